@@ -1,0 +1,1 @@
+//! The post room: documents and meshes in, fabrication files out.

@@ -1,0 +1,9 @@
+//! Turns a job into geometry and one certificate. Knows neither bytes, nor paths, nor HTTP.
+
+pub mod certificate;
+pub mod job;
+pub mod run;
+
+pub use certificate::Certificate;
+pub use job::{Input, Job, JobKind, Params};
+pub use run::{Geometry, JobError, Outcome, Plan, Validation, plan, run, validate};

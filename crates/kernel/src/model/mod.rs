@@ -1,0 +1,42 @@
+//! Shapes as people describe them: one plain struct per family, each of which lowers to an
+//! automaton with control points. Lengths are mm; nothing here is checked yet.
+
+mod bcifs;
+mod bezier;
+mod corner_cutting;
+mod group;
+mod ifs;
+mod mesh;
+
+pub use bcifs::{Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec};
+pub use bezier::BezierCurve;
+pub use corner_cutting::CornerCutting;
+pub use group::{Group, Part};
+pub use ifs::{AffineMap, Ifs, Primitive};
+pub use mesh::{Interior, PolygonMesh};
+
+/// A model: a name and a shape in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// What the author calls it.
+    pub name: Option<String>,
+    /// What it is.
+    pub shape: Shape,
+}
+
+/// A shape of one of the families.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Affine maps of space, with an optional graph.
+    Ifs(Ifs),
+    /// States, operators and boundaries stated in full.
+    Bcifs(Bcifs),
+    /// A polynomial or rational Bezier curve.
+    BezierCurve(BezierCurve),
+    /// The curve of a corner-cutting scheme.
+    CornerCutting(CornerCutting),
+    /// A polygon mesh.
+    Mesh(PolygonMesh),
+    /// Several shapes.
+    Group(Group),
+}
