@@ -1,0 +1,137 @@
+"""Reads fabrication files back with other people's libraries and says what is in them.
+
+    check.py < requests > reports
+
+One JSON document per line: a request is `{"file": PATH, "intersections": true}`, its report follows at once.
+STL is read by trimesh and 3MF by lib3mf in strict mode, the reader of the 3MF consortium. Counts come from our
+own page of numpy below, from trimesh and from Manifold; self-intersections, if asked, from CGAL through libigl
+with exact arithmetic. Whoever reads the reports compares them; nothing is judged here.
+"""
+import json
+import sys
+
+import igl.copyleft.cgal as cgal
+import lib3mf
+import manifold3d
+import numpy as np
+import trimesh
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+
+def weld(points):
+    """Vertices and triangles of a triangle soup; equal coordinates are one vertex."""
+    vertices, index = np.unique(points.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)
+    return vertices, index.reshape(-1, 3)
+
+
+def read_stl(path):
+    """Vertices, triangles and remarks."""
+    soup = trimesh.load(path, file_type="stl", process=False)
+    vertices, triangles = weld(np.asarray(soup.triangles, dtype=np.float64))
+    return vertices, triangles, {"reader": "trimesh " + trimesh.__version__}
+
+
+def read_3mf(path):
+    """The single mesh of a 3MF file, as its build item places it, and the strict reader's remarks."""
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(path)
+    warnings = [reader.GetWarning(k) for k in range(reader.GetWarningCount())]
+    items, iterator = [], model.GetBuildItems()
+    while iterator.MoveNext():
+        items.append(iterator.GetCurrent())
+    objects, iterator = [], model.GetMeshObjects()
+    while iterator.MoveNext():
+        objects.append(iterator.GetCurrentMeshObject())
+    if len(items) != 1 or len(objects) != 1 or items[0].HasObjectTransform():
+        raise ValueError(f"{len(items)} build items, {len(objects)} meshes")
+    mesh = objects[0]
+    vertices = np.array([[*v.Coordinates] for v in mesh.GetVertices()], dtype=np.float64)
+    triangles = np.array([[*t.Indices] for t in mesh.GetTriangleIndices()], dtype=np.int64)
+    millimetres = model.GetUnit() == lib3mf.ModelUnit.MilliMeter
+    remarks = {"warnings": warnings, "millimetres": millimetres, "valid": mesh.IsValid(), "oriented": mesh.IsManifoldAndOriented()}
+    return vertices, triangles, {"reader": "lib3mf", "lib3mf": remarks}
+
+
+def pairs(count, first, second):
+    """Number and labels of the classes of a relation."""
+    ones = np.ones(len(first), dtype=np.int8)
+    return connected_components(coo_matrix((ones, (first, second)), shape=(count, count)), directed=False)
+
+
+def counts(vertices, triangles):
+    """Counts of the topology, by sorting half-edges."""
+    total = len(triangles)
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((high, low))
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (low[order][1:] != low[order][:-1]) | (high[order][1:] != high[order][:-1])
+    first = np.flatnonzero(new)
+    uses = np.diff(np.append(first, len(order)))
+    one, two = order[first[uses == 2]], order[first[uses == 2] + 1]
+    flipped = start[one] == start[two]
+    # A corner is known by the half-edge that leaves it; across an edge, the corners at each of its ends belong to
+    # one fan. A half-edge's far corner is the next one of its triangle.
+    following = lambda h: h - h % 3 + (h + 1) % 3
+    far_one, far_two = following(one), following(two)
+    joined = [np.where(flipped, two, far_two), np.where(flipped, far_two, two)]
+    fans, _ = pairs(3 * total, np.concatenate([one, far_one]), np.concatenate(joined))
+    shells, label = pairs(total, one // 3, two // 3)
+    a, b, c = (vertices[triangles[:, k]] - vertices.mean(axis=0) for k in range(3))
+    volume = np.bincount(label, weights=np.einsum("ij,ij->i", a, np.cross(b, c)) / 6, minlength=shells)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    used = len(np.unique(triangles))
+    euler = used - len(first) + total
+    return {
+        "vertices": used, "edges": len(first), "triangles": total, "euler": euler, "shells": int(shells),
+        "components": int((volume > 0).sum()), "cavities": int((volume < 0).sum()), "genus": int(shells) - euler // 2,
+        "boundary_edges": int((uses == 1).sum()), "nonmanifold_edges": int((uses > 2).sum()),
+        "nonmanifold_vertices": int(fans - used), "flipped_pairs": int(flipped.sum()),
+        "degenerate_triangles": int((area == 0).sum()), "volume": float(volume.sum()), "area": float(area.sum()),
+        "box": [vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()],
+    }
+
+
+def second_opinions(vertices, triangles, intersections):
+    """What trimesh, Manifold and CGAL think."""
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, triangles.astype(np.uint64)))
+    status = str(solid.status()).rsplit(".", 1)[-1]
+    opinions = {
+        "trimesh": {"watertight": bool(mesh.is_watertight), "winding": bool(mesh.is_winding_consistent),
+                    "volume": float(mesh.volume), "euler": int(mesh.euler_number)},
+        "manifold": {"status": status, "volume": float(solid.volume()), "shells": len(solid.decompose())},
+    }
+    if intersections:
+        found = cgal.remesh_self_intersections(vertices, triangles.astype(np.int32), detect_only=True)
+        # The pairs are the third of the five arrays.
+        opinions["self_intersections"] = int(np.asarray(found[2]).reshape(-1, 2).shape[0])
+    return opinions
+
+
+def report(request):
+    """The report on one file."""
+    path = request["file"]
+    vertices, triangles, remarks = (read_3mf if path.endswith(".3mf") else read_stl)(path)
+    finite = bool(np.isfinite(vertices).all())
+    return {**remarks, "finite": finite, **counts(vertices, triangles),
+            **second_opinions(vertices, triangles, request.get("intersections", False))}
+
+
+def main():
+    """Answers until the requests end."""
+    for line in sys.stdin:
+        request = json.loads(line)
+        try:
+            answer = report(request)
+        except Exception as problem:  # a file that cannot be read is a finding, not an end
+            answer = {"problem": f"{type(problem).__name__}: {problem}"}
+        print(json.dumps({"file": request["file"], **answer}), flush=True)
+
+
+if __name__ == "__main__":
+    main()
