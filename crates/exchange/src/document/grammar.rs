@@ -1,0 +1,430 @@
+//! The members of every object of the grammar, once: the reader takes the names from here, the JSON
+//! Schema its properties and descriptions, so that the two cannot disagree on a name.
+
+use serde_json::{Value, json};
+
+/// A kind of object.
+pub(super) struct Object {
+    /// What messages and schemas call it.
+    pub(super) title: &'static str,
+    /// What it is, for people.
+    pub(super) about: &'static str,
+    /// Its members.
+    pub(super) members: &'static [Member],
+}
+
+/// A member of a kind of object.
+#[derive(Clone, Copy)]
+pub(super) struct Member {
+    pub(super) name: &'static str,
+    pub(super) required: bool,
+    /// What it is, for people: in the schema, and in the message when it is missing.
+    pub(super) about: &'static str,
+    /// The schema of its value.
+    pub(super) schema: fn() -> Value,
+}
+
+const fn required(name: &'static str, about: &'static str, schema: fn() -> Value) -> Member {
+    Member { name, required: true, about, schema }
+}
+
+const fn optional(name: &'static str, about: &'static str, schema: fn() -> Value) -> Member {
+    Member { name, required: false, about, schema }
+}
+
+/// A reference to another schema by its bare name; [`super::schema`] adds where schemas live.
+pub(super) fn reference(name: &str) -> Value {
+    json!({ "$ref": name })
+}
+
+fn number() -> Value {
+    json!({ "type": "number" })
+}
+
+fn positive() -> Value {
+    json!({ "type": "number", "exclusiveMinimum": 0 })
+}
+
+fn count() -> Value {
+    json!({ "type": "integer", "minimum": 1 })
+}
+
+fn index() -> Value {
+    json!({ "type": "integer", "minimum": 0 })
+}
+
+fn flag() -> Value {
+    json!({ "type": "boolean", "default": false })
+}
+
+fn text() -> Value {
+    json!({ "type": "string", "minLength": 1, "maxLength": 256 })
+}
+
+fn list(items: Value, least: usize) -> Value {
+    json!({ "type": "array", "items": items, "minItems": least })
+}
+
+fn tuple(items: Value, length: usize) -> Value {
+    json!({ "type": "array", "items": items, "minItems": length, "maxItems": length })
+}
+
+fn vector() -> Value {
+    tuple(number(), 3)
+}
+
+fn points(least: usize) -> Value {
+    list(vector(), least)
+}
+
+fn rational_points(least: usize) -> Value {
+    list(reference("ControlPoint"), least)
+}
+
+fn faces(least: usize) -> Value {
+    list(list(index(), 1), least)
+}
+
+fn index_pair() -> Value {
+    tuple(index(), 2)
+}
+
+fn one_of_words(words: &[&str]) -> Value {
+    json!({ "type": "string", "enum": words })
+}
+
+fn version() -> Value {
+    json!({ "type": "integer", "const": 1 })
+}
+
+/// A point in space with an optional weight, as a schema without members.
+pub(super) fn control_point_schema() -> Value {
+    json!({
+        "description": "A point [x, y, z], or [x, y, z, w] with a positive weight w (1 when absent). The coordinates are those of the point, not multiplied by w.",
+        "type": "array", "items": number(), "minItems": 3, "maxItems": 4
+    })
+}
+
+/// A matrix, as a schema without members.
+pub(super) fn matrix_schema() -> Value {
+    json!({
+        "description": "An array of rows of one length. An entry is a number, null (unknown, to be solved) or the name of one of the model's parameters.",
+        "type": "array", "minItems": 1,
+        "items": { "type": "array", "minItems": 1, "items": { "type": ["number", "null", "string"] } }
+    })
+}
+
+macro_rules! family {
+    ($word:literal) => {
+        required("family", "The family of the shape.", || json!({ "type": "string", "const": $word }))
+    };
+}
+
+pub(super) const MODEL: Object = Object {
+    title: "a model",
+    about: "A shape with its unit. Lengths without a unit are mm.",
+    members: &[
+        required("lacuna", "The version of the grammar: 1.", version),
+        optional("name", "What the author calls the model.", text),
+        optional("units", "The unit of every length of the model; converted to mm on reading. Weights, linear parts and operators have no unit.", || {
+            json!({ "type": "string", "enum": ["um", "mm", "cm", "m", "in"], "default": "mm" })
+        }),
+        required("shape", "The shape, of one of the families.", || reference("Shape")),
+    ],
+};
+
+/// A model inside a job, whose version is the job's.
+pub(super) const EMBEDDED_MODEL: Object = Object {
+    title: "a model",
+    about: "A model inside a job: as a model on its own, but the version may be left to the job.",
+    members: &[Member { required: false, ..MODEL.members[0] }, MODEL.members[1], MODEL.members[2], MODEL.members[3]],
+};
+
+pub(super) const LINEAR_MAP: Object = Object {
+    title: "an affine map",
+    about: "The map x -> A x + t.",
+    members: &[
+        required("linear", "A, three rows of three numbers.", || tuple(vector(), 3)),
+        optional("translation", "t, a length; the origin when absent.", vector),
+    ],
+};
+
+pub(super) const TURNED_MAP: Object = Object {
+    title: "an affine map",
+    about: "The map x -> R S x + t: scaled along x, y and z, then turned about an axis through the origin, then moved.",
+    members: &[
+        optional("scale", "One factor, or one for each of x, y and z; 1 when absent. Zero and negative factors are legal.", || {
+            json!({ "anyOf": [number(), vector()], "default": 1 })
+        }),
+        optional("axis", "Direction of the axis of rotation, of any length above zero; z when absent.", vector),
+        optional("angle_deg", "Angle of the rotation in degrees, counter-clockwise seen from the axis's tip; 0 when absent.", number),
+        optional("translation", "t, a length; the origin when absent.", vector),
+    ],
+};
+
+/// `linear` as a member that may be absent: known wherever a map is read.
+pub(super) const LINEAR_IF_ANY: &[Member] = &[Member { required: false, ..LINEAR_MAP.members[0] }];
+
+/// The members of [`TURNED_MAP`] that exclude `linear`.
+pub(super) const TURNS: &[Member] = &[TURNED_MAP.members[0], TURNED_MAP.members[1], TURNED_MAP.members[2]];
+
+pub(super) const IFS: Object = Object {
+    title: "an ifs",
+    about: "An iterated function system: the compact set A with A = union of T_i A, for affine maps T_i of space.",
+    members: &[
+        family!("ifs"),
+        required("maps", "The maps T_i.", || list(reference("AffineMap"), 1)),
+        optional("primitive", "The compact drawn at the leaves; a point of each leaf cell when absent.", || reference("Primitive")),
+        optional(
+            "graph",
+            "Which maps may follow which in an address: one list of indices of maps per map, or a square matrix of booleans. All may follow all when absent.",
+            || {
+                json!({ "anyOf": [
+                    list(json!({ "type": "array", "items": index(), "uniqueItems": true }), 1),
+                    list(list(json!({ "type": "boolean" }), 1), 1),
+                ] })
+            },
+        ),
+    ],
+};
+
+pub(super) const PRIMITIVE: Object = Object {
+    title: "a primitive",
+    about: "A compact set: exactly one of points, a polyline, a mesh taken as a surface, or a solid.",
+    members: &[
+        optional("points", "Points.", || points(1)),
+        optional("polyline", "The corners of a polyline, in order.", || points(1)),
+        optional("closed", "Whether the polyline's last corner is joined to its first; only with `polyline`.", flag),
+        optional("mesh", "A polygon mesh, taken as a surface.", || reference("MeshData")),
+        optional("solid", "A closed polygon mesh with outward faces, taken with its interior.", || reference("MeshData")),
+    ],
+};
+
+pub(super) const MESH_DATA: Object = Object {
+    title: "a polygon mesh",
+    about: "Corner points, and the indices of each face's corners.",
+    members: &[
+        required("vertices", "The corner points.", || points(1)),
+        required("faces", "The corner indices of each face, counter-clockwise seen from outside.", || faces(1)),
+    ],
+};
+
+pub(super) const BCIFS: Object = Object {
+    title: "a bcifs",
+    about: "A boundary controlled iterated function system, stated in full: states, operators, boundaries, constraints and root cells.",
+    members: &[
+        family!("bcifs"),
+        required("states", "The kinds of cells.", || list(reference("State"), 1)),
+        optional("incidences", "Incidence constraints: how a boundary's subdivision lies in the subdivision.", || list(reference("Incidence"), 0)),
+        optional("adjacencies", "Adjacency constraints: boundaries that two children share.", || list(reference("Adjacency"), 0)),
+        required("cells", "The root cells.", || list(reference("RootCell"), 1)),
+        optional("glue", "Boundaries of root cells that are one; as objects or as bare pairs.", || {
+            list(json!({ "anyOf": [reference("Glue"), tuple(index_pair(), 2)] }), 0)
+        }),
+        optional("parameters", "Named values that entries of matrices may use.", || {
+            json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() })
+        }),
+    ],
+};
+
+pub(super) const STATE: Object = Object {
+    title: "a state",
+    about: "A kind of cell.",
+    members: &[
+        required("name", "The state's name, unique in the model.", text),
+        required("cell", "The topological kind of the cell.", || one_of_words(&["vertex", "edge", "face", "volume"])),
+        required("dimension", "The number of control points.", count),
+        required("transitions", "How the cell subdivides.", || list(reference("Transition"), 0)),
+        optional("boundaries", "The cell's boundary cells, in order.", || list(reference("Boundary"), 0)),
+    ],
+};
+
+pub(super) const TRANSITION: Object = Object {
+    title: "a transition",
+    about: "A child of a cell.",
+    members: &[
+        required("to", "Name of the child's state.", text),
+        required("operator", "T: its columns are the child's control points in the parent's barycentric space.", || reference("Matrix")),
+    ],
+};
+
+pub(super) const BOUNDARY: Object = Object {
+    title: "a boundary",
+    about: "A boundary cell of a cell.",
+    members: &[
+        required("state", "Name of the boundary's state.", text),
+        required("incidence", "Its columns are the boundary's control points in the cell's barycentric space.", || reference("Matrix")),
+    ],
+};
+
+pub(super) const INCIDENCE: Object = Object {
+    title: "an incidence",
+    about: "The j-th child of boundary `boundary` is boundary m of child i, with [i, m] = children[j].",
+    members: &[
+        required("state", "Name of the state.", text),
+        required("boundary", "Index of the boundary.", index),
+        required("children", "Pairs [child, boundary of that child].", || list(index_pair(), 0)),
+    ],
+};
+
+pub(super) const ADJACENCY: Object = Object {
+    title: "an adjacency",
+    about: "Two children share a boundary.",
+    members: &[
+        required("state", "Name of the state.", text),
+        required("between", "Two pairs [child, boundary of that child].", || tuple(index_pair(), 2)),
+        optional("reversed", "Whether the second is seen from its other end.", flag),
+    ],
+};
+
+pub(super) const ROOT_CELL: Object = Object {
+    title: "a root cell",
+    about: "A cell that the shape starts from.",
+    members: &[
+        required("state", "Name of the cell's state.", text),
+        required("control_points", "As many points as the state's dimension.", || rational_points(1)),
+    ],
+};
+
+pub(super) const GLUE: Object = Object {
+    title: "a glue",
+    about: "Two boundaries of root cells that are one.",
+    members: &[
+        required("between", "Two pairs [root cell, boundary of its state].", || tuple(index_pair(), 2)),
+        optional("reversed", "Whether the second is seen from its other end.", flag),
+    ],
+};
+
+pub(super) const BEZIER_CURVE: Object = Object {
+    title: "a bezier_curve",
+    about: "A polynomial or rational Bezier curve; n control points make degree n - 1.",
+    members: &[
+        family!("bezier_curve"),
+        required("control_points", "The control points, in order.", || rational_points(1)),
+        optional("weights", "One positive weight per control point, unless the points carry theirs.", || list(positive(), 1)),
+    ],
+};
+
+pub(super) const CORNER_CUTTING: Object = Object {
+    title: "a corner_cutting",
+    about: "The limit of the corner-cutting scheme (a, b) on a control polygon; a = b = 1/4 is Chaikin's.",
+    members: &[
+        family!("corner_cutting"),
+        required("control_points", "The control polygon.", || points(3)),
+        optional("a", "First parameter; 1/4 when absent.", || json!({ "type": "number", "default": 0.25 })),
+        optional("b", "Second parameter; 1/4 when absent.", || json!({ "type": "number", "default": 0.25 })),
+        optional("closed", "Whether the polygon is closed.", flag),
+    ],
+};
+
+pub(super) const MESH: Object = Object {
+    title: "a mesh",
+    about: "A polygon mesh: faces of one corner are points, of two segments, of three and more polygons.",
+    members: &[
+        family!("mesh"),
+        required("vertices", "The corner points.", || points(1)),
+        required("faces", "The corner indices of each face, counter-clockwise seen from outside.", || faces(1)),
+        optional("interior", "Whether the mesh stands for the solid that it bounds or for its surface; `auto`: the solid if it is closed.", || {
+            json!({ "type": "string", "enum": ["auto", "solid", "surface"], "default": "auto" })
+        }),
+    ],
+};
+
+pub(super) const GROUP: Object = Object {
+    title: "a group",
+    about: "The union of several shapes.",
+    members: &[family!("group"), required("parts", "The shapes, each with an optional name and place.", || list(reference("Part"), 1))],
+};
+
+/// What a part has besides its shape.
+pub(super) const PART_MEMBERS: &[Member] = &[
+    optional("name", "What the author calls the part.", text),
+    optional("transform", "Where the part is put; as it is when absent.", || reference("AffineMap")),
+];
+
+pub(super) const PART: Object = Object {
+    title: "a part",
+    about: "A shape with an optional name and place, the shape as a member.",
+    members: &[PART_MEMBERS[0], PART_MEMBERS[1], required("shape", "The shape of the part.", || reference("Shape"))],
+};
+
+/// The families that can be evaluated, with the schema's name.
+pub(super) const FAMILIES: [(&str, &str, &Object); 6] = [
+    ("ifs", "IfsShape", &IFS),
+    ("bcifs", "BcifsShape", &BCIFS),
+    ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
+    ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
+    ("mesh", "MeshShape", &MESH),
+    ("group", "GroupShape", &GROUP),
+];
+
+/// Families of the grammar that cannot be evaluated yet.
+pub(super) const LATER_FAMILIES: [&str; 12] = [
+    "bezier_surface",
+    "nurbs_curve",
+    "nurbs_surface",
+    "nurbs_volume",
+    "catmull_rom",
+    "beta_spline",
+    "four_point",
+    "subdivision",
+    "interpolation",
+    "terrain",
+    "tensor",
+    "sum",
+];
+
+/// Kinds of jobs of the grammar that cannot be done yet.
+pub(super) const LATER_KINDS: [&str; 7] = ["intersect", "check", "slice", "sla", "cast", "panels", "convert"];
+
+pub(super) const JOB: Object = Object {
+    title: "a job",
+    about: "An order: what to do, with which model, how precisely, and what to deliver. Exactly one of model, model_ref and inputs is given.",
+    members: &[
+        required("lacuna", "The version of the grammar: 1.", version),
+        required(
+            "kind",
+            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), or measure (box, area and volume as intervals).",
+            || one_of_words(&["evaluate", "solidify", "measure"]),
+        ),
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional("inputs", "Named models, for kinds of jobs with several.", || list(reference("JobInput"), 1)),
+        required("params", "How to do it.", || reference("JobParams")),
+        optional("outputs", "Names of the formats wanted, for example 3mf and stl.", || {
+            json!({ "type": "array", "items": text(), "uniqueItems": true })
+        }),
+        optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
+    ],
+};
+
+pub(super) const JOB_INPUT: Object = Object {
+    title: "an input",
+    about: "A named model. Exactly one of model and model_ref is given.",
+    members: &[
+        required("name", "What the job calls the model.", text),
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+    ],
+};
+
+pub(super) const JOB_PARAMS: Object = Object {
+    title: "params",
+    about: "Settings of a job. What a kind does not use must be absent.",
+    members: &[
+        required("tolerance_mm", "The Hausdorff bound on the result, in mm, above zero.", positive),
+        optional("radius_mm", "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, absent for evaluate.", positive),
+    ],
+};
+
+pub(super) const JOB_LIMITS: Object = Object {
+    title: "limits",
+    about: "What a job may use. Each limit that is absent is the service's default.",
+    members: &[
+        optional("seconds", "Wall time in seconds.", positive),
+        optional("triangles", "Triangles of the result.", count),
+        optional("cells", "Leaf cells that the evaluation may produce.", count),
+        optional("memory_bytes", "Accounted memory in bytes.", count),
+        optional("depth", "Length of the longest address.", || json!({ "type": "integer", "minimum": 1, "maximum": u32::MAX })),
+    ],
+};

@@ -1,0 +1,318 @@
+//! Reads jobs: what to do, with which models, how precisely, and within which limits.
+
+use lacuna_fabrication::job::{Input, Job, JobKind, Params};
+use lacuna_kernel::budget::Limits;
+use lacuna_kernel::model::Model;
+
+use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS};
+use super::model::{model, version};
+use super::node::{Place, quoted};
+use super::walk::{Members, Walker, length, suggestion};
+use crate::diagnostic::{Diagnostic, code};
+
+/// A job as its document states it: legal, with references to stored models still to be resolved and
+/// limits still to be completed from the service's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobDocument {
+    /// What to do.
+    pub kind: JobKind,
+    /// With what.
+    pub inputs: Vec<InputDocument>,
+    /// How.
+    pub params: Params,
+    /// Names of the formats wanted, each once; the exchange crate's table knows them.
+    pub outputs: Vec<String>,
+    /// What may be used, as far as the document says.
+    pub limits: RequestedLimits,
+}
+
+/// A model that a job uses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputDocument {
+    /// The name that the job gives it, if it does.
+    pub name: Option<String>,
+    /// The model, or where it is stored.
+    pub source: ModelSource,
+    /// JSON pointer to the model or the reference.
+    pub pointer: String,
+}
+
+/// A model in full, or the id of a stored one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ModelSource {
+    /// The model.
+    Inline(Box<Model>),
+    /// The id.
+    Stored(String),
+}
+
+/// Limits that a document asks for; the service's own where it says nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RequestedLimits {
+    /// Wall time in seconds.
+    pub seconds: Option<f64>,
+    /// Accounted memory in bytes.
+    pub memory_bytes: Option<u64>,
+    /// Leaf cells.
+    pub cells: Option<u64>,
+    /// Triangles of the result.
+    pub triangles: Option<u64>,
+    /// Length of the longest address.
+    pub depth: Option<u32>,
+}
+
+impl RequestedLimits {
+    /// The limits of the job: what was asked, `default` where nothing was.
+    ///
+    /// # Errors
+    /// A diagnostic for each limit asked above `most`.
+    pub fn resolve(&self, default: &Limits, most: &Limits) -> Result<Limits, Vec<Diagnostic>> {
+        let limits = Limits {
+            seconds: self.seconds.unwrap_or(default.seconds),
+            memory_bytes: self.memory_bytes.unwrap_or(default.memory_bytes),
+            cells: self.cells.unwrap_or(default.cells),
+            triangles: self.triangles.unwrap_or(default.triangles),
+            depth: self.depth.unwrap_or(default.depth),
+        };
+        let excesses = [
+            ("seconds", self.seconds.is_some() && limits.seconds > most.seconds, limits.seconds.to_string(), most.seconds.to_string()),
+            ("memory_bytes", limits.memory_bytes > most.memory_bytes, limits.memory_bytes.to_string(), most.memory_bytes.to_string()),
+            ("cells", limits.cells > most.cells, limits.cells.to_string(), most.cells.to_string()),
+            ("triangles", limits.triangles > most.triangles, limits.triangles.to_string(), most.triangles.to_string()),
+            ("depth", limits.depth > most.depth, limits.depth.to_string(), most.depth.to_string()),
+        ];
+        let diagnostics: Vec<_> = excesses
+            .into_iter()
+            .filter(|(_, exceeded, _, _)| *exceeded)
+            .map(|(name, _, asked, allowed)| Diagnostic {
+                pointer: format!("/limits/{name}"),
+                code: code::LIMIT_TOO_HIGH,
+                message: format!("is {asked}; at most {allowed} is allowed"),
+                line: None,
+                column: None,
+            })
+            .collect();
+        if diagnostics.is_empty() { Ok(limits) } else { Err(diagnostics) }
+    }
+}
+
+impl JobDocument {
+    /// The ids of stored models that the job refers to.
+    pub fn references(&self) -> impl Iterator<Item = &str> {
+        self.inputs.iter().filter_map(|input| match &input.source {
+            ModelSource::Stored(id) => Some(id.as_str()),
+            ModelSource::Inline(_) => None,
+        })
+    }
+
+    /// The job, with stored models fetched by `find` and limits that are absent taken from `default`.
+    /// An input without a name is called as its model, or `shape`.
+    ///
+    /// # Errors
+    /// A diagnostic for each reference that `find` does not know, and each limit above `most`.
+    pub fn resolve(self, default: &Limits, most: &Limits, mut find: impl FnMut(&str) -> Option<Model>) -> Result<Job, Vec<Diagnostic>> {
+        let mut diagnostics = Vec::new();
+        let mut inputs = Vec::with_capacity(self.inputs.len());
+        for InputDocument { name, source, pointer } in self.inputs {
+            let model = match source {
+                ModelSource::Inline(model) => Some(*model),
+                ModelSource::Stored(id) => {
+                    let model = find(&id);
+                    if model.is_none() {
+                        let message = format!("no model is stored as {}; store it first, or send it as \"model\"", quoted(&id));
+                        diagnostics.push(Diagnostic { pointer, code: code::UNKNOWN_MODEL, message, line: None, column: None });
+                    }
+                    model
+                }
+            };
+            if let Some(model) = model {
+                let name = name.or_else(|| model.name.clone()).unwrap_or_else(|| "shape".into());
+                inputs.push(Input { name, model });
+            }
+        }
+        match self.limits.resolve(default, most) {
+            Ok(limits) if diagnostics.is_empty() => {
+                Ok(Job { kind: self.kind, inputs, params: self.params, outputs: self.outputs, limits })
+            }
+            Ok(_) => Err(diagnostics),
+            Err(excesses) => {
+                diagnostics.extend(excesses);
+                Err(diagnostics)
+            }
+        }
+    }
+}
+
+/// A job document.
+pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocument> {
+    let members = walker.object(place, &JOB)?;
+    if let Some(place) = members.get("lacuna") {
+        version(walker, place);
+    }
+    let kind = members.get("kind").and_then(|place| kind(walker, place));
+    let inputs = inputs(walker, &members);
+    let params = members.get("params").and_then(|place| params(walker, place, kind));
+    let outputs = members.get("outputs").map_or(Some(Vec::new()), |place| outputs(walker, place, kind));
+    let limits = members.get("limits").map_or(Some(RequestedLimits::default()), |place| limits(walker, place));
+    Some(JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits? })
+}
+
+fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
+    const KINDS: [(&str, JobKind); 3] = [("evaluate", JobKind::Evaluate), ("solidify", JobKind::Solidify), ("measure", JobKind::Measure)];
+    let text = walker.text(place, "the name of a kind of job")?;
+    if let Some((_, kind)) = KINDS.iter().find(|(word, _)| *word == text) {
+        return Some(*kind);
+    }
+    let available = || KINDS.iter().map(|(word, _)| *word);
+    if LATER_KINDS.contains(&text) {
+        walker.fault(&place, code::KIND_NOT_AVAILABLE, || {
+            format!("jobs of kind \"{text}\" are not available yet; available are {}", available().collect::<Vec<_>>().join(", "))
+        });
+    } else {
+        walker.fault(&place, code::UNKNOWN_VALUE, || format!("{} is not a kind of job; {}", quoted(text), suggestion(text, available())));
+    }
+    None
+}
+
+/// Exactly one of `model`, `model_ref` and `inputs`; every kind of job takes one model today.
+fn inputs(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Vec<InputDocument>> {
+    one_of(walker, members, &["model", "model_ref", "inputs"], "a job")?;
+    let Some(place) = members.get("inputs") else {
+        return Some(vec![InputDocument { name: None, ..source(walker, members)? }]);
+    };
+    let mut names: Vec<String> = Vec::new();
+    let inputs = walker.each_of(place, 1, "an array of inputs", |walker, place| {
+        let members = walker.object(place, &JOB_INPUT)?;
+        let name = members.get("name").and_then(|place| {
+            let name = walker.name(place, "the name of an input")?;
+            if names.contains(&name) {
+                walker.fault(&place, code::DUPLICATE_NAME, || format!("another input is called {} already", quoted(&name)));
+                return None;
+            }
+            // why: with more inputs than any job takes, a fault is certain and the rest need not be compared
+            if names.len() < 64 {
+                names.push(name.clone());
+            }
+            Some(name)
+        });
+        let source = one_of(walker, &members, &["model", "model_ref"], "an input").and_then(|()| source(walker, &members));
+        Some(InputDocument { name: Some(name?), ..source? })
+    });
+    match length(place.node) {
+        Some(found) if found > 1 => walker.wrong_length(&place, found, "one input: evaluate, solidify and measure take one model"),
+        _ => inputs,
+    }
+}
+
+/// Reports unless exactly one of the members is there.
+fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title: &str) -> Option<()> {
+    let listed = || names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+    let mut stated = names.iter().filter(|name| members.has(name));
+    let Some(first) = stated.next() else {
+        walker.fault(&members.place, code::MISSING_MEMBER, || format!("{title} needs one of the members {}", listed()));
+        return None;
+    };
+    let mut alone = Some(());
+    for other in stated {
+        if let Some(conflict) = members.get(other) {
+            walker.fault(&conflict, code::CONFLICTING_MEMBERS, || format!("\"{other}\" and \"{first}\" exclude each other; keep one of {}", listed()));
+        }
+        alone = None;
+    }
+    alone
+}
+
+/// The model, or the reference to it.
+fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<InputDocument> {
+    if let Some(place) = members.get("model") {
+        let source = ModelSource::Inline(Box::new(model(walker, place, true)?));
+        return Some(InputDocument { name: None, source, pointer: place.path.pointer() });
+    }
+    let place = members.get("model_ref")?;
+    let source = ModelSource::Stored(walker.name(place, "the id of a stored model")?);
+    Some(InputDocument { name: None, source, pointer: place.path.pointer() })
+}
+
+fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Params> {
+    let members = walker.object(place, &JOB_PARAMS)?;
+    let tolerance = members.get("tolerance_mm").and_then(|place| walker.positive(place, "a tolerance in mm"));
+    let radius = members.get("radius_mm").map(|place| walker.positive(place, "a radius in mm"));
+    match (kind, members.get("radius_mm")) {
+        (Some(JobKind::Solidify), None) => {
+            walker.fault(&place, code::MISSING_MEMBER, || {
+                "solidify needs the member \"radius_mm\": the radius of the dilating ball, in mm".into()
+            });
+            return None;
+        }
+        (Some(JobKind::Evaluate), Some(radius)) => {
+            walker.fault(&radius, code::CONFLICTING_MEMBERS, || {
+                "evaluate dilates nothing and takes no \"radius_mm\"; remove it, or ask for the kind \"solidify\"".into()
+            });
+            return None;
+        }
+        _ => {}
+    }
+    let radius_mm = match radius {
+        Some(radius) => Some(radius?),
+        None => None,
+    };
+    Some(Params { tolerance_mm: tolerance?, radius_mm })
+}
+
+fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {
+    let mut seen: Vec<String> = Vec::new();
+    let outputs = walker.each(place, "an array of names of formats", |walker, place| {
+        let name = walker.name(place, "the name of a format")?;
+        if seen.contains(&name) {
+            walker.fault(&place, code::REPEATED_ELEMENT, || format!("{} is asked for twice; ask for it once", quoted(&name)));
+            return None;
+        }
+        // why: there are a dozen formats; a list of a million names is compared with the first few
+        if seen.len() < 64 {
+            seen.push(name.clone());
+        }
+        Some(name)
+    })?;
+    if kind == Some(JobKind::Measure) && !outputs.is_empty() {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || "measure delivers numbers and no files; remove \"outputs\"".into());
+        return None;
+    }
+    Some(outputs)
+}
+
+fn limits(walker: &mut Walker<'_>, place: Place<'_>) -> Option<RequestedLimits> {
+    let members = walker.object(place, &JOB_LIMITS)?;
+    let seconds = members.get("seconds").map(|place| walker.positive(place, "a time in seconds"));
+    let mut count = |name: &str, most: u64| {
+        let place = members.get(name)?;
+        let number = walker.positive(place, "a limit").and_then(|_| walker.integer(place, "a limit"));
+        Some(number.and_then(|number| {
+            if number <= most {
+                return Some(number);
+            }
+            walker.fault(&place, code::INDEX_OUT_OF_RANGE, || format!("is {number}; expected {most} at most"));
+            None
+        }))
+    };
+    let memory_bytes = count("memory_bytes", u64::MAX);
+    let cells = count("cells", u64::MAX);
+    let triangles = count("triangles", u64::MAX);
+    let depth = count("depth", u64::from(u32::MAX));
+    // why: the outer option says whether the member is there, the inner whether it is legal
+    Some(RequestedLimits {
+        seconds: stated(seconds)?,
+        memory_bytes: stated(memory_bytes)?,
+        cells: stated(cells)?,
+        triangles: stated(triangles)?,
+        depth: stated(depth)?.and_then(|depth| u32::try_from(depth).ok()),
+    })
+}
+
+/// Absent is legal, wrong is not.
+#[allow(clippy::option_option)]
+fn stated<T>(member: Option<Option<T>>) -> Option<Option<T>> {
+    match member {
+        None => Some(None),
+        Some(value) => value.map(Some),
+    }
+}

@@ -1,0 +1,119 @@
+//! Documents: JSON in, models and jobs out, with every fault at once.
+//!
+//! A document is read in three steps. Its bytes become text within the limits; the text becomes a tree
+//! that keeps order, repeated names and places (`parse`); the tree becomes a typed model or
+//! job (`model`, `job`), and whatever is wrong on the way is noted with its JSON pointer instead of ending
+//! the reading. After that nothing about the document needs to be looked at again, except what only the
+//! mathematics can tell: the kernel's business.
+
+mod bcifs;
+mod curve;
+mod grammar;
+mod ifs;
+mod job;
+mod mesh;
+mod model;
+mod node;
+mod parse;
+mod report;
+mod schema;
+mod transform;
+mod units;
+mod walk;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
+pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
+pub use schema::{job_schema, model_schema, schemas};
+pub use write::{write_job, write_model, write_model_indented};
+
+use lacuna_kernel::model::Model;
+
+use crate::diagnostic::{Diagnostic, code};
+use node::Place;
+use report::{Report, single};
+use walk::{Walker, root};
+
+/// How large a document may be. The bytes bound time and memory; the rest bounds what is built of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DocumentLimits {
+    /// Bytes of the document; a larger one is refused before any of it is read.
+    pub bytes: usize,
+    /// Nesting of arrays and objects; never above 256, whatever is set here.
+    pub nesting: usize,
+    /// JSON values, numbers in arrays of numbers not counted: memory is about 60 bytes for each.
+    pub values: usize,
+    /// States of a model.
+    pub states: usize,
+    /// Transitions of a model, the maps and the graph of an `ifs` included.
+    pub transitions: usize,
+    /// Faults that are listed; the others are counted.
+    pub diagnostics: usize,
+}
+
+impl Default for DocumentLimits {
+    /// 8 MiB, 64 levels, 8 million values, 4096 states, 65536 transitions, 100 diagnostics.
+    fn default() -> Self {
+        Self { bytes: 8 << 20, nesting: 64, values: 8_000_000, states: 4096, transitions: 65_536, diagnostics: 100 }
+    }
+}
+
+/// Reads a model document. Lengths come out in mm.
+///
+/// Linear in the document's length.
+///
+/// # Errors
+/// Every fault that can be found without mathematics, in the order of the text, and at least one.
+pub fn read_model(bytes: &[u8], limits: &DocumentLimits) -> Result<Model, Vec<Diagnostic>> {
+    read(bytes, limits, |walker, place| model::model(walker, place, false))
+}
+
+/// Reads a job document; [`JobDocument::resolve`] makes a job of it.
+///
+/// # Errors
+/// As [`read_model`], and what the kind of job needs or cannot have.
+pub fn read_job(bytes: &[u8], limits: &DocumentLimits) -> Result<JobDocument, Vec<Diagnostic>> {
+    read(bytes, limits, job::job)
+}
+
+fn read<T>(
+    bytes: &[u8],
+    limits: &DocumentLimits,
+    take: impl FnOnce(&mut Walker<'_>, Place<'_>) -> Option<T>,
+) -> Result<T, Vec<Diagnostic>> {
+    let text = text(bytes, limits)?;
+    let mut report = Report::new(limits.diagnostics);
+    let Some(node) = parse::parse(text, limits, &mut report) else {
+        return Err(report.into_diagnostics(text));
+    };
+    let mut walker = Walker::new(limits, report);
+    match take(&mut walker, root(&node)) {
+        Some(value) if walker.report.is_clean() => Ok(value),
+        _ => {
+            assert!(!walker.report.is_clean(), "a document that is refused has a reason");
+            Err(walker.report.into_diagnostics(text))
+        }
+    }
+}
+
+/// The document as text: not too large, UTF-8, without a byte order mark.
+fn text<'b>(bytes: &'b [u8], limits: &DocumentLimits) -> Result<&'b str, Vec<Diagnostic>> {
+    if bytes.len() > limits.bytes {
+        let (found, allowed) = (bytes.len(), limits.bytes);
+        return Err(single(&[], code::TOO_LARGE, format!("the document has {found} bytes; {allowed} are allowed")));
+    }
+    let marks: [(&[u8], &str); 3] = [(b"\xEF\xBB\xBF", "UTF-8"), (b"\xFF\xFE", "UTF-16"), (b"\xFE\xFF", "UTF-16")];
+    if let Some((_, encoding)) = marks.iter().find(|(mark, _)| bytes.starts_with(mark)) {
+        let message = format!("the document starts with a byte order mark ({encoding}); save it as UTF-8 without one");
+        return Err(single(&[], code::BYTE_ORDER_MARK, message));
+    }
+    std::str::from_utf8(bytes).map_err(|error| {
+        let before = bytes.get(..error.valid_up_to()).unwrap_or_default();
+        match error.error_len() {
+            None => single(before, code::TRUNCATED, "the document ends in the middle of a character; was it sent completely?".into()),
+            Some(_) => single(before, code::NOT_UTF8, format!("byte {} does not belong to UTF-8 text; save the document as UTF-8", before.len())),
+        }
+    })
+}

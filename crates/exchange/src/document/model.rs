@@ -1,0 +1,114 @@
+//! Reads models: version, name, unit, and a shape of one of the families.
+
+use lacuna_kernel::model::{Group, Model, Part, Shape};
+
+use super::bcifs::bcifs;
+use super::curve::{bezier_curve, corner_cutting};
+use super::grammar::{EMBEDDED_MODEL, FAMILIES, GROUP, LATER_FAMILIES, MODEL, Member, PART, PART_MEMBERS};
+use super::ifs::ifs;
+use super::mesh::mesh;
+use super::node::{Place, Value, number_text, quoted};
+use super::transform::affine_map;
+use super::units::{UNITS, Unit};
+use super::walk::{Walker, suggestion};
+use crate::diagnostic::code;
+
+/// The version of the grammar that is read.
+const VERSION: f64 = 1.0;
+
+/// A model document. The version may be absent where the model stands in a job that has it.
+pub(super) fn model(walker: &mut Walker<'_>, place: Place<'_>, in_job: bool) -> Option<Model> {
+    let members = walker.object(place, if in_job { &EMBEDDED_MODEL } else { &MODEL })?;
+    if let Some(place) = members.get("lacuna") {
+        version(walker, place);
+    }
+    let name = match members.get("name") {
+        Some(place) => walker.name(place, "the name of a model").map(Some),
+        None => Some(None),
+    };
+    let unit = members.get("units").and_then(|place| walker.word(place, "a unit of length", &UNITS));
+    walker.unit = unit.unwrap_or(Unit::Millimetre);
+    (walker.states, walker.transitions) = (0, 0);
+    let shape = members.get("shape").and_then(|place| shape(walker, place, &[]));
+    Some(Model { name: name?, shape: shape? })
+}
+
+/// Reports a version that is not the one read here.
+pub(super) fn version(walker: &mut Walker<'_>, place: Place<'_>) {
+    if let Some(version) = walker.number(place)
+        && version != VERSION
+    {
+        walker.fault(&place, code::UNSUPPORTED_VERSION, || {
+            format!("is {}; this program reads version {VERSION} of the grammar", number_text(version))
+        });
+    }
+}
+
+/// A shape; `added` are members that the context allows besides those of the family.
+fn shape(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<Shape> {
+    let Value::Object(entries) = &place.node.value else {
+        return walker.wrong_type(&place, "an object (a shape with its family)");
+    };
+    let available = || FAMILIES.iter().map(|(family, _, _)| *family);
+    let Some((name, node)) = entries.iter().find(|(name, _)| name == "family") else {
+        walker.fault(&place, code::MISSING_MEMBER, || {
+            format!("a shape needs the member \"family\": one of {}", available().collect::<Vec<_>>().join(", "))
+        });
+        return None;
+    };
+    let family_place = Place { node, path: place.path.member(name) };
+    let family = walker.text(family_place, "the name of a family")?;
+    match family {
+        "ifs" => ifs(walker, place, added).map(Shape::Ifs),
+        "bcifs" => bcifs(walker, place, added).map(Shape::Bcifs),
+        "bezier_curve" => bezier_curve(walker, place, added).map(Shape::BezierCurve),
+        "corner_cutting" => corner_cutting(walker, place, added).map(Shape::CornerCutting),
+        "mesh" => mesh(walker, place, added).map(Shape::Mesh),
+        "group" => group(walker, place, added).map(Shape::Group),
+        later if LATER_FAMILIES.contains(&later) => {
+            walker.fault(&family_place, code::FAMILY_NOT_AVAILABLE, || {
+                format!("the family \"{later}\" is not available yet; available are {}", available().collect::<Vec<_>>().join(", "))
+            });
+            None
+        }
+        unknown => {
+            walker.fault(&family_place, code::UNKNOWN_VALUE, || {
+                format!("{} is not a family; {}", quoted(unknown), suggestion(unknown, available()))
+            });
+            None
+        }
+    }
+}
+
+fn group(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<Group> {
+    let members = walker.object_of(place, &GROUP, added)?;
+    let parts = members.get("parts").and_then(|place| walker.each_of(place, 1, "an array of parts", part))?;
+    Some(Group { parts })
+}
+
+/// A part: a shape that has a name and a place besides its own members, or that is a member itself.
+fn part(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Part> {
+    let Value::Object(entries) = &place.node.value else {
+        return walker.wrong_type(&place, "an object (a part)");
+    };
+    let wrapped = entries.iter().any(|(name, _)| name == "shape");
+    let shape = if wrapped {
+        let members = walker.object(place, &PART)?;
+        members.get("shape").and_then(|place| shape(walker, place, &[]))
+    } else {
+        shape(walker, place, PART_MEMBERS)
+    };
+    let find = |name: &str| {
+        let (key, node) = entries.iter().find(|(key, _)| key == name)?;
+        Some(Place { node, path: place.path.member(key) })
+    };
+    let name = match find("name") {
+        Some(place) => walker.name(place, "the name of a part").map(Some),
+        None => Some(None),
+    };
+    let transform = match find("transform") {
+        Some(place) => affine_map(walker, place).map(Some),
+        None => Some(None),
+    };
+    Some(Part { name: name?, transform: transform?, shape: shape? })
+}

@@ -1,0 +1,142 @@
+//! JSON Schemas (draft 2020-12) of the documents, generated from the grammar's tables.
+//!
+//! A schema tells what the reader's first pass tells: members, types, lengths, words. What needs two
+//! places at once (indices in range, names that are known, members that exclude each other by kind of
+//! job) only the reader tells.
+
+use serde_json::{Map, Value, json};
+
+use super::grammar::{
+    ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA,
+    MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
+    reference,
+};
+
+/// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
+/// between them start with `prefix`, for example `#/components/schemas/`. The entry points are `Model`
+/// and `Job`.
+#[must_use]
+pub fn schemas(prefix: &str) -> Vec<(String, Value)> {
+    let mut schemas = named_schemas();
+    for (_, schema) in &mut schemas {
+        point_references(schema, prefix);
+    }
+    schemas
+}
+
+/// The schema of model documents on its own.
+#[must_use]
+pub fn model_schema() -> Value {
+    standalone("Model")
+}
+
+/// The schema of job documents on its own.
+#[must_use]
+pub fn job_schema() -> Value {
+    standalone("Job")
+}
+
+fn standalone(entry: &str) -> Value {
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$ref": format!("#/$defs/{entry}"),
+        "$defs": schemas("#/$defs/").into_iter().collect::<Map<_, _>>(),
+    })
+}
+
+fn named_schemas() -> Vec<(String, Value)> {
+    const PLAIN: [(&str, &Object); 12] = [
+        ("Model", &MODEL),
+        ("EmbeddedModel", &EMBEDDED_MODEL),
+        ("MeshData", &MESH_DATA),
+        ("State", &STATE),
+        ("Transition", &TRANSITION),
+        ("Boundary", &BOUNDARY),
+        ("Incidence", &INCIDENCE),
+        ("Adjacency", &ADJACENCY),
+        ("RootCell", &ROOT_CELL),
+        ("Glue", &GLUE),
+        ("JobParams", &JOB_PARAMS),
+        ("JobLimits", &JOB_LIMITS),
+    ];
+    let mut schemas: Vec<(String, Value)> = PLAIN.iter().map(|(name, grammar)| ((*name).into(), object(grammar, &[]))).collect();
+    schemas.extend(FAMILIES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
+    schemas.push(("Shape".into(), any_of("A shape of one of the families.", FAMILIES.iter().map(|(_, name, _)| reference(name)))));
+    let placed = FAMILIES.iter().map(|(_, _, grammar)| object(grammar, PART_MEMBERS));
+    let parts = std::iter::once(object(&PART, &[])).chain(placed);
+    schemas.push(("Part".into(), any_of("A shape with an optional name and place: beside the shape's own members, or with the shape as a member.", parts)));
+    let maps = [object(&LINEAR_MAP, &[]), object(&TURNED_MAP, &[])];
+    schemas.push(("AffineMap".into(), any_of("An affine map of space.", maps.into_iter())));
+    schemas.push(("ControlPoint".into(), control_point_schema()));
+    schemas.push(("Matrix".into(), matrix_schema()));
+    schemas.push(("Primitive".into(), primitive()));
+    schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
+    schemas.push(("Job".into(), job()));
+    schemas.sort_by(|(one, _), (other, _)| one.cmp(other));
+    schemas
+}
+
+/// An object with the members of a table and those that a context adds, and no others.
+fn object(grammar: &Object, added: &[Member]) -> Value {
+    let members = || grammar.members.iter().chain(added);
+    let properties: Map<String, Value> = members()
+        .map(|member| {
+            let mut schema = (member.schema)();
+            if let Value::Object(keywords) = &mut schema {
+                // why: generators of clients differ on siblings of a reference, so it gets a wrapper
+                if let Some(target) = keywords.remove("$ref") {
+                    keywords.insert("allOf".into(), json!([{ "$ref": target }]));
+                }
+                keywords.insert("description".into(), member.about.into());
+            }
+            (member.name.to_owned(), schema)
+        })
+        .collect();
+    let required: Vec<&str> = members().filter(|member| member.required).map(|member| member.name).collect();
+    let mut schema = json!({ "type": "object", "description": grammar.about, "properties": properties, "additionalProperties": false });
+    if !required.is_empty() {
+        schema["required"] = json!(required);
+    }
+    schema
+}
+
+fn any_of(about: &str, choices: impl Iterator<Item = Value>) -> Value {
+    json!({ "description": about, "anyOf": choices.collect::<Vec<_>>() })
+}
+
+fn exactly_one(mut schema: Value, names: &[&str]) -> Value {
+    schema["oneOf"] = names.iter().map(|name| json!({ "required": [name] })).collect();
+    schema
+}
+
+fn primitive() -> Value {
+    let mut schema = exactly_one(object(&PRIMITIVE, &[]), &["points", "polyline", "mesh", "solid"]);
+    schema["dependentRequired"] = json!({ "closed": ["polyline"] });
+    schema
+}
+
+fn job() -> Value {
+    let mut schema = exactly_one(object(&JOB, &[]), &["model", "model_ref", "inputs"]);
+    let kind = |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
+    schema["allOf"] = json!([
+        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"] } } })),
+        kind("evaluate", json!({ "properties": { "params": { "not": { "required": ["radius_mm"] } } } })),
+        kind("measure", json!({ "properties": { "outputs": { "maxItems": 0 } } })),
+    ]);
+    schema
+}
+
+fn point_references(schema: &mut Value, prefix: &str) {
+    match schema {
+        Value::Object(keywords) => {
+            for (keyword, value) in keywords.iter_mut() {
+                match value {
+                    Value::String(name) if keyword == "$ref" => *name = format!("{prefix}{name}"),
+                    _ => point_references(value, prefix),
+                }
+            }
+        }
+        Value::Array(values) => values.iter_mut().for_each(|value| point_references(value, prefix)),
+        _ => {}
+    }
+}

@@ -1,0 +1,282 @@
+//! Writes models and jobs as canonical documents: one text for one model, to be hashed and read again.
+//!
+//! Canonical means: no unit (mm), maps as `linear` and `translation`, members in the grammar's order,
+//! defaults left out, parameters in their own order, every number the shortest that reads back to the
+//! same double, and no negative zero.
+
+use glam::{DMat3, DVec3, DVec4};
+use lacuna_fabrication::job::{Input, Job};
+use lacuna_kernel::budget::Limits;
+use lacuna_kernel::model::{
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model,
+    Part, PolygonMesh, Primitive, RootCell, Shape,
+};
+use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+
+/// The canonical document of a model: `read_model` gives the same model back.
+///
+/// A number that is not finite has no place in a document; it is written as a string, which no
+/// document may have there, so that reading refuses it.
+#[must_use]
+pub fn write_model(model: &Model) -> String {
+    text(&Wire(model), false)
+}
+
+/// The canonical document of a model, indented for people.
+#[must_use]
+pub fn write_model_indented(model: &Model) -> String {
+    text(&Wire(model), true)
+}
+
+/// The canonical document of a job, models in full and limits complete: what `input_digest` hashes.
+#[must_use]
+pub fn write_job(job: &Job) -> String {
+    text(&Wire(job), false)
+}
+
+fn text(document: &impl Serialize, indented: bool) -> String {
+    let text = if indented { serde_json::to_string_pretty(document) } else { serde_json::to_string(document) };
+    // why: writing to memory fails only for keys that are not strings, and all keys here are literals or names
+    text.expect("a document has string keys")
+}
+
+/// A kernel type on its way out: the kernel itself knows no JSON.
+struct Wire<'m, T: ?Sized>(&'m T);
+
+/// Numbers, all of them written by this type.
+struct Number(f64);
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        // why: adding zero turns -0 into 0 and changes nothing else
+        if self.0.is_finite() { serializer.serialize_f64(self.0 + 0.0) } else { serializer.serialize_str(&self.0.to_string()) }
+    }
+}
+
+/// A list of things that can be written.
+fn list<'m, T>(items: &'m [T]) -> Vec<Wire<'m, T>> {
+    items.iter().map(Wire).collect()
+}
+
+/// Writes an object member by member, leaving out what is absent.
+struct Members<M>(M);
+
+impl<M: SerializeMap> Members<M> {
+    fn put(&mut self, name: &'static str, value: &impl Serialize) -> Result<&mut Self, M::Error> {
+        self.0.serialize_entry(name, value)?;
+        Ok(self)
+    }
+
+    fn put_if(&mut self, present: bool, name: &'static str, value: &impl Serialize) -> Result<&mut Self, M::Error> {
+        if present { self.put(name, value) } else { Ok(self) }
+    }
+
+    fn put_some(&mut self, name: &'static str, value: Option<&impl Serialize>) -> Result<&mut Self, M::Error> {
+        match value {
+            Some(value) => self.put(name, value),
+            None => Ok(self),
+        }
+    }
+}
+
+macro_rules! object {
+    ($($kind:ty: |$value:ident, $members:ident| $body:expr;)+) => {$(
+        impl Serialize for Wire<'_, $kind> {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let $value = self.0;
+                let mut map = Members(serializer.serialize_map(None)?);
+                let $members = &mut map;
+                $body;
+                map.0.end()
+            }
+        }
+    )+};
+}
+
+macro_rules! shape_object {
+    ($($kind:ty: |$value:ident, $members:ident| $body:expr;)+) => {$(
+        impl Placed<'_, $kind> {
+            fn write<M: SerializeMap>(&self, $members: &mut Members<M>) -> Result<(), M::Error> {
+                let $value = self.0;
+                $body;
+                Ok(())
+            }
+        }
+    )+};
+}
+
+/// A shape whose members go into an object that may have others.
+struct Placed<'m, T>(&'m T);
+
+object! {
+    Model: |model, members| members
+        .put("lacuna", &1)?
+        .put_some("name", model.name.as_ref())?
+        .put("shape", &Wire(&model.shape))?;
+    Shape: |shape, members| write_shape(shape, members)?;
+    Part: |part, members| {
+        members.put_some("name", part.name.as_ref())?.put_some("transform", part.transform.as_ref().map(Wire).as_ref())?;
+        write_shape(&part.shape, members)?
+    };
+    AffineMap: |map, members| members.put("linear", &Wire(&map.linear))?.put("translation", &Wire(&map.translation))?;
+    Primitive: |primitive, members| match primitive {
+        Primitive::Points(points) => members.put("points", &list(points))?,
+        Primitive::Polyline { points, closed } => members.put("polyline", &list(points))?.put_if(*closed, "closed", closed)?,
+        Primitive::Mesh { vertices, faces } => members.put("mesh", &MeshData { vertices, faces })?,
+        Primitive::Solid { vertices, faces } => members.put("solid", &MeshData { vertices, faces })?,
+    };
+    BcifsState: |state, members| members
+        .put("name", &state.name)?
+        .put("cell", match state.cell {
+            CellKind::Vertex => &"vertex",
+            CellKind::Edge => &"edge",
+            CellKind::Face => &"face",
+            CellKind::Volume => &"volume",
+        })?
+        .put("dimension", &state.dimension)?
+        .put("transitions", &list(&state.transitions))?
+        .put_if(!state.boundaries.is_empty(), "boundaries", &list(&state.boundaries))?;
+    lacuna_kernel::model::TransitionSpec: |transition, members| members
+        .put("to", &transition.to)?
+        .put("operator", &Wire(&transition.operator))?;
+    lacuna_kernel::model::BoundarySpec: |boundary, members| members
+        .put("state", &boundary.state)?
+        .put("incidence", &Wire(&boundary.incidence))?;
+    Incidence: |incidence, members| members
+        .put("state", &incidence.state)?
+        .put("boundary", &incidence.boundary)?
+        .put("children", &incidence.children)?;
+    Adjacency: |adjacency, members| members
+        .put("state", &adjacency.state)?
+        .put("between", &adjacency.between)?
+        .put_if(adjacency.reversed, "reversed", &true)?;
+    RootCell: |cell, members| members.put("state", &cell.state)?.put("control_points", &list(&cell.control_points))?;
+    Glue: |glue, members| members.put("between", &glue.between)?.put_if(glue.reversed, "reversed", &true)?;
+    Job: |job, members| members
+        .put("lacuna", &1)?
+        .put("kind", &job.kind)?
+        .put("inputs", &list(&job.inputs))?
+        .put("params", &Wire(&job.params))?
+        .put("outputs", &job.outputs)?
+        .put("limits", &Wire(&job.limits))?;
+    Input: |input, members| members.put("name", &input.name)?.put("model", &Wire(&input.model))?;
+    lacuna_fabrication::job::Params: |params, members| members
+        .put("tolerance_mm", &Number(params.tolerance_mm))?
+        .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?;
+    Limits: |limits, members| members
+        .put("seconds", &Number(limits.seconds))?
+        .put("triangles", &limits.triangles)?
+        .put("cells", &limits.cells)?
+        .put("memory_bytes", &limits.memory_bytes)?
+        .put("depth", &limits.depth)?;
+}
+
+shape_object! {
+    Ifs: |ifs, members| members
+        .put("family", &"ifs")?
+        .put("maps", &list(&ifs.maps))?
+        .put_some("primitive", ifs.primitive.as_ref().map(Wire).as_ref())?
+        .put_some("graph", ifs.graph.as_ref())?;
+    Bcifs: |bcifs, members| members
+        .put("family", &"bcifs")?
+        .put("states", &list(&bcifs.states))?
+        .put_if(!bcifs.incidences.is_empty(), "incidences", &list(&bcifs.incidences))?
+        .put_if(!bcifs.adjacencies.is_empty(), "adjacencies", &list(&bcifs.adjacencies))?
+        .put("cells", &list(&bcifs.cells))?
+        .put_if(!bcifs.glue.is_empty(), "glue", &list(&bcifs.glue))?
+        .put_if(!bcifs.parameters.is_empty(), "parameters", &Parameters(&bcifs.parameters))?;
+    BezierCurve: |curve, members| members
+        .put("family", &"bezier_curve")?
+        .put("control_points", &list(&curve.control_points))?
+        .put_some("weights", curve.weights.as_ref().map(|weights| weights.iter().map(|weight| Number(*weight)).collect::<Vec<_>>()).as_ref())?;
+    CornerCutting: |curve, members| members
+        .put("family", &"corner_cutting")?
+        .put("control_points", &list(&curve.control_points))?
+        .put("a", &Number(curve.a))?
+        .put("b", &Number(curve.b))?
+        .put_if(curve.closed, "closed", &true)?;
+    PolygonMesh: |mesh, members| members
+        .put("family", &"mesh")?
+        .put("vertices", &list(&mesh.vertices))?
+        .put("faces", &mesh.faces)?
+        .put_some("interior", match mesh.interior {
+            Interior::Auto => None,
+            Interior::Solid => Some(&"solid"),
+            Interior::Surface => Some(&"surface"),
+        })?;
+    Group: |group, members| members.put("family", &"group")?.put("parts", &list(&group.parts))?;
+}
+
+fn write_shape<M: SerializeMap>(shape: &Shape, members: &mut Members<M>) -> Result<(), M::Error> {
+    match shape {
+        Shape::Ifs(ifs) => Placed(ifs).write(members),
+        Shape::Bcifs(bcifs) => Placed(bcifs).write(members),
+        Shape::BezierCurve(curve) => Placed(curve).write(members),
+        Shape::CornerCutting(curve) => Placed(curve).write(members),
+        Shape::Mesh(mesh) => Placed(mesh).write(members),
+        Shape::Group(group) => Placed(group).write(members),
+    }
+}
+
+/// Vertices and faces of a primitive.
+struct MeshData<'m> {
+    vertices: &'m [DVec3],
+    faces: &'m [Vec<u32>],
+}
+
+impl Serialize for MeshData<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = Members(serializer.serialize_map(Some(2))?);
+        map.put("vertices", &list(self.vertices))?.put("faces", &self.faces)?;
+        map.0.end()
+    }
+}
+
+/// Named values in their own order.
+struct Parameters<'m>(&'m [(String, f64)]);
+
+impl Serialize for Parameters<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, Number(*value))))
+    }
+}
+
+impl Serialize for Wire<'_, DVec3> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.to_array().map(Number))
+    }
+}
+
+/// A control point; the weight only when it is not 1.
+impl Serialize for Wire<'_, DVec4> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let [x, y, z, w] = self.0.to_array();
+        if w == 1.0 { serializer.collect_seq([x, y, z].map(Number)) } else { serializer.collect_seq([x, y, z, w].map(Number)) }
+    }
+}
+
+impl Serialize for Wire<'_, DMat3> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.transpose().to_cols_array_2d().map(|row| row.map(Number)))
+    }
+}
+
+impl Serialize for Wire<'_, Matrix> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut rows = serializer.serialize_seq(Some(self.0.rows.len()))?;
+        for row in &self.0.rows {
+            rows.serialize_element(&list(row))?;
+        }
+        rows.end()
+    }
+}
+
+impl Serialize for Wire<'_, Entry> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Entry::Number(number) => Number(*number).serialize(serializer),
+            Entry::Unknown => serializer.serialize_unit(),
+            Entry::Parameter(name) => serializer.serialize_str(name),
+        }
+    }
+}
