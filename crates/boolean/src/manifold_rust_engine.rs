@@ -1,0 +1,126 @@
+//! The default engine: manifold-rust, a port of Manifold to Rust in double precision.
+//!
+//! Two habits of the library decide the code. Its batch operation is a left fold, whose cost grows with the square
+//! of the number of operands; the expression tree joins them smallest first. And it takes a closed mesh that crosses
+//! itself without a word and then counts the overlap twice, so operands are searched for crossings first.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use glam::DVec3;
+use lacuna_kernel::budget::CancelToken;
+use lacuna_kernel::solid::TriMesh;
+use manifold_rust::cancel::CancelToken as EngineToken;
+use manifold_rust::csg_tree::CsgNode;
+use manifold_rust::impl_mesh::ManifoldImpl;
+use manifold_rust::manifold::Manifold;
+use manifold_rust::types::{Error as Status, MeshGLP, OpType};
+
+use crate::{BooleanEngine, BooleanError, Fault, Operation, operand};
+
+/// How often the caller's token is looked at; below what a person notices, above what costs anything.
+const POLL: Duration = Duration::from_millis(5);
+
+/// Manifold in Rust: double precision, the same bytes for any number of threads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ManifoldRust;
+
+impl BooleanEngine for ManifoldRust {
+    fn name(&self) -> &'static str {
+        "manifold-rust 0.19.2"
+    }
+
+    fn combine(&self, operation: Operation, operands: &[&TriMesh], cancel: &CancelToken) -> Result<TriMesh, BooleanError> {
+        cancel.check()?;
+        if operands.is_empty() {
+            return if operation == Operation::Union { Ok(TriMesh::default()) } else { Err(BooleanError::NoOperand) };
+        }
+        for (index, mesh) in operands.iter().enumerate() {
+            operand::check(index, mesh)?;
+        }
+        // The library has more than a hundred places that may panic; none of them may take the caller along.
+        let made = catch_unwind(AssertUnwindSafe(|| watched(cancel, |token| evaluate(operation, operands, token))));
+        match made {
+            Ok(result) => result.and_then(|mesh| cancel.check().map(|()| mesh).map_err(BooleanError::from)),
+            Err(panic) => Err(BooleanError::Engine(words(panic.as_ref()))),
+        }
+    }
+}
+
+/// Does the work while a second thread carries the caller's wish to stop over to the library's own token.
+fn watched<T: Send>(cancel: &CancelToken, work: impl FnOnce(&EngineToken) -> T) -> T {
+    let token = EngineToken::new();
+    let (done, waiting) = channel::<()>();
+    std::thread::scope(|scope| {
+        let carried = token.clone();
+        scope.spawn(move || {
+            while waiting.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
+                if cancel.reason().is_some() {
+                    carried.cancel();
+                    return;
+                }
+            }
+        });
+        let result = work(&token);
+        // Dropping the sender, here or in a panic, ends the second thread.
+        drop(done);
+        result
+    })
+}
+
+fn evaluate(operation: Operation, operands: &[&TriMesh], token: &EngineToken) -> Result<TriMesh, BooleanError> {
+    let mut leaves = Vec::with_capacity(operands.len());
+    for (index, mesh) in operands.iter().enumerate() {
+        leaves.push(CsgNode::leaf(import(index, mesh)?));
+        if token.is_cancelled() {
+            // The caller's token tells why.
+            return Ok(TriMesh::default());
+        }
+    }
+    let kind = match operation {
+        Operation::Union => OpType::Add,
+        Operation::Intersection => OpType::Intersect,
+        Operation::Difference => OpType::Subtract,
+    };
+    let result = Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token)));
+    match result.status() {
+        Status::NoError => Ok(export(&result)),
+        Status::Cancelled => Ok(TriMesh::default()),
+        Status::ResultTooLarge => Err(BooleanError::ResultTooLarge),
+        status => Err(BooleanError::Engine(format!("{status:?}"))),
+    }
+}
+
+fn import(index: usize, mesh: &TriMesh) -> Result<ManifoldImpl, BooleanError> {
+    if mesh.triangles.is_empty() {
+        return Ok(Manifold::empty().into_impl());
+    }
+    let not_a_solid = |fault| BooleanError::NotASolid { operand: index, fault };
+    let solid = Manifold::from_mesh_glp(&MeshGLP::<f64, u32> {
+        num_prop: 3,
+        vert_properties: mesh.vertices.iter().flat_map(|p| p.to_array()).collect(),
+        tri_verts: mesh.triangles.as_flattened().to_vec(),
+        ..MeshGLP::default()
+    });
+    match solid.status() {
+        Status::NoError if solid.has_self_intersections() => Err(not_a_solid(Fault::SelfIntersecting)),
+        Status::NoError => Ok(solid.into_impl()),
+        status => Err(BooleanError::Engine(format!("operand {index} was refused: {status:?}"))),
+    }
+}
+
+fn export(solid: &Manifold) -> TriMesh {
+    // -1: no normals among the properties, so no vertex is split.
+    let mesh = solid.get_mesh_glp::<f64, u32>(-1);
+    let (points, _) = mesh.vert_properties.as_chunks::<3>();
+    let (triangles, _) = mesh.tri_verts.as_chunks::<3>();
+    TriMesh { vertices: points.iter().map(|p| DVec3::from_array(*p)).collect(), triangles: triangles.to_vec() }
+}
+
+/// What a panic said.
+fn words(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "panic without words".to_owned())
+}
