@@ -1,0 +1,228 @@
+//! Settings of the service, each with the origin of its value: flag, environment or default.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use lacuna_kernel::budget::Limits;
+
+use crate::digest::Digest;
+
+/// Where a value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// The command line.
+    Flag,
+    /// A variable of the environment.
+    Environment,
+    /// Nobody said otherwise.
+    Default,
+}
+
+/// What the command line of `serve` may say.
+#[derive(Clone, Debug, Default)]
+pub struct Flags {
+    /// `--bind`.
+    pub bind: Option<String>,
+    /// `--data`.
+    pub data: Option<PathBuf>,
+    /// `--workers`.
+    pub workers: Option<usize>,
+    /// `--threads`.
+    pub threads: Option<usize>,
+    /// `--log-format`.
+    pub log_json: Option<bool>,
+}
+
+/// Settings of the service.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Address and port to listen on; port 0 takes a free one.
+    pub bind: SocketAddr,
+    /// The data folder.
+    pub data: PathBuf,
+    /// Jobs that are done at the same time.
+    pub workers: usize,
+    /// Threads that they share; 0 for one per core.
+    pub threads: usize,
+    /// Digests of the keys; without any, everybody who reaches the address is the same owner.
+    pub keys: Vec<Digest>,
+    /// Origins whose pages may call the service.
+    pub cors_origins: Vec<String>,
+    /// Longest JSON body in bytes.
+    pub body_bytes: usize,
+    /// Time for a request's head, in seconds.
+    pub header_seconds: u64,
+    /// Time for a request's body, in seconds.
+    pub body_seconds: u64,
+    /// Time for an answer, in seconds; longer than the longest `Prefer: wait`.
+    pub answer_seconds: u64,
+    /// Jobs that may wait.
+    pub queued: usize,
+    /// Unfinished jobs that one key may have.
+    pub jobs_per_key: usize,
+    /// Submissions per minute that one key may make.
+    pub submissions_per_minute: u32,
+    /// Time to end what runs when the service stops, in seconds.
+    pub drain_seconds: u64,
+    /// Age at which ended jobs are forgotten, in hours.
+    pub retention_hours: u64,
+    /// The most that a job may ask for; the default of what it does not ask for.
+    pub job_limits: Limits,
+    /// Whether the log is JSON.
+    pub log_json: bool,
+}
+
+/// A value that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{name} is {value:?}: {expected}")]
+pub struct BadSetting {
+    /// The setting.
+    pub name: &'static str,
+    /// What was said.
+    pub value: String,
+    /// What is expected.
+    pub expected: &'static str,
+}
+
+/// A setting as `lacuna doctor` tells it.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Told {
+    /// Its name, the variable's.
+    pub name: &'static str,
+    /// Its value in words; secrets are counted, not shown.
+    pub value: String,
+    /// Who said so.
+    pub origin: Origin,
+}
+
+/// Reads settings and keeps where each came from.
+struct Reader<'a> {
+    environment: &'a dyn Fn(&str) -> Option<String>,
+    told: Vec<Told>,
+}
+
+impl Reader<'_> {
+    fn take<T: ToString + std::str::FromStr>(
+        &mut self,
+        name: &'static str,
+        flag: Option<T>,
+        default: T,
+        expected: &'static str,
+    ) -> Result<T, BadSetting> {
+        let (value, origin) = match (flag, (self.environment)(name)) {
+            (Some(value), _) => (value, Origin::Flag),
+            (None, Some(text)) => {
+                let value = text.trim().parse().map_err(|_| BadSetting { name, value: text, expected })?;
+                (value, Origin::Environment)
+            }
+            (None, None) => (default, Origin::Default),
+        };
+        self.told.push(Told { name, value: value.to_string(), origin });
+        Ok(value)
+    }
+
+    fn list(&mut self, name: &'static str, secret: bool) -> Vec<String> {
+        let text = (self.environment)(name);
+        let origin = if text.is_some() { Origin::Environment } else { Origin::Default };
+        let items: Vec<String> =
+            text.unwrap_or_default().split(',').map(str::trim).filter(|item| !item.is_empty()).map(str::to_owned).collect();
+        let value = if secret { format!("{} set", items.len()) } else { items.join(", ") };
+        self.told.push(Told { name, value, origin });
+        items
+    }
+}
+
+impl Config {
+    /// Settings from flags and the environment, and where each came from.
+    ///
+    /// # Errors
+    /// When a value cannot be read, or the address is public and there is no key.
+    pub fn read(
+        flags: &Flags,
+        environment: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<(Self, Vec<Told>), BadSetting> {
+        const COUNT: &str = "a whole number is expected";
+        let mut reader = Reader { environment, told: Vec::new() };
+        let bind = reader.take("LACUNA_BIND", flags.bind.clone(), "127.0.0.1:7878".to_owned(), "")?;
+        let address = bind.parse::<SocketAddr>().map_err(|_| BadSetting {
+            name: "LACUNA_BIND",
+            value: bind.clone(),
+            expected: "an address and a port are expected, for example 127.0.0.1:7878 or [::1]:7878",
+        })?;
+        let data = reader.take("LACUNA_DATA", flags.data.as_ref().map(|d| d.display().to_string()), "lacuna-data".to_owned(), "")?;
+        let defaults = Limits::default();
+        let config = Self {
+            bind: address,
+            data: PathBuf::from(data),
+            workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
+            threads: reader.take("LACUNA_THREADS", flags.threads, 0, COUNT)?,
+            keys: reader.list("LACUNA_API_KEYS", true).iter().map(|key| Digest::of(key.as_bytes())).collect(),
+            cors_origins: reader.list("LACUNA_CORS_ORIGINS", false),
+            body_bytes: reader.take("LACUNA_BODY_BYTES", None, 8 << 20, COUNT)?,
+            header_seconds: reader.take("LACUNA_HEADER_SECONDS", None, 10, COUNT)?,
+            body_seconds: reader.take("LACUNA_BODY_SECONDS", None, 30, COUNT)?,
+            answer_seconds: reader.take("LACUNA_ANSWER_SECONDS", None, 60, COUNT)?,
+            queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,
+            jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 36, COUNT)?,
+            submissions_per_minute: reader.take("LACUNA_SUBMISSIONS_PER_MINUTE", None, 600, COUNT)?,
+            drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
+            retention_hours: reader.take("LACUNA_RETENTION_HOURS", None, 72, COUNT)?,
+            job_limits: Limits {
+                seconds: reader.take("LACUNA_LIMIT_SECONDS", None, 3600.0, "seconds are expected")?,
+                memory_bytes: reader.take("LACUNA_LIMIT_MEMORY_BYTES", None, defaults.memory_bytes, COUNT)?,
+                triangles: reader.take("LACUNA_LIMIT_TRIANGLES", None, 50_000_000, COUNT)?,
+                ..defaults
+            },
+            log_json: reader.take("LACUNA_LOG_JSON", flags.log_json, false, "true or false is expected")?,
+        };
+        config.check(&bind)?;
+        Ok((config, reader.told))
+    }
+
+    /// A service on the network with nobody to ask for a key is an accident, not a setting.
+    fn check(&self, bind: &str) -> Result<(), BadSetting> {
+        if self.keys.is_empty() && !self.bind.ip().is_loopback() {
+            return Err(BadSetting {
+                name: "LACUNA_BIND",
+                value: bind.to_owned(),
+                expected: "an address beyond this machine needs keys: set LACUNA_API_KEYS, or bind to 127.0.0.1",
+            });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_flag_goes_before_the_environment_and_that_before_the_default() {
+        let environment = |name: &str| (name == "LACUNA_WORKERS" || name == "LACUNA_QUEUED").then(|| "7".to_owned());
+        let flags = Flags { workers: Some(3), ..Flags::default() };
+        let (config, told) = Config::read(&flags, &environment).unwrap();
+        assert_eq!((config.workers, config.queued, config.jobs_per_key), (3, 7, 36));
+        let origin = |name| told.iter().find(|t| t.name == name).unwrap().origin;
+        assert_eq!(origin("LACUNA_WORKERS"), Origin::Flag);
+        assert_eq!(origin("LACUNA_QUEUED"), Origin::Environment);
+        assert_eq!(origin("LACUNA_JOBS_PER_KEY"), Origin::Default);
+    }
+
+    #[test]
+    fn a_public_address_needs_keys() {
+        let flags = Flags { bind: Some("0.0.0.0:80".into()), ..Flags::default() };
+        assert!(Config::read(&flags, &|_| None).unwrap_err().expected.contains("LACUNA_API_KEYS"));
+        let keys = |name: &str| (name == "LACUNA_API_KEYS").then(|| "secret, other".to_owned());
+        let (config, told) = Config::read(&flags, &keys).unwrap();
+        assert_eq!(config.keys.len(), 2);
+        assert!(told.iter().all(|t| !t.value.contains("secret")));
+    }
+
+    #[test]
+    fn nonsense_is_named() {
+        let error = Config::read(&Flags::default(), &|name| (name == "LACUNA_QUEUED").then(|| "many".into())).unwrap_err();
+        assert_eq!((error.name, error.value.as_str()), ("LACUNA_QUEUED", "many"));
+    }
+}

@@ -1,0 +1,277 @@
+//! Documents at the doors: bytes to typed models and jobs, all findings as one problem, and the digest of
+//! what was meant.
+
+use lacuna_exchange::diagnostic::{Diagnostic, code};
+use lacuna_exchange::document::{self, DocumentLimits};
+use lacuna_exchange::format::{FORMATS, Format};
+use lacuna_fabrication::{Job, JobKind};
+use lacuna_kernel::budget::Limits;
+use lacuna_kernel::model::Model;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::digest::Digest;
+use crate::problem::{Finding, Problem, ProblemKind};
+use crate::production;
+
+/// Finds a stored model's document by its id.
+pub type ModelFinder<'a> = &'a dyn Fn(&str) -> Option<Vec<u8>>;
+
+/// What `validate` says of a model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ValidationReport {
+    /// Whether the model can be evaluated.
+    pub valid: bool,
+    /// What is wrong or odd, with places.
+    pub diagnostics: Vec<Remark>,
+    /// Number of states of the automaton, once the document is legal.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub states: Option<u64>,
+    /// Degrees of freedom of the unknown operators; 0 when none is unknown.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub degrees_of_freedom: Option<u64>,
+    /// Largest violation of a constraint.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub constraint_residual: Option<f64>,
+    /// `[lower, upper]` bounds of the joint spectral radius; `null` for a bound that is not known.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub spectral_radius: Option<[Option<f64>; 2]>,
+}
+
+/// How much a remark matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The model cannot be evaluated.
+    Error,
+    /// It deserves attention.
+    Warning,
+}
+
+/// One remark about a model.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Remark {
+    /// JSON pointer into the model document.
+    pub pointer: String,
+    /// Stable code.
+    pub code: String,
+    /// What, in words, with the values.
+    pub message: String,
+    /// How much it matters.
+    pub severity: Severity,
+    /// Line of the value, from 1.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub line: Option<u64>,
+    /// Column of the value, from 1.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub column: Option<u64>,
+}
+
+/// The word of a kind of job in documents.
+#[must_use]
+pub fn kind_word(kind: JobKind) -> &'static str {
+    match kind {
+        JobKind::Evaluate => "evaluate",
+        JobKind::Solidify => "solidify",
+        JobKind::Measure => "measure",
+    }
+}
+
+/// Reads a model document.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_model(bytes: &[u8]) -> Result<Model, Problem> {
+    production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))?.map_err(refused)
+}
+
+/// Reads a job document, fetches the stored models that it names, and completes its limits.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
+    let read = production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    let model = |id: &str| find(id).and_then(|bytes| read_model(&bytes).ok());
+    let mut job = read.resolve(&within(&Limits::default(), most), most, model).map_err(refused)?;
+    if job.outputs.is_empty() {
+        job.outputs = default_outputs(job.kind).iter().map(|&name| name.to_owned()).collect();
+    }
+    if job.kind == JobKind::Measure && !job.outputs.is_empty() {
+        let message = "a measurement makes numbers only; ask for no outputs";
+        return Err(one_finding("/outputs", "job.no-geometry", message));
+    }
+    for (index, name) in job.outputs.iter().enumerate() {
+        format(name).map_err(|problem| one_finding(&format!("/outputs/{index}"), &problem.code, &problem.detail))?;
+    }
+    Ok(job)
+}
+
+/// What a job makes when it asks for no format: what printers read, and what carries wires.
+fn default_outputs(kind: JobKind) -> &'static [&'static str] {
+    match kind {
+        JobKind::Solidify => &["3mf"],
+        JobKind::Evaluate => &["obj"],
+        JobKind::Measure => &[],
+    }
+}
+
+/// The defaults, but nowhere above the most that is allowed.
+#[must_use]
+pub fn within(default: &Limits, most: &Limits) -> Limits {
+    Limits {
+        seconds: default.seconds.min(most.seconds),
+        memory_bytes: default.memory_bytes.min(most.memory_bytes),
+        cells: default.cells.min(most.cells),
+        triangles: default.triangles.min(most.triangles),
+        depth: default.depth.min(most.depth),
+    }
+}
+
+/// The document from which a worker does the job: canonical, models in full and limits complete.
+#[must_use]
+pub fn order_document(job: &Job) -> String {
+    document::write_job(job)
+}
+
+/// Digest of the canonical job document with the default limits: equal for equal work, because limits
+/// decide whether there is a result but not which.
+#[must_use]
+pub fn job_digest(job: &Job) -> Digest {
+    Digest::of(document::write_job(&Job { limits: Limits::default(), ..job.clone() }).as_bytes())
+}
+
+/// The canonical document of a model.
+#[must_use]
+pub fn model_document(model: &Model) -> String {
+    document::write_model(model)
+}
+
+/// Reads and examines a model.
+///
+/// # Errors
+/// When the bytes are not a JSON text at all, or the kernel has a defect.
+pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
+    let model = match production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))? {
+        Ok(model) => model,
+        Err(diagnostics) if diagnostics.iter().any(is_about_the_text) => return Err(refused(diagnostics)),
+        Err(diagnostics) => {
+            let diagnostics = diagnostics.into_iter().map(remark).collect();
+            let unknown = (None, None, None, None);
+            let (states, degrees_of_freedom, constraint_residual, spectral_radius) = unknown;
+            return Ok(ValidationReport { valid: false, diagnostics, states, degrees_of_freedom, constraint_residual, spectral_radius });
+        }
+    };
+    let found = production::validate(&model)?;
+    let diagnostics = found.diagnostics.into_iter().map(|d| Remark {
+        pointer: format!("/shape{}", d.pointer),
+        code: d.code.to_owned(),
+        message: d.message,
+        severity: if d.warning { Severity::Warning } else { Severity::Error },
+        line: None,
+        column: None,
+    });
+    Ok(ValidationReport {
+        valid: found.valid,
+        diagnostics: diagnostics.collect(),
+        states: Some(found.states),
+        degrees_of_freedom: Some(found.degrees_of_freedom),
+        constraint_residual: Some(found.constraint_residual),
+        spectral_radius: Some(found.spectral_radius.map(|bound| bound.is_finite().then_some(bound))),
+    })
+}
+
+fn remark(diagnostic: Diagnostic) -> Remark {
+    let Diagnostic { pointer, code, message, line, column } = diagnostic;
+    Remark { pointer, code: code.to_owned(), message, severity: Severity::Error, line, column }
+}
+
+/// Whether the bytes are no JSON text: then nothing can be said of a model.
+fn is_about_the_text(diagnostic: &Diagnostic) -> bool {
+    const TEXT: [&str; 6] =
+        [code::NO_CONTENT, code::BYTE_ORDER_MARK, code::NOT_UTF8, code::SYNTAX, code::TRUNCATED, code::TRAILING_CONTENT];
+    TEXT.contains(&diagnostic.code)
+}
+
+/// All findings of a document as one problem, with the first one's words and code in front.
+fn refused(diagnostics: Vec<Diagnostic>) -> Problem {
+    let kind = if diagnostics.iter().any(is_about_the_text) {
+        ProblemKind::MalformedJson
+    } else if diagnostics.iter().any(|d| d.code == code::TOO_LARGE) {
+        ProblemKind::BodyTooLarge
+    } else {
+        ProblemKind::InvalidModel
+    };
+    let others = match diagnostics.len() {
+        0 | 1 => String::new(),
+        count => format!(" (and {} more)", count - 1),
+    };
+    let first = diagnostics.first().map_or_else(|| "the document is refused".to_owned(), ToString::to_string);
+    let code = diagnostics.first().map_or("invalid-model", |d| d.code);
+    let findings = diagnostics.iter().map(|d| Finding {
+        pointer: d.pointer.clone(),
+        code: d.code.to_owned(),
+        message: d.message.clone(),
+        line: d.line,
+        column: d.column,
+    });
+    Problem::new(kind, format!("{first}{others}")).code(code).errors(findings.collect())
+}
+
+fn one_finding(pointer: &str, code: &str, message: &str) -> Problem {
+    let finding = Finding { pointer: pointer.to_owned(), code: code.to_owned(), message: message.to_owned(), line: None, column: None };
+    Problem::new(ProblemKind::InvalidModel, message).code(code).errors(vec![finding])
+}
+
+/// The format of an output's name.
+///
+/// # Errors
+/// When there is none, with the names there are.
+pub fn format(name: &str) -> Result<Format, Problem> {
+    FORMATS.iter().find(|row| row.ending == name).map(|row| row.format).ok_or_else(|| {
+        let names: Vec<&str> = FORMATS.iter().map(|row| row.ending).collect();
+        let detail = format!("there is no format {name:?}; there are {}", names.join(", "));
+        Problem::new(ProblemKind::InvalidModel, detail).code("job.unknown-format")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const JOB: &str = r#"{"lacuna":1,"kind":"KIND","model":{"lacuna":1,"units":"UNITS","shape":{"family":"mesh",
+        "vertices":[[0,0,0],[LENGTH,0,0]],"faces":[[0,1]]}},"params":{"tolerance_mm":0.1 RADIUS} REST}"#;
+
+    fn job(kind: &str, units: &str, length: &str, radius: &str, rest: &str) -> Result<Job, Problem> {
+        let text = JOB.replace("KIND", kind).replace("UNITS", units).replace("LENGTH", length);
+        read_job(text.replace("RADIUS", radius).replace("REST", rest).as_bytes(), &Limits::default(), &|_| None)
+    }
+
+    #[test]
+    fn equal_work_has_one_digest() {
+        let cm = job("measure", "cm", "1", "", "").unwrap();
+        let mm = job("measure", "mm", "10", "", r#","limits":{"seconds":5}"#).unwrap();
+        assert_eq!(job_digest(&cm), job_digest(&mm));
+        assert_ne!(order_document(&cm), order_document(&mm));
+        assert_ne!(job_digest(&cm), job_digest(&job("measure", "mm", "11", "", "").unwrap()));
+    }
+
+    #[test]
+    fn a_worker_reads_the_same_job() {
+        let first = job("solidify", "in", "1", r#","radius_mm":0.4"#, "").unwrap();
+        assert_eq!(first.outputs, ["3mf"]);
+        let again = read_job(order_document(&first).as_bytes(), &Limits::default(), &|_| None).unwrap();
+        assert_eq!(first, again);
+    }
+
+    #[test]
+    fn findings_carry_their_places() {
+        let unknown = job("measure", "mm", "1", "", r#","colour":"red""#).unwrap_err();
+        assert_eq!((unknown.kind, unknown.errors[0].pointer.as_str()), (ProblemKind::InvalidModel, "/colour"));
+        let format = job("evaluate", "mm", "1", "", r#","outputs":["obj","dwg"]"#).unwrap_err();
+        assert_eq!(format.errors[0].pointer, "/outputs/1");
+        let limit = job("evaluate", "mm", "1", "", r#","limits":{"triangles":1000000000000}"#).unwrap_err();
+        assert_eq!(limit.errors[0].pointer, "/limits/triangles");
+        assert_eq!(read_model(b"{").unwrap_err().kind, ProblemKind::MalformedJson);
+    }
+}

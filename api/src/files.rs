@@ -1,0 +1,140 @@
+//! Files that are there in full or not at all: written beside their place, synced, then renamed.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use uuid::Uuid;
+
+/// Ending of files that are being written; whoever owns a folder may remove leftovers of it.
+pub const PENDING_ENDING: &str = ".lacuna-part";
+
+/// A file that is being written. Dropping it without [`PendingFile::commit`] removes it.
+pub struct PendingFile {
+    file: File,
+    path: PathBuf,
+}
+
+impl PendingFile {
+    /// Starts a file in a folder.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn create_in(folder: &Path) -> io::Result<Self> {
+        let path = folder.join(format!(".{}{PENDING_ENDING}", Uuid::now_v7().simple()));
+        let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path)?;
+        Ok(Self { file, path })
+    }
+
+    /// Starts a file in the folder of the file that it will become.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn create_beside(target: &Path) -> io::Result<Self> {
+        Self::create_in(folder_of(target))
+    }
+
+    /// The file's bytes from its start, for reading back what was written.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn reread(&mut self) -> io::Result<&mut File> {
+        self.file.flush()?;
+        self.file.seek(SeekFrom::Start(0))?;
+        Ok(&mut self.file)
+    }
+
+    /// Puts the file in its place, over a file that stands there.
+    ///
+    /// # Errors
+    /// When the device fails; then nothing is in the place that was not there before.
+    pub fn commit(self, target: &Path) -> io::Result<()> {
+        self.file.sync_all()?;
+        fs::rename(&self.path, target)?;
+        sync_folder(folder_of(target))
+    }
+}
+
+impl Write for PendingFile {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        self.file.write(buffer)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for PendingFile {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.file.seek(position)
+    }
+}
+
+impl Drop for PendingFile {
+    fn drop(&mut self) {
+        // After a commit nothing has this name any more.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Writes a whole file at once.
+///
+/// # Errors
+/// When the device fails.
+pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut pending = PendingFile::create_beside(target)?;
+    pending.write_all(bytes)?;
+    pending.commit(target)
+}
+
+/// What a model's name leaves for a file name: letters, digits, `-` and `_` of ASCII, 64 at most.
+#[must_use]
+pub fn safe_stem(name: &str) -> String {
+    let kept: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '-' }).take(64).collect();
+    let stem = kept.trim_matches('-');
+    if stem.is_empty() { "result".to_owned() } else { stem.to_owned() }
+}
+
+fn folder_of(target: &Path) -> &Path {
+    target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A rename lasts only when its folder is on the device too.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn names_cannot_leave_their_folder() {
+        assert_eq!(safe_stem("../../etc/passwd"), "etc-passwd");
+        assert_eq!(safe_stem("Koch curve \u{e9}"), "Koch-curve");
+        assert_eq!(safe_stem("\u{3b1}"), "result");
+    }
+
+    #[test]
+    fn nothing_is_left_of_an_abandoned_file() {
+        let folder = std::env::temp_dir().join(format!("lacuna-files-{}", Uuid::now_v7()));
+        fs::create_dir_all(&folder).unwrap();
+        let target = folder.join("part.stl");
+        fs::write(&target, b"old").unwrap();
+
+        let mut pending = PendingFile::create_beside(&target).unwrap();
+        pending.write_all(b"half").unwrap();
+        drop(pending);
+        assert_eq!((fs::read(&target).unwrap().as_slice(), fs::read_dir(&folder).unwrap().count()), (&b"old"[..], 1));
+
+        let mut pending = PendingFile::create_beside(&target).unwrap();
+        pending.write_all(b"whole").unwrap();
+        assert_eq!(io::read_to_string(pending.reread().unwrap()).unwrap(), "whole");
+        pending.commit(&target).unwrap();
+        assert_eq!((fs::read(&target).unwrap().as_slice(), fs::read_dir(&folder).unwrap().count()), (&b"whole"[..], 1));
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,10 @@
+//! The HTTP door: router, layers and everything that is not about one resource.
+
+pub mod auth;
+pub mod body;
+pub mod headers;
+pub mod layers;
+pub mod range;
+pub mod router;
+pub mod serve;
+pub mod state;

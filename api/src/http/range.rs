@@ -1,0 +1,139 @@
+//! Files over HTTP: whole, one range of them, or "you have it".
+
+use std::io::SeekFrom;
+use std::path::Path;
+
+use axum::body::{Body, Bytes};
+use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
+use futures_util::stream;
+use tokio::fs::File;
+use tokio::io::{AsyncReadExt, AsyncSeekExt};
+
+use super::headers::is_known;
+use crate::jobs::record::Output;
+use crate::problem::{Problem, ProblemKind};
+
+/// Bytes that are read from the disk at once.
+const CHUNK: u64 = 1 << 16;
+
+/// What a `Range` header asks of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of it: no range, one that is not understood, or several, which a server may ignore (RFC 9110).
+    Whole,
+    /// The bytes from the first to the last, both included.
+    Range(u64, u64),
+    /// Bytes that the file does not have.
+    Outside,
+}
+
+/// Reads a `Range` header against a file's length.
+#[must_use]
+pub fn part(range: Option<&str>, length: u64) -> Part {
+    let Some((first, last)) = range.and_then(|range| range.trim().strip_prefix("bytes=")?.split_once('-')) else {
+        return Part::Whole;
+    };
+    match (first.trim().parse::<u64>(), last.trim().parse::<u64>(), first.trim().is_empty(), last.trim().is_empty()) {
+        (Ok(first), Ok(last), ..) if first <= last && first < length => Part::Range(first, last.min(length - 1)),
+        (Ok(first), Ok(last), ..) if first > last => Part::Whole,
+        (Ok(first), Err(_), _, true) if first < length => Part::Range(first, length - 1),
+        (Ok(_), Ok(_), ..) | (Ok(_), Err(_), _, true) | (Err(_), Ok(0), true, _) => Part::Outside,
+        (Err(_), Ok(suffix), true, _) if length > 0 => Part::Range(length - suffix.min(length), length - 1),
+        (Err(_), Ok(_), true, _) => Part::Outside,
+        _ => Part::Whole,
+    }
+}
+
+/// Answers with a file that never changes.
+///
+/// # Errors
+/// When the range lies outside, or the file is gone or fails.
+pub async fn answer(request: &HeaderMap, path: &Path, output: &Output) -> Result<Response<Body>, Problem> {
+    let etag = format!("\"{}\"", output.digest);
+    let mut response = Response::new(Body::empty());
+    immutable_headers(response.headers_mut(), output, &etag)?;
+    if is_known(request, &etag) {
+        *response.status_mut() = StatusCode::NOT_MODIFIED;
+        return Ok(response);
+    }
+    let mut file = File::open(path).await.map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => Problem::new(ProblemKind::NotFound, "the result is no longer kept; submit the job again"),
+        _ => Problem::io("the result could not be opened", &error),
+    })?;
+    let text = |name| request.get(name).and_then(|value| value.to_str().ok());
+    // A range of another version must not be glued to this one.
+    let range = text(header::RANGE).filter(|_| text(header::IF_RANGE).is_none_or(|tag| tag == etag));
+    let (first, length) = match part(range, output.bytes) {
+        Part::Whole => (0, output.bytes),
+        Part::Outside => return Err(outside(output.bytes)),
+        Part::Range(first, last) => {
+            *response.status_mut() = StatusCode::PARTIAL_CONTENT;
+            let value = format!("bytes {first}-{last}/{}", output.bytes);
+            response.headers_mut().insert(header::CONTENT_RANGE, header_value(&value)?);
+            (first, last - first + 1)
+        }
+    };
+    file.seek(SeekFrom::Start(first)).await.map_err(|error| Problem::io("the result could not be read", &error))?;
+    response.headers_mut().insert(header::CONTENT_LENGTH, HeaderValue::from(length));
+    *response.body_mut() = Body::from_stream(stream::try_unfold((file, length), next_chunk));
+    Ok(response)
+}
+
+async fn next_chunk((mut file, left): (File, u64)) -> std::io::Result<Option<(Bytes, (File, u64))>> {
+    if left == 0 {
+        return Ok(None);
+    }
+    let mut chunk = vec![0; usize::try_from(left.min(CHUNK)).unwrap_or(0)];
+    file.read_exact(&mut chunk).await?;
+    let left = left - chunk.len() as u64;
+    Ok(Some((Bytes::from(chunk), (file, left))))
+}
+
+fn immutable_headers(headers: &mut HeaderMap, output: &Output, etag: &str) -> Result<(), Problem> {
+    headers.insert(header::CONTENT_TYPE, header_value(&output.media_type)?);
+    headers.insert(header::ETAG, header_value(etag)?);
+    headers.insert(header::ACCEPT_RANGES, HeaderValue::from_static("bytes"));
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("private, max-age=31536000, immutable"));
+    headers.insert("repr-digest", header_value(&format!("sha-256=:{}:", output.digest.base64()))?);
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    let disposition = format!("attachment; filename=\"{}\"", output.file_name);
+    headers.insert(header::CONTENT_DISPOSITION, header_value(&disposition)?);
+    Ok(())
+}
+
+fn outside(length: u64) -> Problem {
+    Problem::new(ProblemKind::Range, format!("the file has {length} bytes, numbered from 0"))
+}
+
+fn header_value(text: &str) -> Result<HeaderValue, Problem> {
+    HeaderValue::from_str(text).map_err(|error| Problem::internal(format!("a header's value: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_ten_bytes() {
+        for (range, expected) in [
+            (None, Part::Whole),
+            (Some("bytes=0-0"), Part::Range(0, 0)),
+            (Some("bytes=2-5"), Part::Range(2, 5)),
+            (Some("bytes=2-"), Part::Range(2, 9)),
+            (Some("bytes=8-100"), Part::Range(8, 9)),
+            (Some("bytes=-3"), Part::Range(7, 9)),
+            (Some("bytes=-30"), Part::Range(0, 9)),
+            (Some("bytes=10-"), Part::Outside),
+            (Some("bytes=10-12"), Part::Outside),
+            (Some("bytes=-0"), Part::Outside),
+            (Some("bytes=5-2"), Part::Whole),
+            (Some("bytes=0-1,3-4"), Part::Whole),
+            (Some("lines=1-2"), Part::Whole),
+            (Some("bytes=a-b"), Part::Whole),
+        ] {
+            assert_eq!(part(range, 10), expected, "{range:?}");
+        }
+        assert_eq!(part(Some("bytes=0-"), 0), Part::Outside);
+        assert_eq!(part(Some("bytes=-1"), 0), Part::Outside);
+    }
+}

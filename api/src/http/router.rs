@@ -1,0 +1,65 @@
+//! The table of contents of the HTTP contract.
+
+use axum::Router;
+use axum::middleware::from_fn_with_state;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::state::Shared;
+use super::{auth, layers};
+use crate::problem::{Problem, ProblemKind};
+use crate::routes::{capabilities, docs, events, health, jobs, models, results, studies};
+
+/// Every address with its description; the public ones apart, because the others need a key.
+fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
+    let public = OpenApiRouter::new()
+        .routes(routes!(health::livez))
+        .routes(routes!(health::readyz))
+        .routes(routes!(health::version))
+        .routes(routes!(docs::openapi))
+        .routes(routes!(docs::docs));
+    let private = OpenApiRouter::new()
+        .routes(routes!(models::store, models::list))
+        .routes(routes!(models::fetch, models::forget))
+        .routes(routes!(studies::validate))
+        .routes(routes!(studies::plan))
+        .routes(routes!(jobs::submit, jobs::list))
+        .routes(routes!(jobs::show, jobs::forget))
+        .routes(routes!(jobs::cancel))
+        .routes(routes!(events::events))
+        .routes(routes!(results::output))
+        .routes(routes!(results::result))
+        .routes(routes!(capabilities::capabilities))
+        .routes(routes!(health::metrics));
+    (public, private)
+}
+
+/// The description of every address.
+#[must_use]
+pub fn description() -> utoipa::openapi::OpenApi {
+    let (public, private) = tables();
+    let mut all = public.into_openapi();
+    all.merge(private.into_openapi());
+    all
+}
+
+/// The service as a router: addresses and layers over a state.
+pub fn router(state: Shared) -> Router {
+    let (public, private) = tables();
+    let private = Router::from(private).route_layer(from_fn_with_state(state.clone(), auth::require_key));
+    Router::from(public)
+        .merge(private)
+        .fallback(absent)
+        .method_not_allowed_fallback(not_allowed)
+        .layer(from_fn_with_state(state.clone(), layers::observe))
+        .layer(from_fn_with_state(state.clone(), layers::cors))
+        .with_state(state)
+}
+
+async fn absent() -> Problem {
+    Problem::new(ProblemKind::NotFound, "there is nothing at this address; /docs lists what there is")
+}
+
+async fn not_allowed() -> Problem {
+    Problem::new(ProblemKind::MethodNotAllowed, "the address does not have this method; the header Allow lists those it has")
+}

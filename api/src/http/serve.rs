@@ -1,0 +1,117 @@
+//! The running service: listening, serving, and going down in order.
+
+use std::convert::Infallible;
+use std::future::Future;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use hyper::body::Incoming;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use tokio::net::{TcpListener, TcpStream};
+use tower::ServiceExt;
+
+use super::router::router;
+use super::state::{AppState, Shared};
+use crate::config::Config;
+use crate::jobs::worker;
+use crate::problem::Problem;
+
+/// Between two sweeps of what is too old to keep.
+const SWEEP_EVERY: Duration = Duration::from_secs(3600);
+
+/// Listens and serves until `stop` is ready; `told` gets the address once it is known.
+///
+/// # Errors
+/// When the address or the data folder cannot be used.
+pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop: impl Future<Output = ()>) -> Result<(), Problem> {
+    let failed = |error| Problem::io(format!("cannot listen on {}", config.bind), &error);
+    let listener = TcpListener::bind(config.bind).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    let state = AppState::open(config)?;
+    let workers = worker::start(&state.desk, state.config.workers, state.config.job_limits)
+        .map_err(|error| Problem::io("no threads for the workers", &error))?;
+    let sweeper = tokio::spawn(sweep(state.clone()));
+    told(address);
+    tracing::info!(%address, workers = workers.len(), "serving");
+
+    let connections = GracefulShutdown::new();
+    let accepting = accept(&listener, &state, &connections);
+    tokio::select! {
+        () = accepting => {}
+        () = stop => {}
+    }
+    // In this order: no new work, open streams end, answers under way are finished, running jobs too.
+    tracing::info!("going down");
+    state.desk.stop();
+    state.closing.send_replace(true);
+    sweeper.abort();
+    let drain = Duration::from_secs(state.config.drain_seconds);
+    let desk = Arc::clone(&state.desk);
+    let drained = tokio::task::spawn_blocking(move || end_workers(&desk, workers, drain));
+    drop(listener);
+    let _ = tokio::time::timeout(drain, connections.shutdown()).await;
+    let _ = drained.await;
+    tracing::info!("down");
+    Ok(())
+}
+
+async fn accept(listener: &TcpListener, state: &Shared, connections: &GracefulShutdown) {
+    let app = router(state.clone());
+    loop {
+        match listener.accept().await {
+            Ok((stream, _)) => attend(stream, app.clone(), state, connections),
+            Err(error) => {
+                // Out of descriptors, most likely: wait for connections to end instead of spinning.
+                tracing::warn!(%error, "a connection was not accepted");
+                tokio::time::sleep(Duration::from_millis(100)).await;
+            }
+        }
+    }
+}
+
+fn attend(stream: TcpStream, app: Router, state: &Shared, connections: &GracefulShutdown) {
+    let _ = stream.set_nodelay(true);
+    let service = service_fn(move |request: hyper::Request<Incoming>| {
+        let app = app.clone();
+        async move {
+            let answer = app.oneshot(request.map(Body::new)).await;
+            Ok::<_, Infallible>(answer.unwrap_or_else(|never| match never {}))
+        }
+    });
+    let mut builder = hyper::server::conn::http1::Builder::new();
+    // A client that sends its head byte by byte would hold a connection forever.
+    builder.timer(TokioTimer::new()).header_read_timeout(Duration::from_secs(state.config.header_seconds));
+    let connection = connections.watch(builder.serve_connection(TokioIo::new(stream), service));
+    tokio::spawn(async move {
+        if let Err(error) = connection.await {
+            tracing::debug!(%error, "a connection broke off");
+        }
+    });
+}
+
+/// Waits for running jobs, then stops them: they are taken up again at the next start.
+fn end_workers(desk: &crate::jobs::desk::Desk, workers: Vec<std::thread::JoinHandle<()>>, drain: Duration) {
+    let start = std::time::Instant::now();
+    while start.elapsed() < drain && workers.iter().any(|worker| !worker.is_finished()) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    desk.interrupt();
+    for worker in workers {
+        let _ = worker.join();
+    }
+}
+
+async fn sweep(state: Shared) {
+    let age = Duration::from_secs(state.config.retention_hours.saturating_mul(3600));
+    loop {
+        let swept = state.beside(move |state| state.desk.sweep(age).map_err(|error| Problem::io("sweeping", &error))).await;
+        if let Err(problem) = swept {
+            tracing::error!(detail = %problem.detail, "not swept");
+        }
+        tokio::time::sleep(SWEEP_EVERY).await;
+    }
+}

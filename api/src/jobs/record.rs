@@ -1,0 +1,147 @@
+//! What is kept of a job, and what its owner sees of it.
+
+use lacuna_fabrication::{Certificate, JobKind};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::digest::Digest;
+use crate::problem::Problem;
+
+/// Where a job stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum JobState {
+    /// Accepted and waiting for a worker.
+    Queued,
+    /// A worker is at it.
+    Running,
+    /// Asked to stop; the worker has not stopped yet.
+    Cancelling,
+    /// Done; the outputs are there.
+    Succeeded,
+    /// Ended with a problem.
+    Failed,
+    /// Stopped by its owner.
+    Cancelled,
+}
+
+impl JobState {
+    /// All states, in the order of a job's life.
+    pub const ALL: [Self; 6] = [Self::Queued, Self::Running, Self::Cancelling, Self::Succeeded, Self::Failed, Self::Cancelled];
+
+    /// Whether nothing will change any more.
+    #[must_use]
+    pub fn is_final(self) -> bool {
+        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
+    }
+
+    /// The word in documents.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Cancelling => "cancelling",
+            Self::Succeeded => "succeeded",
+            Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
+/// A file that a job made.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Output {
+    /// The format's name, or `certificate.json`.
+    pub name: String,
+    /// What to call the file.
+    pub file_name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Its length.
+    pub bytes: u64,
+    /// `sha256:` and 64 hex digits; also its address under `/v1/results/`.
+    #[schema(value_type = String)]
+    pub digest: Digest,
+}
+
+/// How far a running job has come.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Step {
+    /// `validate`, `refine`, `dilate`, `stitch`, `verify` or `write`.
+    pub phase: String,
+    /// Share of the phase that is done, in [0, 1].
+    pub fraction: f64,
+    /// Triangles or cells made so far, by phase.
+    pub count: u64,
+}
+
+/// A job as its owner sees it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct JobView {
+    /// Its id.
+    pub id: String,
+    /// What it does.
+    pub kind: JobKind,
+    /// Where it stands.
+    pub state: JobState,
+    /// How often it was started; 2 after the service stopped during the first time.
+    pub attempt: u32,
+    /// When it was accepted.
+    pub created: String,
+    /// When a worker took it.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub started: Option<String>,
+    /// When it ended.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub finished: Option<String>,
+    /// How far it has come, while it runs.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub progress: Option<Step>,
+    /// `sha256:` digest of the canonical job document.
+    pub input_digest: String,
+    /// Whether the same work had been done before and its results are handed out again.
+    pub reused: bool,
+    /// The files it made.
+    pub outputs: Vec<Output>,
+    /// What is proven of the result.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub certificate: Option<Certificate>,
+    /// What the owner should know, in words.
+    pub warnings: Vec<String>,
+    /// Why it failed.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub problem: Option<Problem>,
+}
+
+/// The idempotency key of a submission and what it was used with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Idempotency {
+    /// Digest of the key.
+    pub key: Digest,
+    /// Digest of the body.
+    pub body: Digest,
+}
+
+/// A job as it is kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JobRecord {
+    /// What the owner sees.
+    pub view: JobView,
+    /// Whose it is.
+    pub owner: String,
+    /// Digest under which the job document is kept.
+    pub document: Digest,
+    /// Idempotency key, if one was given.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub idempotency: Option<Idempotency>,
+}
+
+/// What finished work left, so that the same work need not be done again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The files.
+    pub outputs: Vec<Output>,
+    /// What is proven of them.
+    pub certificate: Certificate,
+}

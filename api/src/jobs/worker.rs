@@ -1,0 +1,153 @@
+//! The workers: threads of their own, because geometry blocks and would starve the service's event loop.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use lacuna_exchange::format::Format;
+use lacuna_fabrication::{Geometry, Job, Outcome};
+use lacuna_kernel::budget::{Budget, Limits, Progress, StopReason};
+
+use super::desk::{self, ATTEMPTS, Desk};
+use super::live::LiveJob;
+use super::record::{Answer, JobState, Output};
+use super::watchdog::Watchdog;
+use crate::digest::Digest;
+use crate::problem::{Problem, ProblemKind};
+use crate::production::{self, Label};
+use crate::{documents, files};
+
+/// Name of the certificate among a job's outputs.
+const CERTIFICATE: &str = "certificate.json";
+
+/// Starts the workers; they end when the desk's queue is closed.
+///
+/// # Errors
+/// When the system has no thread to spare.
+pub fn start(desk: &Arc<Desk>, count: usize, most: Limits) -> std::io::Result<Vec<JoinHandle<()>>> {
+    (0..count)
+        .map(|number| {
+            let desk = Arc::clone(desk);
+            std::thread::Builder::new().name(format!("worker-{number}")).spawn(move || {
+                while let Some(id) = desk.queue.take() {
+                    if let Some(job) = desk.get(&id) {
+                        work(&desk, &job, &most);
+                    }
+                }
+            })
+        })
+        .collect()
+}
+
+/// Does a job from its taking to its record.
+fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits) {
+    let taken = job.update(|record| {
+        let view = &mut record.view;
+        if view.state != JobState::Queued {
+            return false;
+        }
+        view.state = JobState::Running;
+        view.attempt += 1;
+        view.started = Some(crate::clock::now());
+        true
+    });
+    // Recorded before the work: a job that brings the process down is known by its attempt.
+    desk.keep(job);
+    let (id, kind) = job.with(|record| (record.view.id.clone(), record.view.kind));
+    let start = Instant::now();
+    let result = if taken { perform(desk, job, most) } else { Err(Problem::new(ProblemKind::Cancelled, "stopped before the start")) };
+    let state = conclude(job, result);
+    desk.keep(job);
+    let time = start.elapsed();
+    desk.metrics.ended(documents::kind_word(kind), state, time);
+    tracing::info!(job = %id, kind = documents::kind_word(kind), state = state.word(), milliseconds = time.as_millis(), "job ended");
+}
+
+fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits) -> Result<Answer, Problem> {
+    let (document, input) = job.with(|record| (record.document, record.view.input_digest.clone()));
+    let bytes = desk.store.document(document).map_err(|error| Problem::io("the job document could not be read", &error))?;
+    let order = documents::read_job(&bytes, most, &|_| None)?;
+    let budget = budget(job, order.limits);
+    let _watchdog = Watchdog::start(&job.cancel, order.limits.seconds)
+        .map_err(|error| Problem::io("no thread to watch the time", &error))?;
+    let made = production::compute(&order, &budget).map_err(|problem| problem.under("/model")).and_then(|mut outcome| {
+        outcome.certificate.input_digest = input;
+        keep_files(desk, &order, outcome, &budget)
+    });
+    let answer = made.map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
+    if let Err(error) = desk.store.keep_answer(desk::answer_key(documents::job_digest(&order)), &answer) {
+        tracing::warn!(%error, "finished work cannot be found again");
+    }
+    Ok(answer)
+}
+
+fn budget(job: &Arc<LiveJob>, limits: Limits) -> Budget {
+    let listener = Arc::clone(job);
+    let sink = move |progress: &Progress| listener.progress(progress);
+    Budget { limits, cancel: job.cancel.clone(), progress: Some(Arc::new(sink)) }
+}
+
+/// Writes, verifies and keeps every output, the certificate last because it names the others' digests.
+fn keep_files(desk: &Desk, order: &Job, mut outcome: Outcome, budget: &Budget) -> Result<Answer, Problem> {
+    let model = order.inputs.first();
+    let title = model.map(|input| input.name.as_str());
+    let stem = files::safe_stem(title.unwrap_or("result"));
+    let formats: Vec<Format> = order.outputs.iter().map(|name| documents::format(name)).collect::<Result<_, _>>()?;
+    let thumbnail = match (&outcome.geometry, formats.contains(&Format::ThreeMf)) {
+        (Geometry::Solid(_), true) => Some(production::picture(&outcome)?),
+        _ => None,
+    };
+    let mut outputs = Vec::with_capacity(formats.len() + 1);
+    let failed = |error| Problem::io("the result could not be kept", &error);
+    for (done, &format) in formats.iter().enumerate() {
+        if let Some(stopped) = production::why_stopped(budget) {
+            return Err(stopped);
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a share of a handful of files")]
+        budget.report("write", done as f64 / formats.len() as f64, outcome.certificate.triangles);
+        let facts = format.facts();
+        let mut pending = desk.store.new_result().map_err(failed)?;
+        let label = Label { title, thumbnail_png: thumbnail.as_deref() };
+        let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending)?;
+        desk.store.keep_result(pending, digest).map_err(failed)?;
+        let file_name = format!("{stem}.{}", facts.ending);
+        outputs.push(Output { name: facts.ending.to_owned(), file_name, media_type: facts.media_type.to_owned(), bytes, digest });
+    }
+    for output in &outputs {
+        outcome.certificate.output_digests.insert(output.name.clone(), output.digest.to_string());
+    }
+    outputs.push(keep_certificate(desk, &outcome)?);
+    desk.metrics.made(outcome.certificate.triangles, outputs.iter().map(|output| output.bytes).sum());
+    Ok(Answer { outputs, certificate: outcome.certificate })
+}
+
+fn keep_certificate(desk: &Desk, outcome: &Outcome) -> Result<Output, Problem> {
+    use std::io::Write as _;
+    let bytes = production::certificate_file(&outcome.certificate)?;
+    let digest = Digest::of(&bytes);
+    let failed = |error| Problem::io("the certificate could not be kept", &error);
+    let mut pending = desk.store.new_result().map_err(failed)?;
+    pending.write_all(&bytes).map_err(failed)?;
+    desk.store.keep_result(pending, digest).map_err(failed)?;
+    let name = CERTIFICATE.to_owned();
+    Ok(Output { file_name: name.clone(), name, media_type: "application/json".to_owned(), bytes: bytes.len() as u64, digest })
+}
+
+fn conclude(job: &LiveJob, result: Result<Answer, Problem>) -> JobState {
+    let stopped = job.cancel.reason() == Some(StopReason::Cancelled);
+    job.update(|record| {
+        let (id, view) = (record.view.id.clone(), &mut record.view);
+        match result {
+            // What was finished in time is handed out even if somebody wished to stop it meanwhile.
+            Ok(answer) => desk::finish(view, answer.outputs, answer.certificate, false),
+            Err(_) if stopped && view.state == JobState::Cancelling => desk::end_cancelled(view),
+            Err(_) if stopped && view.attempt >= ATTEMPTS => {
+                desk::fail(view, Problem::new(ProblemKind::Interrupted, "The service stopped during the work"));
+            }
+            // The service goes down: the next start takes the job up again.
+            Err(_) if stopped => view.state = JobState::Queued,
+            Err(problem) => desk::fail(view, problem.in_public(&id)),
+        }
+        view.state
+    })
+}

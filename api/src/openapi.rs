@@ -1,0 +1,78 @@
+//! The HTTP contract as OpenAPI 3.1: addresses from the handlers, documents from the exchange crate.
+
+use serde_json::{Value, json};
+use utoipa::ToSchema;
+
+/// Stands for a job document: its schema is the exchange crate's.
+#[derive(ToSchema)]
+pub struct Job {}
+
+/// Stands for a model document: its schema is the exchange crate's.
+#[derive(ToSchema)]
+pub struct Model {}
+
+/// The description as indented JSON, with a line end: what is committed.
+#[must_use]
+pub fn text() -> String {
+    let mut text = serde_json::to_string_pretty(&document()).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// The description.
+#[must_use]
+pub fn document() -> Value {
+    let mut document = serde_json::to_value(crate::http::router::description()).unwrap_or_default();
+    document["info"] = json!({
+        "title": "lacuna",
+        "version": env!("CARGO_PKG_VERSION"),
+        "summary": "Fractal, NURBS and subdivision geometry as fabrication-ready solids, with a certificate.",
+        "description": "Lengths are mm, angles degrees, times RFC 3339 in UTC. Every error is `application/problem+json` (RFC 9457). Unknown members of a document are refused.",
+        "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" }
+    });
+    document["tags"] = json!([
+        { "name": "models", "description": "Stored models." },
+        { "name": "studies", "description": "What can be said without computing the shape." },
+        { "name": "jobs", "description": "Computations: submitted, followed, stopped." },
+        { "name": "results", "description": "Files, by job and by digest." },
+        { "name": "operation", "description": "Probes, limits, the contract itself." }
+    ]);
+    document["security"] = json!([{ "key": [] }]);
+    document["components"]["securitySchemes"] =
+        json!({ "key": { "type": "http", "scheme": "bearer", "description": "A key of the service; not needed where it has none." } });
+    for (name, schema) in lacuna_exchange::document::schemas("#/components/schemas/") {
+        document["components"]["schemas"][name] = schema;
+    }
+    document
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_committed_contract_is_the_served_one() {
+        let committed = include_str!("../openapi.json");
+        assert!(committed == text(), "api/openapi.json is out of date: run `cargo run -- openapi > api/openapi.json`");
+    }
+
+    #[test]
+    fn every_reference_leads_somewhere() {
+        fn check(document: &Value, value: &Value) {
+            match value {
+                Value::Object(members) => {
+                    if let Some(Value::String(reference)) = members.get("$ref") {
+                        let pointer = reference.trim_start_matches('#');
+                        assert!(document.pointer(pointer).is_some(), "{reference}");
+                    }
+                    members.values().for_each(|member| check(document, member));
+                }
+                Value::Array(items) => items.iter().for_each(|item| check(document, item)),
+                _ => {}
+            }
+        }
+        let document = document();
+        check(&document, &document);
+        assert_eq!(document["openapi"].as_str().map(|version| &version[..3]), Some("3.1"));
+    }
+}

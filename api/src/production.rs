@@ -1,0 +1,160 @@
+//! From a legal job to finished files: what the service's workers and the command line share.
+
+use std::io::{BufReader, BufWriter, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use lacuna_exchange::format::{self, Format, FormatError, Metadata};
+use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, Validation};
+use lacuna_kernel::budget::{Budget, StopReason};
+use lacuna_kernel::error::{Kind, LimitFacts};
+use lacuna_kernel::model::Model;
+
+use crate::digest::Digest;
+use crate::files::PendingFile;
+use crate::problem::{Problem, ProblemKind};
+
+/// What is written into a file besides the geometry.
+pub struct Label<'a> {
+    /// The model's name.
+    pub title: Option<&'a str>,
+    /// A picture for file managers.
+    pub thumbnail_png: Option<&'a [u8]>,
+}
+
+/// Does a job. A panic of the kernel ends the job, not the process.
+///
+/// # Errors
+/// The kernel's refusal, with pointers into the model document, or the defect.
+pub fn compute(job: &Job, budget: &Budget) -> Result<Outcome, Problem> {
+    guarded(|| lacuna_fabrication::run(job, budget))?.map_err(Problem::from)
+}
+
+/// Predicts what a job costs.
+///
+/// # Errors
+/// As [`compute`].
+pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, Problem> {
+    guarded(|| lacuna_fabrication::plan(job, budget))?.map_err(Problem::from)
+}
+
+/// Says what is wrong with a model.
+///
+/// # Errors
+/// When the kernel has a defect.
+pub fn validate(model: &Model) -> Result<Validation, Problem> {
+    guarded(|| lacuna_fabrication::validate(model))
+}
+
+/// Why the budget's token was fired, if it was.
+#[must_use]
+pub fn why_stopped(budget: &Budget) -> Option<Problem> {
+    budget.cancel.reason().map(|reason| match reason {
+        StopReason::Cancelled => Problem::new(ProblemKind::Cancelled, "Stopped by the caller"),
+        StopReason::Deadline => {
+            let seconds = budget.limits.seconds;
+            // How long it would have taken is not known; only that the limit was not enough.
+            let facts = LimitFacts { limit: "seconds", asked: seconds, allowed: seconds, remedy: None };
+            let detail = format!(
+                "The work was not done within {seconds} s; allow more seconds, a larger tolerance, or ask `plan` for the cost"
+            );
+            Problem::new(ProblemKind::Limit, detail).code("limit.seconds").limit(&facts)
+        }
+    })
+}
+
+/// Runs what may have a defect and turns a panic into a problem.
+///
+/// # Errors
+/// When it panicked.
+pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Problem> {
+    // The job's data is dropped with the panic, so nothing half changed is seen afterwards.
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let said = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+        Problem::internal(format!("a computation panicked: {}", said.unwrap_or("no message")))
+    })
+}
+
+/// Writes a result in a format and reads it back: what is proven of the mesh is proven of the file.
+///
+/// # Errors
+/// When the format has no room for the geometry, the device fails, or the file differs from the mesh.
+pub fn write_file(
+    format: Format,
+    outcome: &Outcome,
+    label: &Label<'_>,
+    pending: &mut PendingFile,
+) -> Result<(Digest, u64), Problem> {
+    let metadata = Metadata {
+        title: label.title,
+        certificate: Some(&outcome.certificate),
+        thumbnail_png: label.thumbnail_png,
+        ..Metadata::default()
+    };
+    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
+    let failed = |error| Problem::io("the file could not be written", &error);
+    let mut sink = BufWriter::with_capacity(1 << 16, &mut *pending);
+    guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
+    sink.flush().map_err(failed)?;
+    drop(sink);
+    if let (Geometry::Solid(solid), true) = (&outcome.geometry, format != Format::Png) {
+        let mut source = BufReader::with_capacity(1 << 16, pending.reread().map_err(failed)?);
+        guarded(|| format::verify_written(format, &mut source, solid))?.map_err(|error| format_problem(&error))?;
+    }
+    Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)
+}
+
+/// A picture of a result as PNG.
+///
+/// # Errors
+/// When there is nothing to see.
+pub fn picture(outcome: &Outcome) -> Result<Vec<u8>, Problem> {
+    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(Format::Png))?;
+    let mut sink = std::io::Cursor::new(Vec::new());
+    guarded(|| format::write(Format::Png, geometry, &Metadata::default(), &mut sink))?.map_err(|error| format_problem(&error))?;
+    Ok(sink.into_inner())
+}
+
+/// The certificate as a file: indented JSON with a line end.
+///
+/// # Errors
+/// When a number in it is not finite, which is a defect.
+pub fn certificate_file(certificate: &Certificate) -> Result<Vec<u8>, Problem> {
+    let mut bytes = serde_json::to_vec_pretty(certificate).map_err(|error| Problem::internal(error.to_string()))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+fn view(geometry: &Geometry) -> Option<format::Geometry<'_>> {
+    match geometry {
+        Geometry::Solid(solid) => Some(solid.into()),
+        Geometry::Tessellation(tessellation) => Some(tessellation.into()),
+        Geometry::None => None,
+    }
+}
+
+fn no_geometry(format: Format) -> Problem {
+    Problem::new(ProblemKind::InvalidModel, format!("this kind of job makes numbers only, no {format} file; ask for no outputs"))
+        .code("job.no-geometry")
+}
+
+/// A format's refusal as a problem; the chain of causes becomes one sentence.
+#[must_use]
+pub fn format_problem(error: &FormatError) -> Problem {
+    let mut detail = error.to_string();
+    let mut source = std::error::Error::source(error);
+    while let Some(cause) = source {
+        detail = format!("{detail}: {cause}");
+        source = cause.source();
+    }
+    let kind = match (error, error.kind()) {
+        (FormatError::Stream(_), _) => ProblemKind::InputOutput,
+        (FormatError::CannotCarry { .. } | FormatError::Empty, _) => ProblemKind::InvalidModel,
+        (_, Kind::Invalid) => ProblemKind::InvalidFile,
+        (_, kind) => kind.into(),
+    };
+    let problem = Problem::new(kind, detail).code(error.code());
+    match error.limit_facts() {
+        Some(facts) => problem.limit(facts),
+        None => problem,
+    }
+}

@@ -1,0 +1,95 @@
+//! What this service can do and how much of it it allows.
+
+use axum::Json;
+use axum::extract::State;
+use lacuna_exchange::format::FORMATS;
+use lacuna_fabrication::JobKind;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::http::state::Shared;
+
+/// What the service can do.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Capabilities {
+    /// Kinds of jobs.
+    kinds: Vec<JobKind>,
+    /// Output formats.
+    formats: Vec<FormatCapability>,
+    /// Limits.
+    limits: LimitCapability,
+    /// The kernel's version: the same input and version give the same bytes.
+    kernel_version: &'static str,
+}
+
+/// An output format.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct FormatCapability {
+    /// Its name in `outputs`.
+    name: &'static str,
+    /// Its media type.
+    media_type: &'static str,
+    /// What it has room for: `solid`, `surface`, `wires`, `points`.
+    carries: Vec<&'static str>,
+}
+
+/// The limits of a request and of a job.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct LimitCapability {
+    /// Bytes of a JSON body.
+    body_bytes: usize,
+    /// Seconds that `Prefer: wait` may ask.
+    wait_seconds: u64,
+    /// Most wall time of a job, in seconds.
+    seconds: f64,
+    /// Most accounted memory of a job, in bytes.
+    memory_bytes: u64,
+    /// Most leaf cells of a job.
+    cells: u64,
+    /// Most triangles of a result.
+    triangles: u64,
+    /// Longest address.
+    depth: u32,
+    /// Jobs that may wait.
+    queued_jobs: usize,
+    /// Unfinished jobs that one key may have.
+    jobs_per_key: usize,
+    /// Submissions per minute and key.
+    submissions_per_minute: u32,
+    /// Hours after which ended jobs are forgotten.
+    retention_hours: u64,
+}
+
+/// Kinds of jobs, formats and limits of this service.
+#[utoipa::path(get, path = "/v1/capabilities", tag = "operation", responses((status = 200, body = Capabilities)))]
+pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
+    let config = &state.config;
+    let formats = FORMATS.iter().map(|row| {
+        let carries = [
+            (row.carries.solid, "solid"),
+            (row.carries.surface, "surface"),
+            (row.carries.wires, "wires"),
+            (row.carries.points, "points"),
+        ];
+        let carries = carries.into_iter().filter_map(|(carried, word)| carried.then_some(word)).collect();
+        FormatCapability { name: row.ending, media_type: row.media_type, carries }
+    });
+    Json(Capabilities {
+        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure],
+        formats: formats.collect(),
+        limits: LimitCapability {
+            body_bytes: config.body_bytes,
+            wait_seconds: crate::http::headers::LONGEST_WAIT.as_secs(),
+            seconds: config.job_limits.seconds,
+            memory_bytes: config.job_limits.memory_bytes,
+            cells: config.job_limits.cells,
+            triangles: config.job_limits.triangles,
+            depth: config.job_limits.depth,
+            queued_jobs: config.queued,
+            jobs_per_key: config.jobs_per_key,
+            submissions_per_minute: config.submissions_per_minute,
+            retention_hours: config.retention_hours,
+        },
+        kernel_version: env!("CARGO_PKG_VERSION"),
+    })
+}

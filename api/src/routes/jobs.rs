@@ -1,0 +1,197 @@
+//! Jobs: submitted, listed, looked at, stopped, forgotten.
+
+use std::time::Duration;
+
+use axum::Json;
+use axum::extract::{Extension, Path, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use lacuna_fabrication::JobKind;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+
+use super::studies::{PLAN_TIME, predict};
+use crate::digest::Digest;
+use crate::documents;
+use crate::http::auth::Owner;
+use crate::http::body::JsonBody;
+use crate::http::headers::{PREFERENCE_APPLIED, Preference, QueryOf, idempotency_key, page_length};
+use crate::http::state::{AppState, Shared};
+use crate::jobs::desk::Submission;
+use crate::jobs::record::{Idempotency, JobState, JobView};
+use crate::openapi::Job;
+use crate::problem::{Problem, ProblemKind};
+
+/// Seconds after which to look at a job again.
+const LOOK_AGAIN: u64 = 1;
+
+/// Which page of which jobs.
+#[derive(Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct JobQuery {
+    /// Only jobs in this state.
+    state: Option<JobState>,
+    /// Only jobs of this kind.
+    kind: Option<JobKind>,
+    /// Items of the page, 1 to 200; 50 when absent.
+    limit: Option<usize>,
+    /// `next` of the page before.
+    cursor: Option<String>,
+}
+
+/// A page of jobs.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct JobPage {
+    /// The jobs, the newest first.
+    items: Vec<JobView>,
+    /// The cursor of the next page, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next: Option<String>,
+}
+
+/// Submits a job.
+///
+/// With `Prefer: wait=n` (30 at most) the answer waits up to n seconds for the end: 200 if it came, else 202.
+/// The job's own failure is in its `problem`, never in the status. An `Idempotency-Key` makes a repeated
+/// submission give the first one's job. Equal work that was finished before is not done again.
+#[utoipa::path(
+    post, path = "/v1/jobs", tag = "jobs", request_body = Job,
+    params(("Prefer" = Option<String>, Header, description = "`wait=10`, `respond-async`"),
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 characters, the caller's choice")),
+    responses((status = 200, body = JobView, description = "It has ended"), (status = 202, body = JobView, description = "It is accepted"),
+        (status = "4XX", body = Problem, content_type = "application/problem+json"),
+        (status = 503, body = Problem, content_type = "application/problem+json"))
+)]
+pub async fn submit(
+    State(state): State<Shared>,
+    Extension(owner): Extension<Owner>,
+    headers: HeaderMap,
+    JsonBody(body): JsonBody,
+) -> Result<Response, Problem> {
+    let key = idempotency_key(&headers)?;
+    let preference = Preference::of(&headers);
+    let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
+    let (job, replayed) = state.beside(move |state| accept(state, &owner, &body, used)).await?;
+    let view = job.wait(preference.wait.unwrap_or(Duration::ZERO)).await;
+    let ended = view.state.is_final();
+    let mut response = answer(view);
+    if let Some(applied) = preference.applied(ended).and_then(|applied| HeaderValue::from_str(&applied).ok()) {
+        response.headers_mut().insert(PREFERENCE_APPLIED, applied);
+    }
+    if replayed {
+        response.headers_mut().insert("idempotency-replayed", HeaderValue::from_static("true"));
+    }
+    Ok(response)
+}
+
+/// Reads, predicts and accepts: what is refused here never becomes a job.
+fn accept(
+    state: &AppState,
+    owner: &Owner,
+    body: &[u8],
+    idempotency: Option<Idempotency>,
+) -> Result<(std::sync::Arc<crate::jobs::live::LiveJob>, bool), Problem> {
+    let job = documents::read_job(body, &state.config.job_limits, &state.models_of(owner))?;
+    match predict(&job, PLAN_TIME) {
+        // A prediction that takes too long is no reason to refuse what may be done in time.
+        Err(problem) if problem.code != "limit.seconds" => return Err(problem),
+        _ => {}
+    }
+    let submission = Submission {
+        owner: owner.0.clone(),
+        kind: job.kind,
+        document: documents::order_document(&job).into_bytes(),
+        input_digest: documents::job_digest(&job),
+        idempotency,
+    };
+    state.desk.submit(submission)
+}
+
+fn answer(view: JobView) -> Response {
+    let place = format!("/v1/jobs/{}", view.id);
+    let status = if view.state.is_final() { StatusCode::OK } else { StatusCode::ACCEPTED };
+    let mut response = (status, [(header::LOCATION, place), (header::CACHE_CONTROL, "no-store".to_owned())], Json(view)).into_response();
+    if status == StatusCode::ACCEPTED {
+        response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(LOOK_AGAIN));
+    }
+    response
+}
+
+/// Lists the caller's jobs.
+#[utoipa::path(
+    get, path = "/v1/jobs", tag = "jobs", params(JobQuery),
+    responses((status = 200, body = JobPage), (status = "4XX", body = Problem, content_type = "application/problem+json"))
+)]
+pub async fn list(
+    State(state): State<Shared>,
+    Extension(owner): Extension<Owner>,
+    QueryOf(query): QueryOf<JobQuery>,
+) -> Result<Json<JobPage>, Problem> {
+    let length = page_length(query.limit)?;
+    let jobs = state.desk.all();
+    let theirs = jobs.iter().rev().filter(|job| {
+        job.with(|record| {
+            record.owner == owner.0
+                && query.state.is_none_or(|state| record.view.state == state)
+                && query.kind.is_none_or(|kind| record.view.kind == kind)
+                && query.cursor.as_ref().is_none_or(|cursor| record.view.id < *cursor)
+        })
+    });
+    let mut items: Vec<JobView> = theirs.take(length + 1).map(|job| job.view()).collect();
+    let more = items.len() > length;
+    items.truncate(length);
+    let next = more.then(|| items.last().map(|view| view.id.clone())).flatten();
+    Ok(Json(JobPage { items, next }))
+}
+
+/// A job, in every state with 200.
+#[utoipa::path(
+    get, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    responses((status = 200, body = JobView), (status = "4XX", body = Problem, content_type = "application/problem+json"))
+)]
+pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let view = find(&state, &owner, &id)?.view();
+    let ended = view.state.is_final();
+    let mut response = ([(header::CACHE_CONTROL, "no-store")], Json(view)).into_response();
+    if !ended {
+        response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(LOOK_AGAIN));
+    }
+    Ok(response)
+}
+
+/// Stops a job. 200 if it has ended, 202 while it is stopping.
+#[utoipa::path(
+    post, path = "/v1/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    responses((status = 200, body = JobView), (status = 202, body = JobView),
+        (status = "4XX", body = Problem, content_type = "application/problem+json"))
+)]
+pub async fn cancel(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let job = find(&state, &owner, &id)?;
+    let stop = move |state: &AppState| state.desk.cancel(&job).map_err(|error| Problem::io("the job could not be recorded", &error));
+    state.beside(stop).await.map(answer)
+}
+
+/// Stops a job if needed and forgets it.
+#[utoipa::path(
+    delete, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))
+)]
+pub async fn forget(
+    State(state): State<Shared>,
+    Extension(owner): Extension<Owner>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, Problem> {
+    let job = find(&state, &owner, &id)?;
+    let forget = move |state: &AppState| state.desk.forget(&job).map_err(|error| Problem::io("the job could not be forgotten", &error));
+    state.beside(forget).await.map(|()| StatusCode::NO_CONTENT)
+}
+
+/// The caller's job with an id; another's is as absent as one that never was.
+///
+/// # Errors
+/// 404.
+pub fn find(state: &AppState, owner: &Owner, id: &str) -> Result<std::sync::Arc<crate::jobs::live::LiveJob>, Problem> {
+    let shown: String = id.chars().take(80).collect();
+    state.desk.find(&owner.0, id).ok_or_else(|| Problem::new(ProblemKind::NotFound, format!("there is no job {shown:?}")))
+}
