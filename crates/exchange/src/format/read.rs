@@ -1,0 +1,130 @@
+//! Reading: which format the bytes are in, and what was found in them.
+
+use super::error::FormatError;
+use super::error::Place;
+use super::limits::within;
+use super::{Format, ReadLimits, obj, off, ply, stl, threemf};
+use lacuna_kernel::solid::TriMesh;
+
+/// A unit of length that a file names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Unit {
+    /// 0.001 mm.
+    Micron,
+    /// 1 mm.
+    Millimetre,
+    /// 10 mm.
+    Centimetre,
+    /// 25.4 mm.
+    Inch,
+    /// 304.8 mm.
+    Foot,
+    /// 1000 mm.
+    Metre,
+}
+
+impl Unit {
+    /// Its length in mm.
+    #[must_use]
+    pub fn millimetres(self) -> f64 {
+        match self {
+            Self::Micron => 0.001,
+            Self::Millimetre => 1.0,
+            Self::Centimetre => 10.0,
+            Self::Inch => 25.4,
+            Self::Foot => 304.8,
+            Self::Metre => 1000.0,
+        }
+    }
+}
+
+/// What was found in a file besides its mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshFacts {
+    /// The format it was read as.
+    pub format: Format,
+    /// `binary`, `binary big-endian`, `ascii` or `xml`.
+    pub encoding: &'static str,
+    /// The unit that the file names; the mesh is in mm already. Without one, the file's numbers
+    /// were taken for mm.
+    pub unit: Option<Unit>,
+    /// Names of objects, at most [`MeshFacts::NAMES`], each cut to [`MeshFacts::NAME_CHARACTERS`].
+    pub object_names: Vec<String>,
+    /// Polygons with more than three corners, cut into triangles about their first corner.
+    pub polygons_fanned: u64,
+}
+
+impl MeshFacts {
+    /// At most so many names are kept.
+    pub const NAMES: usize = 1000;
+    /// Names are cut to so many characters.
+    pub const NAME_CHARACTERS: usize = 256;
+
+    pub(crate) fn of(format: Format, encoding: &'static str) -> Self {
+        Self { format, encoding, unit: None, object_names: Vec::new(), polygons_fanned: 0 }
+    }
+}
+
+/// A mesh that was read. Nothing is proven of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshFile {
+    /// The mesh, in mm.
+    pub mesh: TriMesh,
+    /// What else the file said.
+    pub facts: MeshFacts,
+}
+
+/// Keeps a name, if there is one and there is room.
+pub(crate) fn keep_name(facts: &mut MeshFacts, name: &[u8]) {
+    let name = name.trim_ascii();
+    if name.is_empty() || facts.object_names.len() >= MeshFacts::NAMES {
+        return;
+    }
+    // Four bytes at most for a character: no more than these need decoding.
+    let start = name.get(..4 * MeshFacts::NAME_CHARACTERS).unwrap_or(name);
+    facts.object_names.push(String::from_utf8_lossy(start).chars().take(MeshFacts::NAME_CHARACTERS).collect());
+}
+
+/// The format that the bytes are in, by their first ones and, for binary STL, by their number.
+#[must_use]
+pub fn detect(bytes: &[u8]) -> Option<Format> {
+    let marks: [(&[u8], Format); 5] = [
+        (b"PK\x03\x04", Format::ThreeMf),
+        (b"glTF", Format::Glb),
+        (b"\x89PNG", Format::Png),
+        (b"ply\n", Format::Ply),
+        (b"ply\r", Format::Ply),
+    ];
+    if let Some((_, format)) = marks.iter().find(|(mark, _)| bytes.starts_with(mark)) {
+        return Some(*format);
+    }
+    if stl::is_binary(bytes) || stl::looks_like_text(bytes) {
+        return Some(Format::Stl);
+    }
+    if off::looks_like(bytes) {
+        return Some(Format::Off);
+    }
+    obj::looks_like(bytes).then_some(Format::Obj)
+}
+
+/// Reads a mesh. The format is detected unless it is given.
+///
+/// Polygons become fans, units become mm, the objects of a 3MF file are placed where its build
+/// puts them, and vertices of an STL file with equal coordinates become one. A decimal is read as
+/// the nearest double. Nothing is repaired.
+///
+/// # Errors
+/// Every [`FormatError`] of kind `Invalid` or `Limit`, with the place in the file; never a panic,
+/// and never more memory than the limits and the file's own length justify.
+pub fn read(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result<MeshFile, FormatError> {
+    within(Place::File, "file_bytes", bytes.len() as u64, limits.file_bytes)?;
+    let format = format.or_else(|| detect(bytes)).ok_or(FormatError::UnknownFormat)?;
+    match format {
+        Format::Stl => stl::read(bytes, limits),
+        Format::ThreeMf => threemf::read(bytes, limits),
+        Format::Obj => obj::read(bytes, limits),
+        Format::Ply => ply::read(bytes, limits),
+        Format::Off => off::read(bytes, limits),
+        Format::Glb | Format::Png => Err(FormatError::CannotRead { format }),
+    }
+}
