@@ -1,7 +1,7 @@
 //! Reads boundary controlled iterated function systems: names, shapes and indices. Whether the
 //! operators fit, converge and satisfy their constraints is for the kernel to say.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 use lacuna_kernel::model::{
     Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec,
@@ -20,10 +20,10 @@ struct Outline<'p> {
     boundaries: Option<usize>,
 }
 
-/// The names that a document declares. `None` when they cannot be told: then no reference is judged.
+/// The names that a document declares, in an order that no hash decides. `None` when they cannot be told: then no reference is judged.
 struct Names<'p> {
-    states: Option<HashMap<&'p str, Outline<'p>>>,
-    parameters: Option<HashSet<&'p str>>,
+    states: Option<BTreeMap<&'p str, Outline<'p>>>,
+    parameters: Option<BTreeSet<&'p str>>,
 }
 
 /// A `bcifs` shape.
@@ -35,14 +35,15 @@ pub(super) fn bcifs(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member])
             .filter(|place| length(place.node).is_some_and(|states| states <= walker.limits.states))
             .and_then(|place| outlines(place.node)),
         parameters: match members.get("parameters").map(|place| &place.node.value) {
-            None => Some(HashSet::new()),
+            None => Some(BTreeSet::new()),
             Some(Value::Object(entries)) => Some(entries.iter().map(|(name, _)| name.as_ref()).collect()),
             Some(_) => None,
         },
     };
     let parameters = members.get("parameters").map_or(Some(Vec::new()), |place| parameters(walker, place));
     let states = members.get("states").and_then(|place| states(walker, place, &names));
-    let incidences = optional_list(walker, &members, "incidences", "an array of incidences", |walker, place| incidence(walker, place, &names));
+    let incidences =
+        optional_list(walker, &members, "incidences", "an array of incidences", |walker, place| incidence(walker, place, &names));
     let adjacencies =
         optional_list(walker, &members, "adjacencies", "an array of adjacencies", |walker, place| adjacency(walker, place, &names));
     let cells = members
@@ -52,14 +53,7 @@ pub(super) fn bcifs(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member])
     let glue = optional_list(walker, &members, "glue", "an array of glued boundaries", |walker, place| {
         glue(walker, place, roots.as_deref(), &names)
     });
-    Some(Bcifs {
-        states: states?,
-        incidences: incidences?,
-        adjacencies: adjacencies?,
-        cells: cells?,
-        glue: glue?,
-        parameters: parameters?,
-    })
+    Some(Bcifs { states: states?, incidences: incidences?, adjacencies: adjacencies?, cells: cells?, glue: glue?, parameters: parameters? })
 }
 
 fn optional_list<T>(
@@ -87,7 +81,7 @@ fn elements<'p>(node: &'p Node<'p>) -> Option<&'p [Node<'p>]> {
     }
 }
 
-fn outlines<'p>(states: &'p Node<'p>) -> Option<HashMap<&'p str, Outline<'p>>> {
+fn outlines<'p>(states: &'p Node<'p>) -> Option<BTreeMap<&'p str, Outline<'p>>> {
     let states = elements(states)?;
     let named = states.iter().filter_map(|state| Some((member(state, "name")?.text()?, state)));
     Some(
@@ -131,7 +125,7 @@ fn states(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Optio
     if walker.states > walker.limits.states {
         return None;
     }
-    let mut first_places: HashMap<String, usize> = HashMap::new();
+    let mut first_places: BTreeMap<String, usize> = BTreeMap::new();
     let mut position = 0;
     walker.each_of(place, 1, "an array of states", |walker, place| {
         let state = state(walker, place, names);
@@ -193,21 +187,12 @@ fn state_name(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> O
     match &names.states {
         Some(states) if !states.contains_key(name) => {
             walker.fault(&place, code::UNKNOWN_STATE, || {
-                let known = sorted(states.keys().copied());
-                format!("{} is not a state of the model; {}", quoted(name), suggestion(name, known))
+                format!("{} is not a state of the model; {}", quoted(name), suggestion(name, states.keys().copied()))
             });
             None
         }
         _ => Some(name.to_owned()),
     }
-}
-
-/// Names in an order that does not depend on a hash.
-fn sorted<'n>(names: impl Iterator<Item = &'n str>) -> impl Iterator<Item = &'n str> {
-    // why: a million names are not worth sorting for the sake of a hint
-    let mut names: Vec<&str> = names.take(4096).collect();
-    names.sort_unstable();
-    names.into_iter()
 }
 
 fn matrix(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option<Matrix> {
@@ -247,7 +232,7 @@ fn entry(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option
                         let hint = if known.is_empty() {
                             "declare it in the shape's \"parameters\"".into()
                         } else {
-                            suggestion(name, sorted(known.iter().copied()))
+                            suggestion(name, known.iter().copied())
                         };
                         format!("{} is not one of the model's parameters; {hint}", quoted(name))
                     });
@@ -322,9 +307,8 @@ fn adjacency(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Op
     let members = walker.object(place, &ADJACENCY)?;
     let state = members.get("state").and_then(|place| state_name(walker, place, names));
     let outline = outline(names, state.as_ref());
-    let pairs = members
-        .get("between")
-        .and_then(|place| between(walker, place, |walker, place| child_boundary(walker, place, outline, names)));
+    let pairs =
+        members.get("between").and_then(|place| between(walker, place, |walker, place| child_boundary(walker, place, outline, names)));
     let reversed = members.get("reversed").map_or(Some(false), |place| walker.flag(place));
     Some(Adjacency { state: state?, between: pairs?, reversed: reversed? })
 }

@@ -19,7 +19,9 @@ pub(super) fn bezier_curve(walker: &mut Walker<'_>, place: Place<'_>, added: &[M
             if let (Some(found), Some(expected)) = (length(place.node), points_place.and_then(|points| length(points.node)))
                 && found != expected
             {
-                walker.fault(&place, code::WRONG_LENGTH, || format!("has {found} weights for {expected} control points; expected one for each"));
+                walker.fault(&place, code::WRONG_LENGTH, || {
+                    format!("has {found} weights for {expected} control points; expected one for each")
+                });
             }
             if points.as_ref().is_some_and(|points| points.iter().any(|(_, weight)| weight.is_some())) {
                 walker.fault(&place, code::CONFLICTING_MEMBERS, || {
@@ -31,10 +33,8 @@ pub(super) fn bezier_curve(walker: &mut Walker<'_>, place: Place<'_>, added: &[M
         None => Some(None),
     };
     let points = points?;
-    let own_weights = points
-        .iter()
-        .any(|(_, weight)| weight.is_some())
-        .then(|| points.iter().map(|(_, weight)| weight.unwrap_or(1.0)).collect());
+    let own_weights =
+        points.iter().any(|(_, weight)| weight.is_some()).then(|| points.iter().map(|(_, weight)| weight.unwrap_or(1.0)).collect());
     Some(BezierCurve { control_points: points.into_iter().map(|(point, _)| point).collect(), weights: weights?.or(own_weights) })
 }
 

@@ -3,6 +3,8 @@
 
 use serde_json::{Value, json};
 
+use crate::format::FORMATS;
+
 /// A kind of object.
 pub(super) struct Object {
     /// What messages and schemas call it.
@@ -58,7 +60,7 @@ fn flag() -> Value {
 }
 
 fn text() -> Value {
-    json!({ "type": "string", "minLength": 1, "maxLength": 256 })
+    json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f]*$" })
 }
 
 fn list(items: Value, least: usize) -> Value {
@@ -126,9 +128,11 @@ pub(super) const MODEL: Object = Object {
     members: &[
         required("lacuna", "The version of the grammar: 1.", version),
         optional("name", "What the author calls the model.", text),
-        optional("units", "The unit of every length of the model; converted to mm on reading. Weights, linear parts and operators have no unit.", || {
-            json!({ "type": "string", "enum": ["um", "mm", "cm", "m", "in"], "default": "mm" })
-        }),
+        optional(
+            "units",
+            "The unit of every length of the model; converted to mm on reading. Weights, linear parts and operators have no unit.",
+            || json!({ "type": "string", "enum": ["um", "mm", "cm", "m", "in"], "default": "mm" }),
+        ),
         required("shape", "The shape, of one of the families.", || reference("Shape")),
     ],
 };
@@ -153,9 +157,11 @@ pub(super) const TURNED_MAP: Object = Object {
     title: "an affine map",
     about: "The map x -> R S x + t: scaled along x, y and z, then turned about an axis through the origin, then moved.",
     members: &[
-        optional("scale", "One factor, or one for each of x, y and z; 1 when absent. Zero and negative factors are legal.", || {
-            json!({ "anyOf": [number(), vector()], "default": 1 })
-        }),
+        optional(
+            "scale",
+            "One factor, or one for each of x, y and z; 1 when absent. Zero and negative factors are legal.",
+            || json!({ "anyOf": [number(), vector()], "default": 1 }),
+        ),
         optional("axis", "Direction of the axis of rotation, of any length above zero; z when absent.", vector),
         optional("angle_deg", "Angle of the rotation in degrees, counter-clockwise seen from the axis's tip; 0 when absent.", number),
         optional("translation", "t, a length; the origin when absent.", vector),
@@ -215,15 +221,19 @@ pub(super) const BCIFS: Object = Object {
     members: &[
         family!("bcifs"),
         required("states", "The kinds of cells.", || list(reference("State"), 1)),
-        optional("incidences", "Incidence constraints: how a boundary's subdivision lies in the subdivision.", || list(reference("Incidence"), 0)),
+        optional("incidences", "Incidence constraints: how a boundary's subdivision lies in the subdivision.", || {
+            list(reference("Incidence"), 0)
+        }),
         optional("adjacencies", "Adjacency constraints: boundaries that two children share.", || list(reference("Adjacency"), 0)),
         required("cells", "The root cells.", || list(reference("RootCell"), 1)),
         optional("glue", "Boundaries of root cells that are one; as objects or as bare pairs.", || {
             list(json!({ "anyOf": [reference("Glue"), tuple(index_pair(), 2)] }), 0)
         }),
-        optional("parameters", "Named values that entries of matrices may use.", || {
-            json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() })
-        }),
+        optional(
+            "parameters",
+            "Named values that entries of matrices may use.",
+            || json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() }),
+        ),
     ],
 };
 
@@ -324,9 +334,11 @@ pub(super) const MESH: Object = Object {
         family!("mesh"),
         required("vertices", "The corner points.", || points(1)),
         required("faces", "The corner indices of each face, counter-clockwise seen from outside.", || faces(1)),
-        optional("interior", "Whether the mesh stands for the solid that it bounds or for its surface; `auto`: the solid if it is closed.", || {
-            json!({ "type": "string", "enum": ["auto", "solid", "surface"], "default": "auto" })
-        }),
+        optional(
+            "interior",
+            "Whether the mesh stands for the solid that it bounds or for its surface; `auto`: the solid if it is closed.",
+            || json!({ "type": "string", "enum": ["auto", "solid", "surface"], "default": "auto" }),
+        ),
     ],
 };
 
@@ -391,9 +403,11 @@ pub(super) const JOB: Object = Object {
         optional("model_ref", "The id of a stored model.", text),
         optional("inputs", "Named models, for kinds of jobs with several.", || list(reference("JobInput"), 1)),
         required("params", "How to do it.", || reference("JobParams")),
-        optional("outputs", "Names of the formats wanted, for example 3mf and stl.", || {
-            json!({ "type": "array", "items": text(), "uniqueItems": true })
-        }),
+        optional(
+            "outputs",
+            "Names of the formats wanted, for example 3mf and stl.",
+            || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
+        ),
         optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
     ],
 };
@@ -413,7 +427,11 @@ pub(super) const JOB_PARAMS: Object = Object {
     about: "Settings of a job. What a kind does not use must be absent.",
     members: &[
         required("tolerance_mm", "The Hausdorff bound on the result, in mm, above zero.", positive),
-        optional("radius_mm", "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, absent for evaluate.", positive),
+        optional(
+            "radius_mm",
+            "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, absent for evaluate.",
+            positive,
+        ),
     ],
 };
 

@@ -76,9 +76,8 @@ fn graph(walker: &mut Walker<'_>, place: Place<'_>, maps: Option<usize>) -> Opti
         }),
         _ => false,
     };
-    let graph = walker.each(place, EXPECTED, |walker, row| {
-        if is_matrix { flags_row(walker, row, maps) } else { index_row(walker, row, maps) }
-    })?;
+    let graph =
+        walker.each(place, EXPECTED, |walker, row| if is_matrix { flags_row(walker, row, maps) } else { index_row(walker, row, maps) })?;
     walker.count_transitions(&place, graph.iter().map(Vec::len).sum());
     Some(graph)
 }
@@ -92,9 +91,8 @@ fn flags_row(walker: &mut Walker<'_>, row: Place<'_>, maps: Option<usize>) -> Op
 }
 
 fn index_row(walker: &mut Walker<'_>, row: Place<'_>, maps: Option<usize>) -> Option<Vec<usize>> {
-    let indices = walker.each(row, "a row of indices of maps", |walker, element| {
-        walker.index(element, maps.unwrap_or(usize::MAX), "map")
-    })?;
+    let indices =
+        walker.each(row, "a row of indices of maps", |walker, element| walker.index(element, maps.unwrap_or(usize::MAX), "map"))?;
     let mut seen = std::collections::HashSet::with_capacity(indices.len());
     for (position, index) in indices.iter().enumerate() {
         if !seen.insert(index) {

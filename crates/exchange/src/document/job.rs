@@ -9,6 +9,7 @@ use super::model::{model, version};
 use super::node::{Place, quoted};
 use super::walk::{Members, Walker, length, suggestion};
 use crate::diagnostic::{Diagnostic, code};
+use crate::format::FORMATS;
 
 /// A job as its document states it: legal, with references to stored models still to be resolved and
 /// limits still to be completed from the service's.
@@ -20,7 +21,7 @@ pub struct JobDocument {
     pub inputs: Vec<InputDocument>,
     /// How.
     pub params: Params,
-    /// Names of the formats wanted, each once; the exchange crate's table knows them.
+    /// Names (endings) of the formats wanted, each once and each in [`FORMATS`].
     pub outputs: Vec<String>,
     /// What may be used, as far as the document says.
     pub limits: RequestedLimits,
@@ -131,9 +132,7 @@ impl JobDocument {
             }
         }
         match self.limits.resolve(default, most) {
-            Ok(limits) if diagnostics.is_empty() => {
-                Ok(Job { kind: self.kind, inputs, params: self.params, outputs: self.outputs, limits })
-            }
+            Ok(limits) if diagnostics.is_empty() => Ok(Job { kind: self.kind, inputs, params: self.params, outputs: self.outputs, limits }),
             Ok(_) => Err(diagnostics),
             Err(excesses) => {
                 diagnostics.extend(excesses);
@@ -215,7 +214,9 @@ fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title:
     let mut alone = Some(());
     for other in stated {
         if let Some(conflict) = members.get(other) {
-            walker.fault(&conflict, code::CONFLICTING_MEMBERS, || format!("\"{other}\" and \"{first}\" exclude each other; keep one of {}", listed()));
+            walker.fault(&conflict, code::CONFLICTING_MEMBERS, || {
+                format!("\"{other}\" and \"{first}\" exclude each other; keep one of {}", listed())
+            });
         }
         alone = None;
     }
@@ -260,18 +261,16 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {
-    let mut seen: Vec<String> = Vec::new();
+    let formats = FORMATS.map(|format| (format.ending, format.ending));
+    let mut seen: Vec<&str> = Vec::new();
     let outputs = walker.each(place, "an array of names of formats", |walker, place| {
-        let name = walker.name(place, "the name of a format")?;
+        let name = walker.word(place, "a format", &formats)?;
         if seen.contains(&name) {
-            walker.fault(&place, code::REPEATED_ELEMENT, || format!("{} is asked for twice; ask for it once", quoted(&name)));
+            walker.fault(&place, code::REPEATED_ELEMENT, || format!("\"{name}\" is asked for twice; ask for it once"));
             return None;
         }
-        // why: there are a dozen formats; a list of a million names is compared with the first few
-        if seen.len() < 64 {
-            seen.push(name.clone());
-        }
-        Some(name)
+        seen.push(name);
+        Some(name.to_owned())
     })?;
     if kind == Some(JobKind::Measure) && !outputs.is_empty() {
         walker.fault(&place, code::CONFLICTING_MEMBERS, || "measure delivers numbers and no files; remove \"outputs\"".into());

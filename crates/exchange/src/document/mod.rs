@@ -113,7 +113,9 @@ fn text<'b>(bytes: &'b [u8], limits: &DocumentLimits) -> Result<&'b str, Vec<Dia
         let before = bytes.get(..error.valid_up_to()).unwrap_or_default();
         match error.error_len() {
             None => single(before, code::TRUNCATED, "the document ends in the middle of a character; was it sent completely?".into()),
-            Some(_) => single(before, code::NOT_UTF8, format!("byte {} does not belong to UTF-8 text; save the document as UTF-8", before.len())),
+            Some(_) => {
+                single(before, code::NOT_UTF8, format!("byte {} does not belong to UTF-8 text; save the document as UTF-8", before.len()))
+            }
         }
     })
 }

@@ -213,7 +213,9 @@ impl<'t> Parser<'t, '_> {
         };
         match char::from_u32(scalar) {
             Some(character) => Ok(character),
-            None => self.end(path, code::SYNTAX, || format!("\\u{first:04x} is half of a surrogate pair; write both halves or the character itself")),
+            None => self.end(path, code::SYNTAX, || {
+                format!("\\u{first:04x} is half of a surrogate pair; write both halves or the character itself")
+            }),
         }
     }
 
@@ -313,7 +315,9 @@ impl<'t> Parser<'t, '_> {
         if self.depth == self.nesting {
             let nesting = self.nesting;
             return self.end(path, code::TOO_DEEP, || {
-                format!("arrays and objects are nested more than {nesting} deep; a model needs far less, and a group of groups can be flattened")
+                format!(
+                    "arrays and objects are nested more than {nesting} deep; a model needs far less, and a group of groups can be flattened"
+                )
             });
         }
         self.depth += 1;
@@ -358,7 +362,10 @@ impl<'t> Parser<'t, '_> {
     }
 
     fn next_character(&self) -> String {
-        self.text.get(self.at..).and_then(|rest| rest.chars().next()).map_or_else(|| "a broken character".into(), |found| quoted(&found.to_string()))
+        self.text
+            .get(self.at..)
+            .and_then(|rest| rest.chars().next())
+            .map_or_else(|| "a broken character".into(), |found| quoted(&found.to_string()))
     }
 
     fn skip_space(&mut self) {

@@ -7,8 +7,8 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA,
-    MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
+    ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
+    Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
     reference,
 };
 
@@ -64,7 +64,10 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Shape".into(), any_of("A shape of one of the families.", FAMILIES.iter().map(|(_, name, _)| reference(name)))));
     let placed = FAMILIES.iter().map(|(_, _, grammar)| object(grammar, PART_MEMBERS));
     let parts = std::iter::once(object(&PART, &[])).chain(placed);
-    schemas.push(("Part".into(), any_of("A shape with an optional name and place: beside the shape's own members, or with the shape as a member.", parts)));
+    schemas.push((
+        "Part".into(),
+        any_of("A shape with an optional name and place: beside the shape's own members, or with the shape as a member.", parts),
+    ));
     let maps = [object(&LINEAR_MAP, &[]), object(&TURNED_MAP, &[])];
     schemas.push(("AffineMap".into(), any_of("An affine map of space.", maps.into_iter())));
     schemas.push(("ControlPoint".into(), control_point_schema()));
@@ -117,7 +120,8 @@ fn primitive() -> Value {
 
 fn job() -> Value {
     let mut schema = exactly_one(object(&JOB, &[]), &["model", "model_ref", "inputs"]);
-    let kind = |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
+    let kind =
+        |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
         kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"] } } })),
         kind("evaluate", json!({ "properties": { "params": { "not": { "required": ["radius_mm"] } } } })),

@@ -11,11 +11,8 @@ use crate::diagnostic::code;
 /// An affine map: `linear` and `translation`, or scale, rotation and translation.
 pub(super) fn affine_map(walker: &mut Walker<'_>, place: Place<'_>) -> Option<AffineMap> {
     let is_linear = matches!(&place.node.value, Value::Object(entries) if entries.iter().any(|(name, _)| name == "linear"));
-    let members = if is_linear {
-        walker.object_of(place, &LINEAR_MAP, TURNS)?
-    } else {
-        walker.object_of(place, &TURNED_MAP, LINEAR_IF_ANY)?
-    };
+    let members =
+        if is_linear { walker.object_of(place, &LINEAR_MAP, TURNS)? } else { walker.object_of(place, &TURNED_MAP, LINEAR_IF_ANY)? };
     let translation = match members.get("translation") {
         Some(place) => point(walker, place),
         None => Some(DVec3::ZERO),

@@ -84,7 +84,9 @@ impl<'w> Walker<'w> {
         }
         for member in known().filter(|member| member.required) {
             if !entries.iter().any(|(name, _)| name == member.name) {
-                self.fault(&place, code::MISSING_MEMBER, || format!("{} needs the member \"{}\": {}", grammar.title, member.name, member.about));
+                self.fault(&place, code::MISSING_MEMBER, || {
+                    format!("{} needs the member \"{}\": {}", grammar.title, member.name, member.about)
+                });
             }
         }
         Some(Members { place, entries })

@@ -8,8 +8,8 @@ use glam::{DMat3, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model,
-    Part, PolygonMesh, Primitive, RootCell, Shape,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
+    Model, Part, PolygonMesh, Primitive, RootCell, Shape,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -93,31 +93,15 @@ macro_rules! object {
     )+};
 }
 
-macro_rules! shape_object {
-    ($($kind:ty: |$value:ident, $members:ident| $body:expr;)+) => {$(
-        impl Placed<'_, $kind> {
-            fn write<M: SerializeMap>(&self, $members: &mut Members<M>) -> Result<(), M::Error> {
-                let $value = self.0;
-                $body;
-                Ok(())
-            }
-        }
-    )+};
-}
-
-/// A shape whose members go into an object that may have others.
-struct Placed<'m, T>(&'m T);
-
 object! {
     Model: |model, members| members
         .put("lacuna", &1)?
         .put_some("name", model.name.as_ref())?
         .put("shape", &Wire(&model.shape))?;
-    Shape: |shape, members| write_shape(shape, members)?;
-    Part: |part, members| {
-        members.put_some("name", part.name.as_ref())?.put_some("transform", part.transform.as_ref().map(Wire).as_ref())?;
-        write_shape(&part.shape, members)?
-    };
+    Part: |part, members| members
+        .put_some("name", part.name.as_ref())?
+        .put_some("transform", part.transform.as_ref().map(Wire).as_ref())?
+        .put("shape", &Wire(&part.shape))?;
     AffineMap: |map, members| members.put("linear", &Wire(&map.linear))?.put("translation", &Wire(&map.translation))?;
     Primitive: |primitive, members| match primitive {
         Primitive::Points(points) => members.put("points", &list(points))?,
@@ -169,9 +153,6 @@ object! {
         .put("cells", &limits.cells)?
         .put("memory_bytes", &limits.memory_bytes)?
         .put("depth", &limits.depth)?;
-}
-
-shape_object! {
     Ifs: |ifs, members| members
         .put("family", &"ifs")?
         .put("maps", &list(&ifs.maps))?
@@ -207,14 +188,16 @@ shape_object! {
     Group: |group, members| members.put("family", &"group")?.put("parts", &list(&group.parts))?;
 }
 
-fn write_shape<M: SerializeMap>(shape: &Shape, members: &mut Members<M>) -> Result<(), M::Error> {
-    match shape {
-        Shape::Ifs(ifs) => Placed(ifs).write(members),
-        Shape::Bcifs(bcifs) => Placed(bcifs).write(members),
-        Shape::BezierCurve(curve) => Placed(curve).write(members),
-        Shape::CornerCutting(curve) => Placed(curve).write(members),
-        Shape::Mesh(mesh) => Placed(mesh).write(members),
-        Shape::Group(group) => Placed(group).write(members),
+impl Serialize for Wire<'_, Shape> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Shape::Ifs(ifs) => Wire(ifs).serialize(serializer),
+            Shape::Bcifs(bcifs) => Wire(bcifs).serialize(serializer),
+            Shape::BezierCurve(curve) => Wire(curve).serialize(serializer),
+            Shape::CornerCutting(curve) => Wire(curve).serialize(serializer),
+            Shape::Mesh(mesh) => Wire(mesh).serialize(serializer),
+            Shape::Group(group) => Wire(group).serialize(serializer),
+        }
     }
 }
 
