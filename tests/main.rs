@@ -1,1 +1,23 @@
-//! One test binary for the whole house.
+//! One test binary for the whole house; run with `cargo test --workspace`.
+//!
+//! | module | asks |
+//! |---|---|
+//! | `corpus` | does every case of `fixtures/` hold, through the real command? |
+//! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
+//! | `properties` | do the laws of dilation hold on random sets, against brute force? |
+//! | `determinism` | the same bytes for one thread and for two? |
+//! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
+//! | `service` | does the running service keep them? |
+//! | `architecture` | are the crates, the folders and the map what they claim to be? |
+//! | `container` | do the container's files say what they must? |
+
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod architecture;
+mod container;
+mod contract;
+mod corpus;
+mod determinism;
+mod independent;
+mod properties;
+mod service;

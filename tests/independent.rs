@@ -1,0 +1,219 @@
+//! Every solid case as STL and 3MF, read back by libraries that we did not write (`independent/check.py`).
+
+use std::fs;
+use std::path::Path;
+
+use lacuna_tests::support::binary::succeed;
+use lacuna_tests::support::cases::{self, Case};
+use lacuna_tests::support::python::{Judge, skipped};
+use lacuna_tests::support::scratch::Scratch;
+use serde_json::Value;
+
+/// Counts that reports and certificates have in common.
+const COUNTS: [&str; 13] = [
+    "vertices",
+    "edges",
+    "triangles",
+    "euler",
+    "shells",
+    "components",
+    "cavities",
+    "genus",
+    "boundary_edges",
+    "nonmanifold_edges",
+    "nonmanifold_vertices",
+    "flipped_pairs",
+    "degenerate_triangles",
+];
+
+/// Counts that are 0 in every printable file.
+const ZERO: [&str; 5] = ["boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "flipped_pairs", "degenerate_triangles"];
+
+/// Triangles up to which crossings are searched with exact arithmetic; above, that takes minutes.
+const EXACT_SEARCH: i64 = 120_000;
+
+/// Relative rounding of sums over a mesh in double precision.
+const ROUNDING: f64 = 1e-9;
+
+/// What is wrong with a case.
+#[derive(Default)]
+struct Findings(Vec<String>);
+
+impl Findings {
+    fn expect(&mut self, holds: bool, words: impl FnOnce() -> String) {
+        if !holds {
+            self.0.push(words());
+        }
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs()).max(1.0)
+}
+
+/// Writes the solid in a format and gives its certificate.
+fn solidify(case: &Case, file: &Path, certificate: &Path) -> Value {
+    let expected = &case.expected;
+    succeed([
+        "solidify".into(),
+        case.model().into_os_string(),
+        "--tolerance".into(),
+        expected.tolerance_mm.to_string().into(),
+        "--radius".into(),
+        expected.radius_mm.unwrap().to_string().into(),
+        "-o".into(),
+        file.as_os_str().to_owned(),
+        "--certificate".into(),
+        certificate.as_os_str().to_owned(),
+    ]);
+    serde_json::from_slice(&fs::read(certificate).unwrap()).unwrap()
+}
+
+/// The report agrees with the certificate, with the case, and with itself.
+fn judge(case: &Case, format: &str, report: &Value, certificate: &Value, found: &mut Findings) {
+    let name = format!("{}.{format}", case.name);
+    if let Some(problem) = report.get("problem") {
+        found.expect(false, || format!("{name} cannot be read: {problem}"));
+        return;
+    }
+    for count in COUNTS {
+        let (theirs, ours) = (&report[count], &certificate[count]);
+        found.expect(theirs.is_i64() && theirs == ours, || format!("{name}: {count} is {theirs}, the certificate says {ours}"));
+        let stated = case.expected.count(count);
+        found.expect(stated.is_none_or(|value| theirs == value), || format!("{name}: {count} is {theirs}, exact is {stated:?}"));
+    }
+    for count in ZERO {
+        found.expect(report[count] == 0, || format!("{name}: {count} is {}", report[count]));
+    }
+    found.expect(report["finite"] == true, || format!("{name}: a coordinate is no number"));
+    let volume = number(&report["volume"]);
+    for opinion in [&report["trimesh"]["volume"], &report["manifold"]["volume"], &certificate["mesh_volume_mm3"]] {
+        found.expect(near(volume, number(opinion)), || format!("{name}: volume {volume}, another opinion is {opinion}"));
+    }
+    found.expect(report["trimesh"]["watertight"] == true && report["trimesh"]["winding"] == true, || format!("{name}: {}", report["trimesh"]));
+    found.expect(report["trimesh"]["euler"] == report["euler"], || format!("{name}: trimesh counts {}", report["trimesh"]["euler"]));
+    found.expect(report["manifold"]["status"] == "NoError", || format!("{name}: Manifold says {}", report["manifold"]["status"]));
+    found.expect(report["manifold"]["shells"] == report["shells"], || format!("{name}: Manifold counts {}", report["manifold"]["shells"]));
+    if let Some(crossings) = report.get("self_intersections") {
+        found.expect(*crossings == 0, || format!("{name}: {crossings} pairs of triangles cross"));
+    }
+    if format == "3mf" {
+        let read = &report["lib3mf"];
+        let sound = read["valid"] == true && read["oriented"] == true && read["millimetres"] == true && read["warnings"] == serde_json::json!([]);
+        found.expect(sound, || format!("{name}: lib3mf says {read}"));
+    }
+    judge_measures(case, &name, report, volume, found);
+}
+
+fn judge_measures(case: &Case, name: &str, report: &Value, volume: f64, found: &mut Findings) {
+    if let Some(band) = case.expected.scalar.get("mesh_volume_mm3") {
+        let (lower, upper) = (band.lower.unwrap(), band.upper.unwrap());
+        found.expect(lower <= volume && volume <= upper, || format!("{name}: volume {volume} is not in [{lower}, {upper}]"));
+    }
+    let Some(exact) = &case.expected.exact_box else { return };
+    for (corner, numbers) in [exact.lower, exact.upper].iter().enumerate() {
+        for (axis, value) in numbers.iter().enumerate() {
+            // 1e-6 relative: the files may hold single precision.
+            let allowed = case.expected.tolerance_mm + 1e-6 * value.abs();
+            let got = number(&report["box"][corner][axis]);
+            found.expect((got - value).abs() <= allowed, || format!("{name}: box[{corner}][{axis}] is {got}, exact {value}"));
+        }
+    }
+}
+
+#[test]
+fn other_peoples_libraries_find_what_the_cases_say() {
+    if skipped() {
+        return;
+    }
+    let mut judge_process = Judge::start();
+    let mut found = Findings::default();
+    let scratch = Scratch::new();
+    let cases = cases::solids();
+    assert!(cases.len() >= 30, "only {} solid cases were found", cases.len());
+    for case in &cases {
+        let mut reports = Vec::new();
+        for format in ["stl", "3mf"] {
+            let file = scratch.join(&format!("part.{format}"));
+            let certificate = solidify(case, &file, &scratch.join("certificate.json"));
+            let search = format == "stl" && certificate["triangles"].as_i64().is_some_and(|count| count <= EXACT_SEARCH);
+            let report = judge_process.report(&file, search);
+            judge(case, format, &report, &certificate, &mut found);
+            reports.push(report);
+        }
+        let (a, b) = (number(&reports[0]["volume"]), number(&reports[1]["volume"]));
+        found.expect(near(a, b), || format!("{}: STL holds {a} mm3, 3MF {b} mm3", case.name));
+    }
+    assert!(found.0.is_empty(), "{} findings:\n{}", found.0.len(), found.0.join("\n"));
+}
+
+/// ASCII STL of triangles over named corners.
+fn stl(corners: &[[f64; 3]], triangles: &[[usize; 3]]) -> String {
+    let mut text = String::from("solid defect\n");
+    for triangle in triangles {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for corner in triangle {
+            let [x, y, z] = corners[*corner];
+            text += &format!("vertex {x} {y} {z}\n");
+        }
+        text += "endloop\nendfacet\n";
+    }
+    text + "endsolid defect\n"
+}
+
+/// A judge that never objects is none: known defects must be seen.
+#[test]
+fn the_judge_sees_defects() {
+    if skipped() {
+        return;
+    }
+    let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [-1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
+    let tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    // Mirrored through the origin: meets the first in one point.
+    let other = [[0, 4, 5], [0, 6, 4], [4, 6, 5], [5, 6, 0]];
+    let inward: Vec<[usize; 3]> = tetrahedron.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let turned = [[0, 1, 2], tetrahedron[1], tetrahedron[2], tetrahedron[3]];
+    let shifted: Vec<[f64; 3]> = corners.iter().copied().chain(corners[..4].iter().map(|p| p.map(|x| x + 0.1))).collect();
+    let crossing: Vec<[usize; 3]> = tetrahedron.iter().copied().chain(tetrahedron.iter().map(|t| t.map(|k| k + 7))).collect();
+    let both: Vec<[usize; 3]> = tetrahedron.iter().chain(&other).copied().collect();
+    let cases: [(&str, Vec<[usize; 3]>, &str, i64); 7] = [
+        ("sound", tetrahedron.to_vec(), "components", 1),
+        ("open", tetrahedron[1..].to_vec(), "boundary_edges", 3),
+        ("touching", both, "nonmanifold_vertices", 1),
+        ("inward", inward, "cavities", 1),
+        ("turned", turned.to_vec(), "flipped_pairs", 3),
+        ("crossing", crossing.clone(), "components", 2),
+        ("tripled", tetrahedron.iter().copied().chain([[0, 1, 5]]).collect(), "nonmanifold_edges", 1),
+    ];
+    let scratch = Scratch::new();
+    let mut judge = Judge::start();
+    for (name, triangles, count, expected) in cases {
+        let file = scratch.join(&format!("{name}.stl"));
+        fs::write(&file, stl(&shifted, &triangles)).unwrap();
+        let report = judge.report(&file, name == "sound" || name == "crossing");
+        assert_eq!(report[count], expected, "{name}: {report}");
+        match name {
+            "sound" => assert_eq!(report["self_intersections"], 0, "{report}"),
+            "crossing" => assert!(report["self_intersections"].as_i64().unwrap() > 0, "{report}"),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn the_judge_does_not_read_rubbish() {
+    if skipped() {
+        return;
+    }
+    let scratch = Scratch::new();
+    let mut judge = Judge::start();
+    for name in ["rubbish.3mf", "rubbish.stl"] {
+        let file = scratch.join(name);
+        fs::write(&file, "rubbish").unwrap();
+        assert!(judge.report(&file, false).get("problem").is_some(), "{name}");
+    }
+}

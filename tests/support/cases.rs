@@ -1,0 +1,162 @@
+//! The cases of `fixtures/`, read independently of `lacuna verify`; the format is described in `fixtures/README.md`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::root;
+
+/// A scalar expectation.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scalar {
+    /// The exact value.
+    pub value: Option<f64>,
+    /// Absolute width.
+    #[serde(default)]
+    pub absolute: f64,
+    /// Relative width.
+    #[serde(default)]
+    pub relative: f64,
+    /// Least value.
+    pub lower: Option<f64>,
+    /// Greatest value.
+    pub upper: Option<f64>,
+    /// Where the value comes from.
+    pub source: String,
+    /// Why the width.
+    pub reason: String,
+}
+
+/// The exact box.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExactBox {
+    /// Lower corner.
+    pub lower: [f64; 3],
+    /// Upper corner.
+    pub upper: [f64; 3],
+    /// Allowance for the source's digits.
+    #[serde(default)]
+    pub absolute: f64,
+    /// Where it comes from.
+    pub source: String,
+    /// Why the allowance.
+    pub reason: String,
+}
+
+/// A refusal.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refused {
+    /// Stable code.
+    pub code: String,
+    /// Place in the document.
+    pub pointer: Option<String>,
+}
+
+/// `expected.toml`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expected {
+    /// What the case guards.
+    pub about: String,
+    /// `evaluate`, `solidify` or `measure`.
+    pub kind: String,
+    /// The tolerance.
+    pub tolerance_mm: f64,
+    /// The radius.
+    pub radius_mm: Option<f64>,
+    /// Exact members of the certificate, and their source.
+    #[serde(default)]
+    pub exact: BTreeMap<String, toml::Value>,
+    /// Scalars of the certificate.
+    #[serde(default)]
+    pub scalar: BTreeMap<String, Scalar>,
+    /// The box.
+    #[serde(rename = "box")]
+    pub exact_box: Option<ExactBox>,
+    /// The refusal instead.
+    pub refused: Option<Refused>,
+}
+
+impl Expected {
+    /// An exact count, if the case states it.
+    #[must_use]
+    pub fn count(&self, name: &str) -> Option<i64> {
+        self.exact.get(name).and_then(toml::Value::as_integer)
+    }
+}
+
+/// A case.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// `family/case`.
+    pub name: String,
+    /// What must come out.
+    pub expected: Expected,
+}
+
+impl Case {
+    /// The model document.
+    #[must_use]
+    pub fn model(&self) -> PathBuf {
+        self.folder.join("model.json")
+    }
+}
+
+/// `fixtures/`.
+#[must_use]
+pub fn folder() -> PathBuf {
+    root().join("fixtures")
+}
+
+/// Every case, by name.
+///
+/// # Panics
+/// When a case cannot be read.
+#[must_use]
+pub fn all() -> Vec<Case> {
+    let mut folders = Vec::new();
+    collect(&folder(), &mut folders);
+    folders.sort();
+    folders.iter().map(|folder| read(folder)).collect()
+}
+
+/// The case with a name.
+///
+/// # Panics
+/// When there is none.
+#[must_use]
+pub fn named(name: &str) -> Case {
+    read(&folder().join(name))
+}
+
+/// The cases that make a solid.
+#[must_use]
+pub fn solids() -> Vec<Case> {
+    all().into_iter().filter(|case| case.expected.kind == "solidify" && case.expected.refused.is_none()).collect()
+}
+
+fn collect(folder: &Path, into: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            collect(&path, into);
+        } else if path.file_name().is_some_and(|name| name == "expected.toml") {
+            into.push(folder.to_path_buf());
+        }
+    }
+}
+
+fn read(path: &Path) -> Case {
+    let file = path.join("expected.toml");
+    let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let expected = toml::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let name = path.strip_prefix(folder()).unwrap().to_string_lossy().replace('\\', "/");
+    Case { folder: path.to_path_buf(), name, expected }
+}

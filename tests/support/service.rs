@@ -1,0 +1,221 @@
+//! A running `lacuna serve` on a free port, and a client.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use super::binary::lacuna;
+
+/// How long a service may take to say where it listens.
+const START: Duration = Duration::from_secs(20);
+
+/// A service of its own; it is ended when dropped.
+#[derive(Debug)]
+pub struct Service {
+    process: Child,
+    /// Where it listens.
+    pub address: SocketAddr,
+}
+
+/// An answer.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// The HTTP status.
+    pub status: u16,
+    /// Names in lower case, and values.
+    pub headers: Vec<(String, String)>,
+    /// The body.
+    pub body: Vec<u8>,
+}
+
+impl Answer {
+    /// A header's value, empty if it is absent.
+    #[must_use]
+    pub fn header(&self, name: &str) -> &str {
+        self.headers.iter().find(|(key, _)| key == name).map_or("", |(_, value)| value)
+    }
+
+    /// The body as JSON.
+    ///
+    /// # Panics
+    /// When it is not.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&self.body)))
+    }
+}
+
+impl Service {
+    /// Starts one over a data folder.
+    ///
+    /// # Panics
+    /// When it does not say where it listens.
+    #[must_use]
+    pub fn start(data: &Path) -> Self {
+        Self::start_with(data, &[])
+    }
+
+    /// Starts one with variables of the environment.
+    ///
+    /// # Panics
+    /// When it does not say where it listens.
+    #[must_use]
+    pub fn start_with(data: &Path, environment: &[(&str, &str)]) -> Self {
+        let mut command = Command::new(lacuna());
+        command.args(["serve", "--bind", "127.0.0.1:0", "--data"]).arg(data).envs(environment.iter().copied());
+        let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
+        let (sender, addresses) = channel();
+        let pipes: [Box<dyn Read + Send>; 2] =
+            [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
+        for pipe in pipes {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                for line in BufReader::new(pipe).lines().map_while(Result::ok) {
+                    if let Some(address) = address_in(&line) {
+                        let _ = sender.send(address);
+                    }
+                }
+            });
+        }
+        match addresses.recv_timeout(START) {
+            Ok(address) => Self { process, address },
+            Err(_) => {
+                let _ = process.kill();
+                panic!("the service did not say where it listens: {:?}", process.wait());
+            }
+        }
+    }
+
+    /// The number of the process.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// Ends it at once, as a power failure would.
+    pub fn kill(mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+
+    /// Resident memory in bytes.
+    #[must_use]
+    pub fn resident_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.id())).unwrap();
+        let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
+        line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() * 1024
+    }
+
+    fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Result<Answer, ureq::Error> {
+        let settings = ureq::Agent::config_builder()
+            .http_status_as_error(false)
+            .max_redirects(0)
+            .max_redirects_will_error(false)
+            .timeout_global(Some(Duration::from_secs(90)))
+            .build();
+        let mut request = ureq::http::Request::builder().method(method).uri(format!("http://{}{path}", self.address));
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        let mut response = ureq::Agent::new_with_config(settings).run(request.body(body)?)?;
+        let headers = response.headers().iter().map(|(name, value)| (name.to_string(), value.to_str().unwrap_or("").to_owned())).collect();
+        let status = response.status().as_u16();
+        let body = response.body_mut().with_config().limit(1 << 30).read_to_vec()?;
+        Ok(Answer { status, headers, body })
+    }
+
+    /// `GET`.
+    #[must_use]
+    pub fn get(&self, path: &str) -> Answer {
+        self.send("GET", path, &[], b"").unwrap()
+    }
+
+    /// `GET` with headers.
+    #[must_use]
+    pub fn get_with(&self, path: &str, headers: &[(&str, &str)]) -> Answer {
+        self.send("GET", path, headers, b"").unwrap()
+    }
+
+    /// `DELETE`.
+    #[must_use]
+    pub fn delete(&self, path: &str) -> Answer {
+        self.send("DELETE", path, &[], b"").unwrap()
+    }
+
+    /// `POST` of JSON.
+    #[must_use]
+    pub fn post(&self, path: &str, body: &Value) -> Answer {
+        self.post_with(path, &[], body.to_string().as_bytes())
+    }
+
+    /// `POST` of bytes that are said to be JSON, with headers.
+    #[must_use]
+    pub fn post_with(&self, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
+        let mut all = vec![("content-type", "application/json")];
+        all.extend_from_slice(headers);
+        self.send("POST", path, &all, body).unwrap()
+    }
+
+    /// Does a job and waits for its end.
+    ///
+    /// # Panics
+    /// When it is not accepted or does not end.
+    #[must_use]
+    pub fn done(&self, job: &Value) -> Value {
+        let answer = self.post_with("/v1/jobs", &[("prefer", "wait=30")], job.to_string().as_bytes());
+        assert!(answer.status == 200 || answer.status == 202, "{}: {}", answer.status, answer.json());
+        let id = answer.json()["id"].as_str().unwrap().to_owned();
+        self.ended(&id)
+    }
+
+    /// The job once it has ended.
+    ///
+    /// # Panics
+    /// When that takes minutes.
+    #[must_use]
+    pub fn ended(&self, id: &str) -> Value {
+        let start = Instant::now();
+        loop {
+            let view = self.get(&format!("/v1/jobs/{id}")).json();
+            if matches!(view["state"].as_str(), Some("succeeded" | "failed" | "cancelled")) {
+                return view;
+            }
+            assert!(start.elapsed() < Duration::from_secs(180), "{view}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Sends bytes as they are and gives what comes back until the other side closes or is silent for a while.
+    #[must_use]
+    pub fn raw(&self, bytes: &[u8], patience: Duration) -> String {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(patience)).unwrap();
+        // The service may refuse before it has read everything: then writing fails, and its answer counts.
+        let _ = stream.write_all(bytes);
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// The first address of this machine in a line.
+fn address_in(line: &str) -> Option<SocketAddr> {
+    let start = line.find("127.0.0.1:")?;
+    let rest = &line[start..];
+    let end = rest.find(|c: char| !(c.is_ascii_digit() || c == '.' || c == ':')).unwrap_or(rest.len());
+    rest[..end].trim_end_matches([':', '.']).parse().ok().filter(|address: &SocketAddr| address.port() != 0)
+}
