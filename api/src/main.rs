@@ -1,2 +1,5 @@
 //! The `lacuna` command.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    lacuna_api::cli::main()
+}

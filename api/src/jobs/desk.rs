@@ -11,7 +11,7 @@ use uuid::Uuid;
 
 use super::live::LiveJob;
 use super::queue::{Queue, Refusal};
-use super::record::{Answer, Idempotency, JobRecord, JobState, JobView, Output};
+use super::record::{Idempotency, JobRecord, JobState, JobView, Output};
 use crate::digest::Digest;
 use crate::metrics::Metrics;
 use crate::problem::{Problem, ProblemKind};

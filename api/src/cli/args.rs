@@ -1,0 +1,254 @@
+//! The grammar of the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Fabrication-oriented geometry: fractals, curves and meshes to certified, printable solids.
+///
+/// Lengths are mm. stdout carries data only. `-` stands for stdin or stdout.
+/// Exit codes: 0 ok; 1 a check failed; 2 usage; 3 invalid model or file; 4 a limit was hit;
+/// 5 service unreachable; 6 input/output; 70 a defect of lacuna; 130 interrupted.
+#[derive(Debug, Parser)]
+#[command(name = "lacuna", version, verbatim_doc_comment)]
+pub(super) struct Cli {
+    /// How progress is told on stderr.
+    #[arg(long, global = true, value_enum, default_value_t = ProgressMode::Auto)]
+    pub(super) progress: ProgressMode,
+    /// Say nothing but errors.
+    #[arg(long, short, global = true)]
+    pub(super) quiet: bool,
+    /// How errors are told on stderr: words, or problem JSON (RFC 9457).
+    #[arg(long, global = true, value_enum, default_value_t = ErrorFormat::Text)]
+    pub(super) error_format: ErrorFormat,
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+/// How progress is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProgressMode {
+    /// A bar if stderr is a terminal, else nothing.
+    Auto,
+    /// A bar.
+    Bar,
+    /// One JSON object per line.
+    Json,
+    /// Nothing.
+    None,
+}
+
+/// How errors are told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ErrorFormat {
+    /// Words.
+    Text,
+    /// Problem JSON.
+    Json,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Make a printable solid: the shape dilated by a ball.
+    Solidify(SolidifyArgs),
+    /// Make points, wires or a surface within a tolerance.
+    Evaluate(EvaluateArgs),
+    /// Measure box, area and volume as intervals; JSON on stdout.
+    Measure(MeasureArgs),
+    /// Say what is wrong with a model; JSON on stdout, exit code 3 when it is invalid.
+    Validate {
+        /// The model document.
+        model: PathBuf,
+    },
+    /// Predict what a job costs; JSON on stdout.
+    Plan {
+        /// The job document.
+        job: PathBuf,
+    },
+    /// Do a job and put its files into a folder; what was made is told as JSON on stdout.
+    Run(RunArgs),
+    /// Tell what a mesh file contains; JSON on stdout.
+    Inspect {
+        /// An STL, 3MF, OBJ, PLY or OFF file.
+        file: PathBuf,
+    },
+    /// Do the cases below a folder and compare with what they expect; exit code 1 when one fails.
+    Verify(VerifyArgs),
+    /// Serve HTTP.
+    Serve(ServeArgs),
+    /// Ask a running service whether it is ready; exit code 5 when not.
+    Healthcheck {
+        /// Its address; the one that `serve` would use when absent.
+        #[arg(long)]
+        url: Option<String>,
+    },
+    /// Print the OpenAPI description of the service.
+    Openapi,
+    /// Print the settings of `serve` and where each comes from.
+    Doctor(ServeArgs),
+    /// Print a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// What a computation may use.
+#[derive(Debug, Args)]
+pub(super) struct LimitArgs {
+    /// Most triangles of the result.
+    #[arg(long, value_name = "COUNT", help_heading = "Limits")]
+    pub(super) limit_triangles: Option<u64>,
+    /// Most accounted memory, in bytes or with K, M or G (powers of 1024).
+    #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = "Limits")]
+    pub(super) limit_memory: Option<u64>,
+    /// Most time, in seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Limits")]
+    pub(super) limit_seconds: Option<f64>,
+    /// Threads to use; one per core when absent. The result does not depend on it.
+    #[arg(long, value_name = "COUNT", help_heading = "Limits")]
+    pub(super) threads: Option<usize>,
+}
+
+/// Files to write.
+#[derive(Debug, Args)]
+pub(super) struct OutputArgs {
+    /// File to write, its format chosen by its ending; may be given several times. `-` is stdout.
+    #[arg(short, long = "output", value_name = "FILE", required = true)]
+    pub(super) outputs: Vec<PathBuf>,
+    /// Format of what goes to stdout.
+    #[arg(long, value_name = "FORMAT")]
+    pub(super) format: Option<String>,
+    /// Write the certificate as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub(super) certificate: Option<PathBuf>,
+    /// Write a picture.
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) preview: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SolidifyArgs {
+    /// The model document.
+    pub(super) model: PathBuf,
+    /// Hausdorff bound on the result, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: f64,
+    /// Radius of the ball, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) radius: f64,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct EvaluateArgs {
+    /// The model document.
+    pub(super) model: PathBuf,
+    /// Hausdorff bound on the result, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: f64,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct MeasureArgs {
+    /// The model document.
+    pub(super) model: PathBuf,
+    /// Hausdorff bound on what is measured, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: f64,
+    /// Radius of the ball, in mm: measure the solid instead of the shape itself.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) radius: Option<f64>,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    /// The job document.
+    pub(super) job: PathBuf,
+    /// Folder for the files; it is made if needed.
+    #[arg(short, long = "output", value_name = "DIR")]
+    pub(super) folder: PathBuf,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct VerifyArgs {
+    /// Folder with cases, at any depth.
+    pub(super) folder: PathBuf,
+    /// Print the report as JSON on stdout instead of a table.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Also write a report that CI systems read.
+    #[arg(long, value_name = "FILE")]
+    pub(super) junit: Option<PathBuf>,
+    /// Only cases whose path contains this text.
+    #[arg(long, value_name = "TEXT")]
+    pub(super) filter: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ServeArgs {
+    /// Address and port; port 0 takes a free one. An address beyond this machine needs LACUNA_API_KEYS.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub(super) bind: Option<String>,
+    /// Data folder.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+    /// Jobs that are done at the same time.
+    #[arg(long, value_name = "COUNT")]
+    pub(super) workers: Option<usize>,
+    /// Threads that the jobs share; one per core when absent.
+    #[arg(long, value_name = "COUNT")]
+    pub(super) threads: Option<usize>,
+    /// Log as JSON.
+    #[arg(long)]
+    pub(super) log_json: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("a positive number is expected".to_owned()),
+    }
+}
+
+fn bytes(text: &str) -> Result<u64, String> {
+    let (digits, shift) = match text.trim_end_matches(['b', 'B', 'i']) {
+        text if text.ends_with(['k', 'K']) => (&text[..text.len() - 1], 10),
+        text if text.ends_with(['m', 'M']) => (&text[..text.len() - 1], 20),
+        text if text.ends_with(['g', 'G']) => (&text[..text.len() - 1], 30),
+        text => (text, 0),
+    };
+    let number = digits.trim().parse::<u64>().ok().and_then(|number| number.checked_mul(1 << shift));
+    number.ok_or_else(|| "a number of bytes is expected, for example 4294967296, 512M or 4G".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_grammar_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_and_lengths() {
+        assert_eq!(bytes("4G"), Ok(4 << 30));
+        assert_eq!(bytes("512MiB"), Ok(512 << 20));
+        assert_eq!(bytes("7"), Ok(7));
+        assert!(bytes("-1").is_err() && bytes("99999999999999G").is_err());
+        assert!(positive("0").is_err() && positive("nan").is_err() && positive("inf").is_err());
+    }
+}

@@ -1,0 +1,112 @@
+//! `lacuna inspect`: what a mesh file really contains, and what a slicer will make of it.
+
+use std::path::Path;
+
+use lacuna_exchange::format::{self, MeshFile, ReadLimits, Unit};
+use lacuna_kernel::solid::TriMesh;
+use serde_json::{Value, json};
+
+use super::{print_json, read_input};
+use crate::problem::Problem;
+use crate::production::{self, format_problem};
+
+/// Slicers of the PrusaSlicer line ask whether an object of less volume was saved in inches.
+const INCH_PROMPT_MM3: f64 = 8.0;
+/// ... and whether one of less volume than this was saved in metres.
+const METRE_PROMPT_MM3: f64 = 0.008;
+/// Above so many triangles slicers become slow.
+const MANY_TRIANGLES: usize = 1_000_000;
+
+/// Reads a mesh file and tells what is in it as JSON.
+pub(super) fn inspect(path: &Path) -> Result<(), Problem> {
+    let limits = ReadLimits::default();
+    let bytes = read_input(path, limits.file_bytes)?;
+    let file = production::guarded(|| format::read(&bytes, None, &limits))?.map_err(|error| format_problem(&error))?;
+    print_json(&report(&file, bytes.len()))
+}
+
+fn report(file: &MeshFile, bytes: usize) -> Value {
+    let (mesh, facts) = (&file.mesh, &file.facts);
+    let (volume, area) = volume_and_area(mesh);
+    json!({
+        "format": facts.format.facts().ending,
+        "encoding": facts.encoding,
+        "bytes": bytes,
+        "unit": facts.unit.map_or("none, taken for mm", unit_word),
+        "objects": facts.object_names,
+        "polygons_fanned": facts.polygons_fanned,
+        "vertices": mesh.vertices.len(),
+        "triangles": mesh.triangles.len(),
+        "bbox_mm": bounding_box(mesh),
+        "volume_mm3": volume,
+        "area_mm2": area,
+        "prompts": prompts(file, volume),
+    })
+}
+
+fn unit_word(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Micron => "um",
+        Unit::Millimetre => "mm",
+        Unit::Centimetre => "cm",
+        Unit::Inch => "in",
+        Unit::Foot => "ft",
+        Unit::Metre => "m",
+    }
+}
+
+fn bounding_box(mesh: &TriMesh) -> Option<[[f64; 3]; 2]> {
+    let first = *mesh.vertices.first()?;
+    let (low, high) = mesh.vertices.iter().fold((first, first), |(low, high), &vertex| (low.min(vertex), high.max(vertex)));
+    Some([low.to_array(), high.to_array()])
+}
+
+/// Enclosed volume (signed tetrahedra about the first vertex, so that a far origin costs no digits) and area.
+fn volume_and_area(mesh: &TriMesh) -> (f64, f64) {
+    let Some(&origin) = mesh.vertices.first() else { return (0.0, 0.0) };
+    let corner = |index: u32| mesh.vertices.get(index as usize).copied().unwrap_or(origin) - origin;
+    mesh.triangles.iter().fold((0.0, 0.0), |(volume, area), &[a, b, c]| {
+        let (a, b, c) = (corner(a), corner(b), corner(c));
+        (volume + a.dot(b.cross(c)) / 6.0, area + (b - a).cross(c - a).length() / 2.0)
+    })
+}
+
+/// What a slicer will ask or suffer from, with the way out.
+fn prompts(file: &MeshFile, volume: f64) -> Vec<Value> {
+    let mut prompts = Vec::new();
+    let mut prompt = |code: &str, message: String| prompts.push(json!({ "code": code, "message": message }));
+    let size = volume.abs();
+    if size > 0.0 && size < METRE_PROMPT_MM3 {
+        prompt("slicer.unit-metres", format!("{size} mm3 is below {METRE_PROMPT_MM3} mm3: slicers ask whether the file is in metres; answer no"));
+    } else if size > 0.0 && size < INCH_PROMPT_MM3 {
+        prompt("slicer.unit-inches", format!("{size} mm3 is below {INCH_PROMPT_MM3} mm3: slicers ask whether the file is in inches; answer no"));
+    }
+    if file.facts.unit.is_none() {
+        prompt("file.no-unit", "the file names no unit; programs take its numbers for mm".to_owned());
+    }
+    if volume < 0.0 {
+        prompt("mesh.inside-out", format!("the enclosed volume is {volume} mm3: the faces look inwards"));
+    }
+    if file.mesh.triangles.len() > MANY_TRIANGLES {
+        prompt("slicer.many-triangles", format!("{} triangles; above {MANY_TRIANGLES} slicers become slow", file.mesh.triangles.len()));
+    }
+    prompts
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const TETRAHEDRON: &[u8] = b"OFF\n4 4 0\n0 0 0\n3 0 0\n0 3 0\n0 0 3\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+
+    #[test]
+    fn a_tetrahedron_is_told_as_it_is() {
+        let file = format::read(TETRAHEDRON, None, &ReadLimits::default()).unwrap();
+        let report = report(&file, TETRAHEDRON.len());
+        assert!((report["volume_mm3"].as_f64().unwrap() - 4.5).abs() < 1e-12);
+        assert_eq!(report["bbox_mm"], json!([[0.0, 0.0, 0.0], [3.0, 3.0, 3.0]]));
+        let codes: Vec<_> = report["prompts"].as_array().unwrap().iter().map(|p| p["code"].as_str().unwrap()).collect();
+        assert_eq!(codes, ["slicer.unit-inches", "file.no-unit"]);
+    }
+}

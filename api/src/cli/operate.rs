@@ -1,0 +1,105 @@
+//! Commands that run the service and look after it.
+
+use std::io::{Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use clap::CommandFactory;
+use tracing_subscriber::filter::LevelFilter;
+
+use super::args::{Cli, ServeArgs};
+use super::{print, print_json, stop, work};
+use crate::config::{BadSetting, Config, Flags};
+use crate::http;
+use crate::problem::{Problem, ProblemKind};
+
+const HEALTH_TIME: Duration = Duration::from_secs(5);
+
+impl From<&ServeArgs> for Flags {
+    fn from(args: &ServeArgs) -> Self {
+        Self {
+            bind: args.bind.clone(),
+            data: args.data.clone(),
+            workers: args.workers,
+            threads: args.threads,
+            log_json: args.log_json.then_some(true),
+        }
+    }
+}
+
+impl From<BadSetting> for Problem {
+    fn from(error: BadSetting) -> Self {
+        Self::new(ProblemKind::Usage, error.to_string()).code("bad-setting")
+    }
+}
+
+fn environment(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}
+
+/// `lacuna serve`.
+pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
+    let (config, _) = Config::read(&Flags::from(&args), &environment)?;
+    start_log(config.log_json);
+    work::use_threads(Some(config.threads))?;
+    let failed = |error| Problem::io("the service cannot start", &error);
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("http").build().map_err(failed)?;
+    let told = |address| {
+        // The one line that scripts wait for; with port 0 it is the only way to learn the port.
+        let _ = print(format!("listening on http://{address}\n").as_bytes());
+    };
+    let result = runtime.block_on(http::serve::serve(config, told, stop::asked()));
+    // Requests that are still read must not hold the exit up.
+    runtime.shutdown_timeout(Duration::from_secs(1));
+    result
+}
+
+fn start_log(json: bool) {
+    let level = environment("LACUNA_LOG").and_then(|level| level.parse().ok()).unwrap_or(LevelFilter::INFO);
+    let builder = tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(level).with_ansi(false);
+    // A second subscriber can only come from an embedding program, which then has its own.
+    let _ = if json { builder.json().flatten_event(true).try_init() } else { builder.try_init() };
+}
+
+/// `lacuna doctor`.
+pub(super) fn doctor(args: &ServeArgs) -> Result<(), Problem> {
+    let (_, told) = Config::read(&Flags::from(args), &environment)?;
+    print_json(&serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "settings": told }))
+}
+
+/// `lacuna completions`.
+pub(super) fn completions(shell: clap_complete::Shell) -> Result<(), Problem> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "lacuna", &mut script);
+    print(&script)
+}
+
+/// `lacuna healthcheck`: one request by hand, so that an image needs no other program.
+pub(super) fn healthcheck(url: Option<&str>) -> Result<(), Problem> {
+    let address = match url {
+        Some(url) => url.trim_start_matches("http://").trim_end_matches('/').to_owned(),
+        None => local_address(&Config::read(&Flags::default(), &environment)?.0),
+    };
+    let unreachable = |error: std::io::Error| Problem::new(ProblemKind::ServiceUnreachable, format!("{address}: {error}"));
+    let status = ask_ready(&address).map_err(unreachable)?;
+    if status.starts_with("HTTP/1.1 200") {
+        return Ok(());
+    }
+    Err(Problem::new(ProblemKind::ServiceUnreachable, format!("{address} is not ready: {status}")))
+}
+
+/// Where the service can be reached from inside its own machine.
+fn local_address(config: &Config) -> String {
+    let port = config.bind.port();
+    if config.bind.ip().is_unspecified() { format!("127.0.0.1:{port}") } else { config.bind.to_string() }
+}
+
+fn ask_ready(address: &str) -> std::io::Result<String> {
+    let place = address.to_socket_addrs()?.next().ok_or(std::io::ErrorKind::NotFound)?;
+    let mut stream = TcpStream::connect_timeout(&place, HEALTH_TIME)?;
+    stream.set_read_timeout(Some(HEALTH_TIME))?;
+    stream.write_all(format!("GET /readyz HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").as_bytes())?;
+    let mut answer = Vec::new();
+    stream.take(4096).read_to_end(&mut answer)?;
+    Ok(String::from_utf8_lossy(&answer).lines().next().unwrap_or_default().to_owned())
+}

@@ -1,0 +1,203 @@
+//! Reports: a table for people, JSON for programs, JUnit for CI systems.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use serde::Serialize;
+
+/// One comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// What is compared.
+    pub field: String,
+    /// What must come out.
+    pub expected: String,
+    /// What came out.
+    pub got: String,
+    /// By how much it differs, if that is a number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub difference: Option<f64>,
+    /// How much it may differ, if that is a number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub allowed: Option<f64>,
+    /// Whether it holds.
+    pub passed: bool,
+}
+
+impl Row {
+    /// A comparison that holds or not, without a distance.
+    #[must_use]
+    pub fn verdict(field: &str, expected: &str, got: &str, passed: bool) -> Self {
+        Self { field: field.to_owned(), expected: expected.to_owned(), got: got.to_owned(), difference: None, allowed: None, passed }
+    }
+
+    /// A comparison that does not hold.
+    #[must_use]
+    pub fn failure(field: &str, expected: &str, got: &str) -> Self {
+        Self::verdict(field, expected, got, false)
+    }
+
+    /// A comparison by distance; without a distance there was no number to compare.
+    #[must_use]
+    pub fn measured(field: &str, expected: &str, got: &str, difference: Option<f64>, allowed: f64) -> Self {
+        // Written so that a NaN fails.
+        let passed = difference.is_some_and(|difference| difference <= allowed);
+        Self { difference, allowed: Some(allowed), ..Self::verdict(field, expected, got, passed) }
+    }
+
+    /// How bad it is: shares of the allowance, and what cannot be measured above all.
+    fn badness(&self) -> f64 {
+        match (self.passed, self.difference, self.allowed) {
+            (true, Some(difference), Some(allowed)) if allowed > 0.0 => difference / allowed,
+            (true, ..) => 0.0,
+            (false, Some(difference), Some(allowed)) => 1.0 + difference / allowed.max(f64::MIN_POSITIVE),
+            (false, ..) => f64::INFINITY,
+        }
+    }
+}
+
+/// One case.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaseReport {
+    /// Its folder.
+    pub case: String,
+    /// What it guards.
+    pub about: String,
+    /// Whether all its comparisons hold.
+    pub passed: bool,
+    /// How long it took.
+    pub seconds: f64,
+    /// Its comparisons, the worst first.
+    pub rows: Vec<Row>,
+}
+
+impl CaseReport {
+    /// A case with its comparisons.
+    #[must_use]
+    pub fn new(case: String, about: String, mut rows: Vec<Row>, time: Duration) -> Self {
+        rows.sort_by(|a, b| b.badness().total_cmp(&a.badness()));
+        // A case that compared nothing has shown nothing.
+        let passed = !rows.is_empty() && rows.iter().all(|row| row.passed);
+        Self { case, about, passed, seconds: time.as_secs_f64(), rows }
+    }
+}
+
+/// All cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The cases, sorted by folder.
+    pub cases: Vec<CaseReport>,
+}
+
+impl Report {
+    /// The report as text: failed cases with their failed comparisons, and the others by name unless `brief`.
+    #[must_use]
+    pub fn table(&self, brief: bool) -> String {
+        let mut text = String::new();
+        for case in &self.cases {
+            if case.passed {
+                if !brief {
+                    let _ = writeln!(text, "ok    {} ({} checks, {:.2} s)", case.case, case.rows.len(), case.seconds);
+                }
+                continue;
+            }
+            let _ = writeln!(text, "FAIL  {}: {}", case.case, case.about);
+            text.push_str(&aligned(case.rows.iter().filter(|row| !row.passed)));
+        }
+        let failed = self.cases.iter().filter(|case| !case.passed).count();
+        let _ = writeln!(text, "{} cases, {failed} failed", self.cases.len());
+        text
+    }
+
+    /// The report as JUnit XML.
+    #[must_use]
+    pub fn junit(&self) -> String {
+        let failed = self.cases.iter().filter(|case| !case.passed).count();
+        let seconds: f64 = self.cases.iter().map(|case| case.seconds).sum();
+        let mut text = format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"lacuna verify\" tests=\"{}\" failures=\"{failed}\" time=\"{seconds:.3}\">\n",
+            self.cases.len()
+        );
+        for case in &self.cases {
+            let (folder, name) = case.case.rsplit_once('/').unwrap_or(("", &case.case));
+            let _ = write!(text, "  <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\"", escaped(folder), escaped(name), case.seconds);
+            if case.passed {
+                text.push_str("/>\n");
+            } else {
+                let table = escaped(&aligned(case.rows.iter().filter(|row| !row.passed)));
+                let _ = writeln!(text, ">\n    <failure message=\"{}\">\n{table}</failure>\n  </testcase>", escaped(&case.about));
+            }
+        }
+        text.push_str("</testsuite>\n");
+        text
+    }
+}
+
+fn aligned<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.6e}"));
+    let heading = ["field", "expected", "got", "diff", "allowed"].map(str::to_owned);
+    let lines: Vec<[String; 5]> = std::iter::once(heading)
+        .chain(rows.map(|row| [row.field.clone(), row.expected.clone(), row.got.clone(), number(row.difference), number(row.allowed)]))
+        .collect();
+    let widths: Vec<usize> = (0..5).map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)).collect();
+    let mut text = String::new();
+    for line in &lines {
+        let cells: Vec<String> = line.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}")).collect();
+        let _ = writeln!(text, "      {}", cells.join("  ").trim_end());
+    }
+    text
+}
+
+/// Text for XML: markup is escaped, and what XML 1.0 cannot hold becomes a question mark.
+fn escaped(text: &str) -> String {
+    text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
+        match c {
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '&' => out.push_str("&amp;"),
+            '"' => out.push_str("&quot;"),
+            '\n' | '\t' => out.push(c),
+            c if c.is_control() => out.push('?'),
+            c => out.push(c),
+        }
+        out
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report() -> Report {
+        let rows = vec![
+            Row::measured("near", "1", "1.0", Some(0.0), 0.1),
+            Row::measured("off", "1", "2", Some(1.0), 0.1),
+            Row::failure("absent", "1 < 2", "absent"),
+        ];
+        let fine = CaseReport::new("a/fine".into(), "x".into(), vec![Row::verdict("f", "1", "1", true)], Duration::ZERO);
+        Report { cases: vec![fine, CaseReport::new("a/bad".into(), "y".into(), rows, Duration::ZERO)] }
+    }
+
+    #[test]
+    fn the_worst_comes_first_and_columns_align() {
+        let text = report().table(false);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("ok    a/fine") && lines[1].starts_with("FAIL  a/bad"));
+        assert!(lines[3].trim_start().starts_with("absent") && lines[4].trim_start().starts_with("off"));
+        assert_eq!(lines[2].find("expected"), lines[4].find("1 "));
+        assert_eq!(lines.last(), Some(&"2 cases, 1 failed"));
+        assert!(!report().table(true).contains("fine"));
+    }
+
+    #[test]
+    fn junit_is_escaped() {
+        let xml = report().junit();
+        assert!(xml.contains("failures=\"1\"") && xml.contains("1 &lt; 2") && !xml.contains("1 < 2"));
+    }
+
+    #[test]
+    fn nothing_compared_and_nan_fail() {
+        assert!(!CaseReport::new("c".into(), String::new(), vec![], Duration::ZERO).passed);
+        assert!(!Row::measured("f", "1", "NaN", Some(f64::NAN), 1.0).passed);
+    }
+}
