@@ -158,11 +158,12 @@ fn nothing_names_the_machine_it_was_made_on() {
     assert!(read > 50, "only {read} files were read");
 }
 
-/// Rust files below a folder.
+/// Rust files below a folder, but for those that hold only tests.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     walk(folder, &mut found);
-    found.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));
+    let tests = |path: &Path| path.with_extension("").components().any(|part| part.as_os_str() == "tests");
+    found.retain(|path| path.extension().is_some_and(|ending| ending == "rs") && !tests(path.strip_prefix(folder).unwrap()));
     found
 }
 
