@@ -138,10 +138,7 @@ impl Config {
     ///
     /// # Errors
     /// When a value cannot be read, or the address is public and there is no key.
-    pub fn read(
-        flags: &Flags,
-        environment: &dyn Fn(&str) -> Option<String>,
-    ) -> Result<(Self, Vec<Told>), BadSetting> {
+    pub fn read(flags: &Flags, environment: &dyn Fn(&str) -> Option<String>) -> Result<(Self, Vec<Told>), BadSetting> {
         const COUNT: &str = "a whole number is expected";
         let mut reader = Reader { environment, told: Vec::new() };
         let bind = reader.take("LACUNA_BIND", flags.bind.clone(), "127.0.0.1:7878".to_owned(), "")?;

@@ -91,8 +91,7 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
 /// What a model's name leaves for a file name: letters, digits, `-` and `_` of ASCII, 64 at most.
 #[must_use]
 pub fn safe_stem(name: &str) -> String {
-    let kept: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '-' }).take(64).collect();
+    let kept: String = name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '-' }).take(64).collect();
     let stem = kept.trim_matches('-');
     if stem.is_empty() { "result".to_owned() } else { stem.to_owned() }
 }

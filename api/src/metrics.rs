@@ -90,10 +90,7 @@ impl Metrics {
         let mut text = String::new();
         heading(&mut text, "lacuna_http_requests_total", "counter", "answered requests");
         for ((method, route, status), count) in crate::locked(&self.requests).iter() {
-            let _ = writeln!(
-                text,
-                "lacuna_http_requests_total{{method=\"{method}\",route=\"{route}\",status=\"{status}\"}} {count}"
-            );
+            let _ = writeln!(text, "lacuna_http_requests_total{{method=\"{method}\",route=\"{route}\",status=\"{status}\"}} {count}");
         }
         heading(&mut text, "lacuna_http_request_seconds", "histogram", "time to the first byte of an answer");
         for (route, histogram) in crate::locked(&self.latency).iter() {

@@ -21,6 +21,20 @@ pub struct Label<'a> {
     pub thumbnail_png: Option<&'a [u8]>,
 }
 
+/// Who does jobs: the kernel, or what stands for it in a test of the service.
+#[derive(Clone, Copy, Debug)]
+pub struct Engine {
+    /// Does a job.
+    pub compute: fn(&Job, &Budget) -> Result<Outcome, Problem>,
+    /// Predicts what it costs.
+    pub plan: fn(&Job, &Budget) -> Result<Plan, Problem>,
+}
+
+impl Engine {
+    /// The kernel of this build.
+    pub const KERNEL: Self = Self { compute, plan };
+}
+
 /// Does a job. A panic of the kernel ends the job, not the process.
 ///
 /// # Errors
@@ -54,9 +68,8 @@ pub fn why_stopped(budget: &Budget) -> Option<Problem> {
             let seconds = budget.limits.seconds;
             // How long it would have taken is not known; only that the limit was not enough.
             let facts = LimitFacts { limit: "seconds", asked: seconds, allowed: seconds, remedy: None };
-            let detail = format!(
-                "The work was not done within {seconds} s; allow more seconds, a larger tolerance, or ask `plan` for the cost"
-            );
+            let detail =
+                format!("The work was not done within {seconds} s; allow more seconds, a larger tolerance, or ask `plan` for the cost");
             Problem::new(ProblemKind::Limit, detail).code("limit.seconds").limit(&facts)
         }
     })
@@ -78,18 +91,9 @@ pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Problem> {
 ///
 /// # Errors
 /// When the format has no room for the geometry, the device fails, or the file differs from the mesh.
-pub fn write_file(
-    format: Format,
-    outcome: &Outcome,
-    label: &Label<'_>,
-    pending: &mut PendingFile,
-) -> Result<(Digest, u64), Problem> {
-    let metadata = Metadata {
-        title: label.title,
-        certificate: Some(&outcome.certificate),
-        thumbnail_png: label.thumbnail_png,
-        ..Metadata::default()
-    };
+pub fn write_file(format: Format, outcome: &Outcome, label: &Label<'_>, pending: &mut PendingFile) -> Result<(Digest, u64), Problem> {
+    let metadata =
+        Metadata { title: label.title, certificate: Some(&outcome.certificate), thumbnail_png: label.thumbnail_png, ..Metadata::default() };
     let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
     let failed = |error| Problem::io("the file could not be written", &error);
     let mut sink = BufWriter::with_capacity(1 << 16, &mut *pending);

@@ -182,8 +182,7 @@ impl Store {
         if let Some(known) = self.model(owner, &id)? {
             return Ok((known, false));
         }
-        let view =
-            ModelView { id, name: name.map(str::to_owned), bytes: document.len() as u64, created: crate::clock::now(), digest };
+        let view = ModelView { id, name: name.map(str::to_owned), bytes: document.len() as u64, created: crate::clock::now(), digest };
         fs::create_dir_all(self.models(owner))?;
         files::write_whole(&self.models(owner).join(format!("{}.document", view.id)), document)?;
         files::write_whole(&self.models(owner).join(format!("{}.json", view.id)), &serde_json::to_vec(&view)?)?;
@@ -295,7 +294,7 @@ mod tests {
         let (view, new) = store.keep_model("ada", Some("curve"), b"{}").unwrap();
         assert!(new);
         assert!(!store.keep_model("ada", Some("curve"), b"{}").unwrap().1);
-        assert_eq!(store.list_models("ada").unwrap(), [view.clone()]);
+        assert_eq!(store.list_models("ada").unwrap(), std::slice::from_ref(&view));
         assert_eq!(store.model("bob", &view.id).unwrap(), None);
         assert_eq!(store.model("ada", "../ada/x").unwrap(), None);
         assert!(store.forget_model("ada", &view.id).unwrap());

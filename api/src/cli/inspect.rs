@@ -77,9 +77,15 @@ fn prompts(file: &MeshFile, volume: f64) -> Vec<Value> {
     let mut prompt = |code: &str, message: String| prompts.push(json!({ "code": code, "message": message }));
     let size = volume.abs();
     if size > 0.0 && size < METRE_PROMPT_MM3 {
-        prompt("slicer.unit-metres", format!("{size} mm3 is below {METRE_PROMPT_MM3} mm3: slicers ask whether the file is in metres; answer no"));
+        prompt(
+            "slicer.unit-metres",
+            format!("{size} mm3 is below {METRE_PROMPT_MM3} mm3: slicers ask whether the file is in metres; answer no"),
+        );
     } else if size > 0.0 && size < INCH_PROMPT_MM3 {
-        prompt("slicer.unit-inches", format!("{size} mm3 is below {INCH_PROMPT_MM3} mm3: slicers ask whether the file is in inches; answer no"));
+        prompt(
+            "slicer.unit-inches",
+            format!("{size} mm3 is below {INCH_PROMPT_MM3} mm3: slicers ask whether the file is in inches; answer no"),
+        );
     }
     if file.facts.unit.is_none() {
         prompt("file.no-unit", "the file names no unit; programs take its numbers for mm".to_owned());

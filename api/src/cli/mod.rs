@@ -94,7 +94,9 @@ fn tell(problem: &Problem, format: ErrorFormat) -> io::Result<()> {
     if format == ErrorFormat::Json {
         return writeln!(stderr, "{}", serde_json::to_string(problem)?);
     }
-    writeln!(stderr, "error: {} [{}]", problem.detail, problem.code)?;
+    // A document's first finding is the detail, and says its code already.
+    let code = if problem.detail.contains(&format!("[{}]", problem.code)) { String::new() } else { format!(" [{}]", problem.code) };
+    writeln!(stderr, "error: {}{code}", problem.detail)?;
     for finding in problem.errors.iter().filter(|finding| problem.errors.len() > 1 || !problem.detail.contains(&finding.message)) {
         let place = if finding.pointer.is_empty() { "the document" } else { finding.pointer.as_str() };
         match (finding.line, finding.column) {

@@ -10,6 +10,7 @@ use super::{DOCUMENT_BYTES, print, print_json, read_input};
 use crate::documents::{self, Remark, Severity, ValidationReport};
 use crate::files;
 use crate::problem::{Problem, ProblemKind};
+use crate::production::Engine;
 use crate::verify;
 
 /// Longest time for a prediction on the command line, where nobody else waits for it.
@@ -55,7 +56,7 @@ pub(super) fn plan(job: &Path) -> Result<(), Problem> {
     let bytes = read_input(job, DOCUMENT_BYTES)?;
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let job = documents::read_job(&bytes, &most, &|_| None)?;
-    print_json(&crate::routes::studies::predict(&job, PLAN_TIME)?)
+    print_json(&crate::routes::studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
 }
 
 /// `lacuna verify`.
@@ -70,5 +71,9 @@ pub(super) fn verify(args: &VerifyArgs, quiet: bool) -> Result<(), Problem> {
         print(report.table(quiet).as_bytes())?;
     }
     let failed = report.cases.iter().filter(|case| !case.passed).count();
-    if failed == 0 { Ok(()) } else { Err(Problem::new(ProblemKind::CheckFailed, format!("{failed} of {} cases failed", report.cases.len()))) }
+    if failed == 0 {
+        Ok(())
+    } else {
+        Err(Problem::new(ProblemKind::CheckFailed, format!("{failed} of {} cases failed", report.cases.len())))
+    }
 }

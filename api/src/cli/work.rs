@@ -53,23 +53,18 @@ pub(super) fn run(args: &RunArgs, manner: Manner) -> Result<(), Problem> {
     let targets: Result<Vec<Target>, Problem> =
         job.outputs.iter().map(|name| target(&args.folder.join(format!("{stem}.{name}")), Some(name))).collect();
     let (targets, certificate) = (targets?, args.folder.join("certificate.json"));
-    let done = perform(&job, &args.limits, manner, |outcome, budget| {
-        deliver(outcome, title.as_deref(), &targets, Some(&certificate), budget)
-    });
+    let done =
+        perform(&job, &args.limits, manner, |outcome, budget| deliver(outcome, title.as_deref(), &targets, Some(&certificate), budget));
     let (outcome, written) = done.map_err(|problem| problem.under("/model"))?;
     print_json(&serde_json::json!({ "outputs": written, "certificate": outcome.certificate }))
 }
 
-fn make(
-    kind: JobKind,
-    model: &Path,
-    params: Params,
-    output: &OutputArgs,
-    limit_args: &LimitArgs,
-    manner: Manner,
-) -> Result<(), Problem> {
-    let mut targets: Vec<Target> =
-        output.outputs.iter().map(|path| target(path, output.format.as_deref().filter(|_| path == Path::new("-")))).collect::<Result<_, _>>()?;
+fn make(kind: JobKind, model: &Path, params: Params, output: &OutputArgs, limit_args: &LimitArgs, manner: Manner) -> Result<(), Problem> {
+    let mut targets: Vec<Target> = output
+        .outputs
+        .iter()
+        .map(|path| target(path, output.format.as_deref().filter(|_| path == Path::new("-"))))
+        .collect::<Result<_, _>>()?;
     check_distinct(&targets, output)?;
     let names: Vec<&str> = targets.iter().filter_map(|target| target.name).collect();
     let job = job_of(kind, model, params, &names, limit_args)?;
@@ -129,7 +124,8 @@ fn perform(
     let reporter = Reporter::new(manner.progress, manner.quiet);
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: reporter.sink() };
     stop::on_signals(&budget.cancel)?;
-    let _watchdog = Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
+    let _watchdog =
+        Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
     let done = production::compute(job, &budget).and_then(|mut outcome| {
         outcome.certificate.input_digest = documents::job_digest(job).to_string();
         let written = deliver(&mut outcome, &budget)?;

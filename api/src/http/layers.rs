@@ -17,7 +17,8 @@ use crate::problem::{Problem, ProblemKind};
 /// The header with a request's id.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-const EXPOSED: &str = "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link";
+const EXPOSED: &str =
+    "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link";
 
 /// Gives a request its id, tells the log and the metrics of it, and every error its form.
 pub async fn observe(State(state): State<Shared>, request: Request, next: Next) -> Response {
@@ -53,7 +54,7 @@ async fn guard(state: &Shared, request: Request, next: Next) -> Response {
 fn as_problem(mut response: Response, id: &str) -> Response {
     let mut problem = response.extensions_mut().remove::<Problem>().unwrap_or_else(|| Problem::from_status(response.status().as_u16()));
     problem.request_id = Some(id.to_owned());
-    let kept = [header::ALLOW, header::CONNECTION].map(|name| (name.clone(), response.headers().get(&name).cloned()));
+    let kept = [header::ALLOW, header::CONTENT_RANGE].map(|name| (name.clone(), response.headers().get(&name).cloned()));
     let mut answer = problem.into_response();
     for (name, value) in kept {
         if let Some(value) = value {
@@ -66,9 +67,8 @@ fn as_problem(mut response: Response, id: &str) -> Response {
 /// The caller's id if it is harmless in a log, else a new one.
 fn request_id(headers: &HeaderMap) -> String {
     let given = headers.get(REQUEST_ID).and_then(|value| value.to_str().ok());
-    let harmless = |id: &&str| {
-        (1..=128).contains(&id.len()) && id.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.:".contains(&byte))
-    };
+    let harmless =
+        |id: &&str| (1..=128).contains(&id.len()) && id.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.:".contains(&byte));
     given.filter(harmless).map_or_else(|| Uuid::now_v7().to_string(), str::to_owned)
 }
 
@@ -108,7 +108,9 @@ fn preflight_answer() -> Response {
     headers.insert(header::ACCESS_CONTROL_ALLOW_METHODS, HeaderValue::from_static("GET, HEAD, POST, DELETE"));
     headers.insert(
         header::ACCESS_CONTROL_ALLOW_HEADERS,
-        HeaderValue::from_static("Authorization, Content-Type, Idempotency-Key, Prefer, Range, If-None-Match, If-Range, Last-Event-ID, X-Request-Id"),
+        HeaderValue::from_static(
+            "Authorization, Content-Type, Idempotency-Key, Prefer, Range, If-None-Match, If-Range, Last-Event-ID, X-Request-Id",
+        ),
     );
     headers.insert(header::ACCESS_CONTROL_MAX_AGE, HeaderValue::from_static("600"));
     response

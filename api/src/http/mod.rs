@@ -8,3 +8,6 @@ pub mod range;
 pub mod router;
 pub mod serve;
 pub mod state;
+
+#[cfg(test)]
+mod tests;

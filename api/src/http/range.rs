@@ -5,6 +5,7 @@ use std::path::Path;
 
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
+use axum::response::IntoResponse;
 use futures_util::stream;
 use tokio::fs::File;
 use tokio::io::{AsyncReadExt, AsyncSeekExt};
@@ -47,7 +48,7 @@ pub fn part(range: Option<&str>, length: u64) -> Part {
 /// Answers with a file that never changes.
 ///
 /// # Errors
-/// When the range lies outside, or the file is gone or fails.
+/// When the file is gone or fails.
 pub async fn answer(request: &HeaderMap, path: &Path, output: &Output) -> Result<Response<Body>, Problem> {
     let etag = format!("\"{}\"", output.digest);
     let mut response = Response::new(Body::empty());
@@ -65,7 +66,7 @@ pub async fn answer(request: &HeaderMap, path: &Path, output: &Output) -> Result
     let range = text(header::RANGE).filter(|_| text(header::IF_RANGE).is_none_or(|tag| tag == etag));
     let (first, length) = match part(range, output.bytes) {
         Part::Whole => (0, output.bytes),
-        Part::Outside => return Err(outside(output.bytes)),
+        Part::Outside => return outside(output.bytes),
         Part::Range(first, last) => {
             *response.status_mut() = StatusCode::PARTIAL_CONTENT;
             let value = format!("bytes {first}-{last}/{}", output.bytes);
@@ -101,8 +102,11 @@ fn immutable_headers(headers: &mut HeaderMap, output: &Output, etag: &str) -> Re
     Ok(())
 }
 
-fn outside(length: u64) -> Problem {
-    Problem::new(ProblemKind::Range, format!("the file has {length} bytes, numbered from 0"))
+fn outside(length: u64) -> Result<Response<Body>, Problem> {
+    let problem = Problem::new(ProblemKind::Range, format!("the file has {length} bytes, numbered from 0"));
+    let mut response = problem.into_response();
+    response.headers_mut().insert(header::CONTENT_RANGE, header_value(&format!("bytes */{length}"))?);
+    Ok(response)
 }
 
 fn header_value(text: &str) -> Result<HeaderValue, Problem> {

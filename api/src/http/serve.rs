@@ -32,7 +32,7 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
     let listener = TcpListener::bind(config.bind).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let state = AppState::open(config)?;
-    let workers = worker::start(&state.desk, state.config.workers, state.config.job_limits)
+    let workers = worker::start(&state.desk, state.config.workers, state.config.job_limits, state.engine)
         .map_err(|error| Problem::io("no threads for the workers", &error))?;
     let sweeper = tokio::spawn(sweep(state.clone()));
     told(address);

@@ -9,6 +9,7 @@ use crate::config::Config;
 use crate::jobs::desk::{Desk, DeskLimits};
 use crate::metrics::Metrics;
 use crate::problem::Problem;
+use crate::production::Engine;
 use crate::store::Store;
 
 /// The state of the service, shared by all requests.
@@ -23,6 +24,8 @@ pub struct AppState {
     pub metrics: Arc<Metrics>,
     /// Turns true when the service goes down; open streams end then.
     pub closing: watch::Sender<bool>,
+    /// Who does the jobs.
+    pub engine: Engine,
     /// Who called how often.
     pub limiter: RateLimiter,
     /// Places for work on documents beside the event loop.
@@ -38,6 +41,14 @@ impl AppState {
     /// # Errors
     /// When the data folder fails.
     pub fn open(config: Config) -> Result<Shared, Problem> {
+        Self::with_engine(config, Engine::KERNEL)
+    }
+
+    /// As [`AppState::open`], with something else in the kernel's place.
+    ///
+    /// # Errors
+    /// As [`AppState::open`].
+    pub fn with_engine(config: Config, engine: Engine) -> Result<Shared, Problem> {
         let failed = |error| Problem::io(format!("the data folder {} cannot be used", config.data.display()), &error);
         let store = Arc::new(Store::open(&config.data).map_err(failed)?);
         let metrics = Arc::new(Metrics::default());
@@ -46,7 +57,7 @@ impl AppState {
         let limiter = RateLimiter::new(config.submissions_per_minute);
         // Twice the workers: reading documents is short, but must not take the memory of many at once.
         let blocking = Arc::new(Semaphore::new(config.workers * 2));
-        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), limiter, blocking }))
+        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, limiter, blocking }))
     }
 
     /// Finds the models that an owner has stored.

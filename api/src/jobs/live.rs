@@ -27,12 +27,8 @@ impl LiveJob {
     #[must_use]
     pub fn new(record: JobRecord) -> Self {
         let view = record.view.clone();
-        let job = Self {
-            record: Mutex::new(record),
-            last_progress: Mutex::default(),
-            cancel: CancelToken::new(),
-            events: EventLog::default(),
-        };
+        let job =
+            Self { record: Mutex::new(record), last_progress: Mutex::default(), cancel: CancelToken::new(), events: EventLog::default() };
         // Whoever listens first learns where the job stands, even if it ended in another process.
         job.announce(&view);
         job

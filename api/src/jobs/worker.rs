@@ -14,7 +14,7 @@ use super::record::{Answer, JobState, Output};
 use super::watchdog::Watchdog;
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
-use crate::production::{self, Label};
+use crate::production::{self, Engine, Label};
 use crate::{documents, files};
 
 /// Name of the certificate among a job's outputs.
@@ -24,14 +24,14 @@ const CERTIFICATE: &str = "certificate.json";
 ///
 /// # Errors
 /// When the system has no thread to spare.
-pub fn start(desk: &Arc<Desk>, count: usize, most: Limits) -> std::io::Result<Vec<JoinHandle<()>>> {
+pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> std::io::Result<Vec<JoinHandle<()>>> {
     (0..count)
         .map(|number| {
             let desk = Arc::clone(desk);
             std::thread::Builder::new().name(format!("worker-{number}")).spawn(move || {
                 while let Some(id) = desk.queue.take() {
                     if let Some(job) = desk.get(&id) {
-                        work(&desk, &job, &most);
+                        work(&desk, &job, &most, engine);
                     }
                 }
             })
@@ -40,7 +40,7 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits) -> std::io::Result<Ve
 }
 
 /// Does a job from its taking to its record.
-fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits) {
+fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) {
     let taken = job.update(|record| {
         let view = &mut record.view;
         if view.state != JobState::Queued {
@@ -55,7 +55,12 @@ fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits) {
     desk.keep(job);
     let (id, kind) = job.with(|record| (record.view.id.clone(), record.view.kind));
     let start = Instant::now();
-    let result = if taken { perform(desk, job, most) } else { Err(Problem::new(ProblemKind::Cancelled, "stopped before the start")) };
+    let result = if taken {
+        // The kernel's panics are caught where it is called; this catches our own, so that a worker never dies.
+        production::guarded(|| perform(desk, job, most, engine)).and_then(|result| result)
+    } else {
+        Err(Problem::new(ProblemKind::Cancelled, "stopped before the start"))
+    };
     let state = conclude(job, result);
     desk.keep(job);
     let time = start.elapsed();
@@ -63,14 +68,14 @@ fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits) {
     tracing::info!(job = %id, kind = documents::kind_word(kind), state = state.word(), milliseconds = time.as_millis(), "job ended");
 }
 
-fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits) -> Result<Answer, Problem> {
+fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Result<Answer, Problem> {
     let (document, input) = job.with(|record| (record.document, record.view.input_digest.clone()));
     let bytes = desk.store.document(document).map_err(|error| Problem::io("the job document could not be read", &error))?;
     let order = documents::read_job(&bytes, most, &|_| None)?;
     let budget = budget(job, order.limits);
-    let _watchdog = Watchdog::start(&job.cancel, order.limits.seconds)
-        .map_err(|error| Problem::io("no thread to watch the time", &error))?;
-    let made = production::compute(&order, &budget).map_err(|problem| problem.under("/model")).and_then(|mut outcome| {
+    let _watchdog =
+        Watchdog::start(&job.cancel, order.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
+    let made = (engine.compute)(&order, &budget).map_err(|problem| problem.under("/model")).and_then(|mut outcome| {
         outcome.certificate.input_digest = input;
         keep_files(desk, &order, outcome, &budget)
     });

@@ -65,12 +65,8 @@ pub struct LimitCapability {
 pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
     let config = &state.config;
     let formats = FORMATS.iter().map(|row| {
-        let carries = [
-            (row.carries.solid, "solid"),
-            (row.carries.surface, "surface"),
-            (row.carries.wires, "wires"),
-            (row.carries.points, "points"),
-        ];
+        let carries =
+            [(row.carries.solid, "solid"), (row.carries.surface, "surface"), (row.carries.wires, "wires"), (row.carries.points, "points")];
         let carries = carries.into_iter().filter_map(|(carried, word)| carried.then_some(word)).collect();
         FormatCapability { name: row.ending, media_type: row.media_type, carries }
     });

@@ -93,7 +93,7 @@ fn accept(
     idempotency: Option<Idempotency>,
 ) -> Result<(std::sync::Arc<crate::jobs::live::LiveJob>, bool), Problem> {
     let job = documents::read_job(body, &state.config.job_limits, &state.models_of(owner))?;
-    match predict(&job, PLAN_TIME) {
+    match predict(state.engine, &job, PLAN_TIME) {
         // A prediction that takes too long is no reason to refuse what may be done in time.
         Err(problem) if problem.code != "limit.seconds" => return Err(problem),
         _ => {}

@@ -45,11 +45,7 @@ pub struct ModelPage {
     responses((status = 201, body = ModelView), (status = 200, body = ModelView, description = "It was stored before"),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
-pub async fn store(
-    State(state): State<Shared>,
-    Extension(owner): Extension<Owner>,
-    JsonBody(body): JsonBody,
-) -> Result<Response, Problem> {
+pub async fn store(State(state): State<Shared>, Extension(owner): Extension<Owner>, JsonBody(body): JsonBody) -> Result<Response, Problem> {
     let kept = state.beside(move |state| {
         let model = documents::read_model(&body)?;
         let document = documents::model_document(&model);

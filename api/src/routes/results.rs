@@ -47,7 +47,10 @@ pub async fn output(
     }
     let output = view.outputs.iter().find(|output| output.name == name || output.file_name == name).ok_or_else(|| {
         let names: Vec<&str> = view.outputs.iter().map(|output| output.name.as_str()).collect();
-        Problem::new(ProblemKind::NotFound, format!("the job has no such output; it has {}", if names.is_empty() { "none".into() } else { names.join(", ") }))
+        Problem::new(
+            ProblemKind::NotFound,
+            format!("the job has no such output; it has {}", if names.is_empty() { "none".into() } else { names.join(", ") }),
+        )
     })?;
     if query.redirect == Some(0) {
         return range::answer(&headers, &state.store.result_path(output.digest), output).await;

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use axum::extract::{Extension, State};
 use axum::Json;
+use axum::extract::{Extension, State};
 use lacuna_fabrication::Plan;
 use lacuna_kernel::budget::{Budget, CancelToken};
 
@@ -14,7 +14,7 @@ use crate::http::state::Shared;
 use crate::jobs::watchdog::Watchdog;
 use crate::openapi::{Job, Model};
 use crate::problem::Problem;
-use crate::production;
+use crate::production::{self, Engine};
 
 /// Longest time that a prediction may take: it is asked inside of a request.
 pub const PLAN_TIME: Duration = Duration::from_secs(10);
@@ -44,7 +44,7 @@ pub async fn plan(
 ) -> Result<Json<Plan>, Problem> {
     let plan = state.beside(move |state| {
         let job = documents::read_job(&body, &state.config.job_limits, &state.models_of(&owner))?;
-        predict(&job, PLAN_TIME)
+        predict(state.engine, &job, PLAN_TIME)
     });
     plan.await.map(Json)
 }
@@ -53,8 +53,8 @@ pub async fn plan(
 ///
 /// # Errors
 /// The kernel's refusal, with pointers into the job document.
-pub fn predict(job: &lacuna_fabrication::Job, time: Duration) -> Result<Plan, Problem> {
+pub fn predict(engine: Engine, job: &lacuna_fabrication::Job, time: Duration) -> Result<Plan, Problem> {
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
     let _watchdog = Watchdog::start(&budget.cancel, time.as_secs_f64()).map_err(|error| Problem::io("no thread", &error))?;
-    production::plan(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under("/model")))
+    (engine.plan)(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under("/model")))
 }

@@ -110,9 +110,10 @@ fn compare_refusal(refused: &Refused, result: Result<serde_json::Value, Problem>
     match result {
         Ok(_) => Row::failure("refused", &expected, "a result"),
         Err(problem) => {
-            let by_finding = problem.errors.iter().any(|finding| {
-                finding.code == refused.code && refused.pointer.as_ref().is_none_or(|pointer| *pointer == finding.pointer)
-            });
+            let by_finding = problem
+                .errors
+                .iter()
+                .any(|finding| finding.code == refused.code && refused.pointer.as_ref().is_none_or(|pointer| *pointer == finding.pointer));
             let passed = by_finding || refused.pointer.is_none() && problem.code == refused.code;
             Row::verdict("refused", &expected, &told(&problem), passed)
         }
