@@ -1,9 +1,17 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
+use lacuna_kernel::attractor::Attractor;
+use lacuna_kernel::dilation::Dilation;
+use lacuna_kernel::measure::AxisBox;
+use lacuna_kernel::measure::mass::{area, dilated_area, dilated_volume, mesh_measures, volume};
+use lacuna_kernel::tessellation::Tessellation;
+use lacuna_kernel::tolerance::{Radius, Tolerance};
+
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Checked<T> {
     /// Nobody looked.
+    #[default]
     NotChecked,
     /// What was found.
     Found(T),
@@ -43,7 +51,8 @@ pub struct Certificate {
     /// Every point of D(r - inner) lies in a ball of this diameter inside the solid.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub thickness_min_mm: Option<f64>,
-    /// Leaf cells (sites) that were evaluated, each counted once.
+    /// Leaf cells evaluated. A dilation evaluates only cells near its boundary, and one again in every block
+    /// of the lattice that needs it.
     pub leaf_cells: u64,
     /// Vertices of the result.
     pub vertices: u64,
@@ -118,9 +127,88 @@ pub struct Certificate {
     pub warnings: Vec<String>,
 }
 
-impl<T> Default for Checked<T> {
-    fn default() -> Self {
-        Self::NotChecked
+fn corners(bounds: &AxisBox) -> [[Interval; 3]; 2] {
+    [bounds.low, bounds.high].map(|corner| corner.map(|end| [end.low, end.high]))
+}
+
+fn start(attractor: &Attractor, tolerance: Tolerance) -> Certificate {
+    Certificate {
+        requested_tolerance_mm: tolerance.mm(),
+        kernel_version: env!("CARGO_PKG_VERSION").into(),
+        warnings: attractor.warnings().to_vec(),
+        ..Certificate::default()
+    }
+}
+
+/// What is proven of a dilated shape.
+pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Radius, tolerance: Tolerance) -> Certificate {
+    let mesh = dilation.solid.mesh();
+    let topology = dilation.solid.topology();
+    let mesh_volume = volume(mesh);
+    let exact = dilated_volume(mesh_volume, radius.mm(), dilation.inner_mm, dilation.outer_mm);
+    let exact_area = dilated_area(exact, radius.mm());
+    let mut certificate = Certificate {
+        achieved_bound_mm: dilation.inner_mm.max(dilation.outer_mm),
+        inner_bound_mm: Some(dilation.inner_mm),
+        outer_bound_mm: Some(dilation.outer_mm),
+        thickness_min_mm: Some((2.0 * (radius.mm() - dilation.inner_mm)).max(0.0)),
+        leaf_cells: dilation.leaf_cells,
+        vertices: topology.vertices,
+        edges: topology.edges,
+        triangles: topology.triangles,
+        components: Some(topology.components),
+        shells: Some(topology.shells),
+        cavities: Some(topology.cavities),
+        genus: Some(topology.genus),
+        euler: Some(topology.euler),
+        boundary_edges: Some(topology.boundary_edges),
+        nonmanifold_edges: Some(topology.nonmanifold_edges),
+        nonmanifold_vertices: Some(topology.nonmanifold_vertices),
+        flipped_pairs: Some(topology.flipped_pairs),
+        degenerate_triangles: Some(topology.degenerate_triangles),
+        // By construction, after rounding too: see the kernel's dilation.
+        self_intersections: Checked::Found(SelfIntersections::None),
+        topology_stable: Checked::NotChecked,
+        bbox_mm: corners(&dilation.bounds.grown(radius.mm())),
+        volume_mm3: Some([exact.low, exact.high]),
+        area_mm2: Some([exact_area.low, exact_area.high]),
+        mesh_volume_mm3: Some(mesh_volume),
+        mesh_area_mm2: Some(area(mesh)),
+        lattice_pitch_mm: Some(dilation.pitch_mm),
+        ..start(attractor, tolerance)
+    };
+    if topology.cavities > 0 {
+        certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
+    }
+    if topology.components > 1 {
+        certificate.warnings.push(format!("{} separate pieces: they will not hold together", topology.components));
+    }
+    certificate
+}
+
+/// What is proven of an evaluation.
+pub(crate) fn of_evaluation(attractor: &Attractor, tessellation: &Tessellation, bounds: &AxisBox, tolerance: Tolerance) -> Certificate {
+    Certificate {
+        achieved_bound_mm: tessellation.deviation_mm + bounds.single_precision(),
+        leaf_cells: tessellation.leaf_cells,
+        vertices: tessellation.vertices.len() as u64,
+        edges: tessellation.segments.len() as u64,
+        triangles: tessellation.triangles.len() as u64,
+        bbox_mm: corners(bounds),
+        ..start(attractor, tolerance)
+    }
+}
+
+/// What is proven of a shape itself. Its volume and area are known when it is one mesh.
+pub(crate) fn of_shape(attractor: &Attractor, bounds: &AxisBox, tolerance: Tolerance) -> Certificate {
+    let widest = bounds.low.iter().chain(&bounds.high).map(|end| end.width()).fold(0.0, f64::max);
+    let exact = mesh_measures(attractor);
+    Certificate {
+        achieved_bound_mm: widest,
+        bbox_mm: corners(bounds),
+        volume_mm3: exact.map(|(volume, _)| [volume.low, volume.high]),
+        area_mm2: exact.map(|(_, area)| [area.low, area.high]),
+        ..start(attractor, tolerance)
     }
 }
 

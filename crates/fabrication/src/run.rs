@@ -1,12 +1,16 @@
 //! One entry for every door: `plan` predicts, `run` does, `validate` tells what is wrong.
 
-use lacuna_kernel::budget::Budget;
+use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine};
+use lacuna_kernel::budget::{Budget, Limits, Stopped};
+use lacuna_kernel::dilation::{DilationError, dilate, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::model::Model;
+use lacuna_kernel::measure::bounding_box;
+use lacuna_kernel::model::{Finding, Lowered, Model};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
+use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
-use crate::{Certificate, Job};
+use crate::{Certificate, Job, JobKind, certificate};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,8 +62,9 @@ pub struct Validation {
     pub degrees_of_freedom: u64,
     /// Largest violation of a constraint.
     pub constraint_residual: f64,
-    /// [lower, upper] bounds of the joint spectral radius on the zero-sum subspaces.
-    pub spectral_radius: [f64; 2],
+    /// [lower, upper] bounds of the joint spectral radius on the zero-sum subspaces, when the model is sound
+    /// enough to have one.
+    pub spectral_radius: Option<[f64; 2]>,
 }
 
 /// One finding about a model.
@@ -91,28 +96,193 @@ pub struct JobError {
     pub diagnostics: Vec<ModelDiagnostic>,
 }
 
+impl From<Finding> for ModelDiagnostic {
+    fn from(finding: Finding) -> Self {
+        let Finding { pointer, code, message, warning } = finding;
+        Self { pointer, code, message, warning }
+    }
+}
+
+impl JobError {
+    fn new(kind: Kind, code: &'static str, message: String) -> Self {
+        Self { kind, code, message, limit: None, diagnostics: Vec::new() }
+    }
+
+    /// The first error speaks for all; every finding is listed.
+    fn model(findings: Vec<Finding>) -> Self {
+        let first = findings.iter().find(|finding| !finding.warning).cloned();
+        let (code, message) = first.map_or(("invalid-model", String::new()), |finding| (finding.code, finding.message));
+        let kind = if code == "automaton.convergence-undecided" { Kind::Unreachable } else { Kind::Invalid };
+        Self { diagnostics: findings.into_iter().map(ModelDiagnostic::from).collect(), ..Self::new(kind, code, message) }
+    }
+}
+
+impl From<NotPositive> for JobError {
+    fn from(error: NotPositive) -> Self {
+        Self::new(Kind::Invalid, "bad-parameter", error.to_string())
+    }
+}
+
+impl From<Stopped> for JobError {
+    fn from(error: Stopped) -> Self {
+        Self::new(error.kind(), error.code(), error.to_string())
+    }
+}
+
+impl From<RefineError> for JobError {
+    fn from(error: RefineError) -> Self {
+        Self { limit: error.limit(), ..Self::new(error.kind(), error.code(), error.to_string()) }
+    }
+}
+
+impl From<DilationError> for JobError {
+    fn from(error: DilationError) -> Self {
+        Self { limit: error.limit(), ..Self::new(error.kind(), error.code(), error.to_string()) }
+    }
+}
+
+/// The one model of a job, lowered.
+fn lower(job: &Job, budget: &Budget) -> Result<Lowered, JobError> {
+    budget.report("validate", 0.0, 0);
+    let [input] = job.inputs.as_slice() else {
+        let message = format!("the job has {} inputs, and this kind takes one", job.inputs.len());
+        return Err(JobError::new(Kind::Invalid, "job.inputs", message));
+    };
+    let lowered = input.model.lower().map_err(JobError::model)?;
+    budget.report("validate", 1.0, lowered.attractor.automaton().states().len() as u64);
+    Ok(lowered)
+}
+
+fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
+    Ok(job.params.radius_mm.map(Radius::new).transpose()?)
+}
+
 /// Does the job.
 ///
 /// # Errors
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
-pub fn run(_job: &Job, _budget: &Budget) -> Result<Outcome, JobError> {
-    Err(unfinished())
+pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
+    let tolerance = Tolerance::new(job.params.tolerance_mm)?;
+    let radius = radius(job)?;
+    let lowered = lower(job, budget)?;
+    let attractor = &lowered.attractor;
+    match (job.kind, radius) {
+        (JobKind::Evaluate, _) => evaluate(attractor, tolerance, budget),
+        (JobKind::Solidify, Some(radius)) => {
+            let dilation = dilate(attractor, radius, tolerance, budget)?;
+            let certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+            Ok(Outcome { geometry: Geometry::Solid(dilation.solid), certificate })
+        }
+        (JobKind::Solidify, None) => {
+            Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()))
+        }
+        (JobKind::Measure, Some(radius)) => {
+            let dilation = dilate(attractor, radius, tolerance, budget)?;
+            Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_dilation(attractor, &dilation, radius, tolerance) })
+        }
+        (JobKind::Measure, None) => {
+            let bounds = bounding_box(attractor, budget)?;
+            Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_shape(attractor, &bounds, tolerance) })
+        }
+    }
 }
+
+fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+    let bounds = bounding_box(attractor, budget)?;
+    let rounding = bounds.single_precision();
+    let share = tolerance.mm() - rounding;
+    // Coordinates travel in single precision: what it takes from the tolerance must leave something.
+    if share < rounding {
+        let reachable = 2.0 * rounding;
+        let message = format!(
+            "single-precision files cannot carry a tolerance of {} mm at coordinates up to {:.1} mm; {reachable:.3e} mm can be carried",
+            tolerance.mm(),
+            bounds.extent()
+        );
+        let limit =
+            LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
+        return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) });
+    }
+    let tessellation = refine(attractor, Tolerance::new(share)?, budget)?;
+    let certificate = certificate::of_evaluation(attractor, &tessellation, &bounds, tolerance);
+    Ok(Outcome { geometry: Geometry::Tessellation(tessellation), certificate })
+}
+
+/// Bytes of a binary STL file with so many triangles.
+fn stl_bytes(triangles: f64) -> f64 {
+    84.0 + 50.0 * triangles
+}
+
+/// Bytes that an evaluation holds for each leaf cell.
+const BYTES_PER_CELL: f64 = 64.0;
 
 /// Predicts the cost of the job.
 ///
 /// # Errors
 /// As [`run`], for what shows before the work.
-pub fn plan(_job: &Job, _budget: &Budget) -> Result<Plan, JobError> {
-    Err(unfinished())
+pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
+    let tolerance = Tolerance::new(job.params.tolerance_mm)?;
+    let radius = radius(job)?;
+    let lowered = lower(job, budget)?;
+    let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;
+    if job.kind == JobKind::Evaluate || radius.is_none() {
+        let counted = if job.kind == JobKind::Evaluate { leaf_cells } else { 0.0 };
+        return Ok(Plan { leaf_cells, triangles: 0.0, memory_bytes: counted * BYTES_PER_CELL, output_bytes: 0.0, lattice_pitch_mm: None });
+    }
+    let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
+    let prediction = predict(&lowered.attractor, radius, tolerance, budget)?;
+    Ok(Plan {
+        leaf_cells,
+        triangles: prediction.triangles,
+        memory_bytes: prediction.memory_bytes,
+        output_bytes: stl_bytes(prediction.triangles),
+        lattice_pitch_mm: Some(prediction.pitch_mm),
+    })
+}
+
+/// Leaf cells that a prediction visits at most.
+const COUNTED_CELLS: u64 = 400_000;
+
+/// Leaf cells at a tolerance: counted when few, else extrapolated by the growth between two coarser
+/// tolerances, N ~ tolerance^-dimension.
+fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<f64, JobError> {
+    let limits = Limits { cells: COUNTED_CELLS, ..budget.limits };
+    let counted = Budget { limits, progress: None, ..budget.clone() };
+    let mut coarse = tolerance.mm();
+    let mut known: Vec<(f64, f64)> = Vec::new();
+    for _ in 0..200 {
+        match count_cells(attractor, Tolerance::new(coarse)?, &counted) {
+            Ok(count) => known.push((coarse, count as f64)),
+            Err(RefineError::Cells { .. } | RefineError::Depth { .. }) => {}
+            Err(stopped @ RefineError::Stopped(_)) => return Err(stopped.into()),
+        }
+        match known.as_slice() {
+            [(first, count), ..] if *first == tolerance.mm() => return Ok(*count),
+            [(fine, many), .., (rough, few)] if *rough >= 4.0 * fine => {
+                let dimension = (many / few).ln() / (rough / fine).ln();
+                return Ok(many * (fine / tolerance.mm()).powf(dimension.max(0.0)));
+            }
+            _ => coarse *= 2.0,
+        }
+    }
+    Ok(known.first().map_or(f64::INFINITY, |(_, count)| *count))
 }
 
 /// Says what is wrong with a model.
 #[must_use]
-pub fn validate(_model: &Model) -> Validation {
-    Validation::default()
-}
-
-fn unfinished() -> JobError {
-    JobError { kind: Kind::Defect, code: "unfinished", message: "the kernel is being written".into(), limit: None, diagnostics: Vec::new() }
+pub fn validate(model: &Model) -> Validation {
+    match model.lower() {
+        Ok(lowered) => {
+            let contraction = lowered.attractor.contraction();
+            Validation {
+                valid: true,
+                diagnostics: lowered.findings.into_iter().map(ModelDiagnostic::from).collect(),
+                states: lowered.attractor.automaton().states().len() as u64,
+                degrees_of_freedom: 0,
+                constraint_residual: lowered.constraint_residual,
+                spectral_radius: Some([contraction.lower, contraction.upper]),
+            }
+        }
+        Err(findings) => Validation { diagnostics: findings.into_iter().map(ModelDiagnostic::from).collect(), ..Validation::default() },
+    }
 }

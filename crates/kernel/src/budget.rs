@@ -82,6 +82,26 @@ impl Default for Limits {
     }
 }
 
+impl Stopped {
+    /// Cancelled, or a limit of time.
+    #[must_use]
+    pub fn kind(&self) -> crate::error::Kind {
+        match self.reason {
+            StopReason::Cancelled => crate::error::Kind::Cancelled,
+            StopReason::Deadline => crate::error::Kind::Limit,
+        }
+    }
+
+    /// Stable code.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self.reason {
+            StopReason::Cancelled => "cancelled",
+            StopReason::Deadline => "limit-time",
+        }
+    }
+}
+
 /// How far a computation has come.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {

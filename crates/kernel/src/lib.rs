@@ -1,8 +1,12 @@
 //! The mathematics of lacuna: from a model to an automaton, an attractor, a proven solid and
 //! measured intervals.
 
+pub mod attractor;
+pub mod automaton;
 pub mod budget;
+pub mod dilation;
 pub mod error;
+pub mod measure;
 pub mod model;
 pub mod solid;
 pub mod tessellation;

@@ -1,6 +1,10 @@
 //! Boundary controlled iterated function systems, stated in full.
 
+use super::lower::Draft;
+use crate::attractor::Root;
+use crate::automaton::{Boundary, LeafPrimitive, OperatorError, State, StateId, SubdivisionOperator, Transition};
 use glam::DVec4;
+use std::collections::BTreeMap;
 
 /// Topological kind of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -123,3 +127,291 @@ pub struct Bcifs {
     /// Named values used as entries, in the document's order.
     pub parameters: Vec<(String, f64)>,
 }
+
+/// Constraints may be violated by this much in barycentric coordinates: operators printed with few digits
+/// leave 1e-6.
+const RESIDUAL_ALLOWED: f64 = 1e-4;
+
+impl Bcifs {
+    pub(super) fn lower(&self, draft: &mut Draft) {
+        if self.states.is_empty() {
+            return draft.error("/states", "automaton.empty", "the model has no state".into());
+        }
+        if self.cells.is_empty() {
+            return draft.error("/cells", "automaton.empty", "the model has no root cell".into());
+        }
+        let reader = Reader { model: self, offset: draft.states.len(), reachable: self.reachable() };
+        let errors_before = draft.findings.iter().filter(|finding| !finding.warning).count();
+        let states: Vec<State> = (0..self.states.len()).map(|index| reader.state(index, draft)).collect();
+        reader.roots(draft);
+        if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
+            reader.constraints(&states, draft);
+        }
+        draft.states.extend(states);
+    }
+
+    fn index_of(&self, name: &str) -> Option<usize> {
+        self.states.iter().position(|state| state.name == name)
+    }
+
+    /// States that a root cell reaches by transitions and boundaries.
+    fn reachable(&self) -> Vec<bool> {
+        let index: BTreeMap<&str, usize> = self.states.iter().enumerate().map(|(index, state)| (state.name.as_str(), index)).collect();
+        let mut reached = vec![false; self.states.len()];
+        let mut stack: Vec<usize> = self.cells.iter().filter_map(|cell| index.get(cell.state.as_str()).copied()).collect();
+        while let Some(current) = stack.pop() {
+            if !std::mem::replace(&mut reached[current], true) {
+                let state = &self.states[current];
+                let names = state.transitions.iter().map(|t| &t.to).chain(state.boundaries.iter().map(|b| &b.state));
+                stack.extend(names.filter_map(|name| index.get(name.as_str()).copied()));
+            }
+        }
+        reached
+    }
+}
+
+struct Reader<'a> {
+    model: &'a Bcifs,
+    offset: usize,
+    reachable: Vec<bool>,
+}
+
+impl Reader<'_> {
+    /// What is wrong in a state that nothing reaches is a warning.
+    fn fault(&self, draft: &mut Draft, state: usize, pointer: &str, code: &'static str, message: String) {
+        if self.reachable[state] { draft.error(pointer, code, message) } else { draft.warn(pointer, code, message) }
+    }
+
+    fn state(&self, index: usize, draft: &mut Draft) -> State {
+        let spec = &self.model.states[index];
+        let place = format!("/states/{index}");
+        if !self.reachable[index] {
+            draft.warn(&place, "automaton.unreachable-state", format!("no root cell reaches state '{}'; it is ignored", spec.name));
+        }
+        let terminal = spec.transitions.is_empty() && (1..=3).contains(&spec.dimension);
+        if spec.transitions.is_empty() && !terminal {
+            let message = format!("state '{}' has {} control points and no transition, so it has no attractor", spec.name, spec.dimension);
+            self.fault(draft, index, &place, "automaton.no-transition", message);
+        }
+        let mut transitions = Vec::new();
+        for (label, transition) in spec.transitions.iter().enumerate() {
+            let place = format!("{place}/transitions/{label}");
+            if let Some((to, operator)) = self.link(index, &transition.to, &transition.operator, &place, "operator", draft) {
+                transitions.push(Transition { to, operator, label });
+            }
+        }
+        let mut boundaries = Vec::new();
+        for (label, boundary) in spec.boundaries.iter().enumerate() {
+            let place = format!("{place}/boundaries/{label}");
+            if let Some((state, incidence)) = self.link(index, &boundary.state, &boundary.incidence, &place, "incidence", draft) {
+                boundaries.push(Boundary { state, incidence });
+            }
+        }
+        let unusable = !self.reachable[index];
+        State {
+            name: spec.name.clone(),
+            kind: Some(spec.cell),
+            // A state that is ignored must not break the automaton: it becomes a point.
+            dimension: if unusable { 1 } else { spec.dimension },
+            transitions: if unusable { Vec::new() } else { transitions },
+            boundaries: if unusable { Vec::new() } else { boundaries },
+            leaf: if unusable || terminal { LeafPrimitive::Simplex } else { LeafPrimitive::Centre },
+            frame: false,
+        }
+    }
+
+    fn link(
+        &self,
+        state: usize,
+        to: &str,
+        matrix: &Matrix,
+        place: &str,
+        member: &str,
+        draft: &mut Draft,
+    ) -> Option<(StateId, SubdivisionOperator)> {
+        let Some(target) = self.model.index_of(to) else {
+            self.fault(draft, state, place, "automaton.unknown-state", format!("state '{to}' does not exist"));
+            return None;
+        };
+        let place = format!("{place}/{member}");
+        let (rows, columns) = (self.model.states[state].dimension, self.model.states[target].dimension);
+        let found = matrix.rows.first().map_or(0, Vec::len);
+        if matrix.rows.len() != rows || matrix.rows.iter().any(|row| row.len() != columns) {
+            let message = format!(
+                "the matrix is {} x {found}, and must be {rows} x {columns}: state '{}' has {rows} control points, '{to}' has {columns}",
+                matrix.rows.len(),
+                self.model.states[state].name
+            );
+            self.fault(draft, state, &place, "automaton.dimension-mismatch", message);
+            return None;
+        }
+        let mut entries = vec![0.0; rows * columns];
+        for (i, row) in matrix.rows.iter().enumerate() {
+            for (j, entry) in row.iter().enumerate() {
+                entries[j * rows + i] = match self.value(entry) {
+                    Ok(value) => value,
+                    Err((code, message)) => {
+                        self.fault(draft, state, &format!("{place}/{i}/{j}"), code, message);
+                        return None;
+                    }
+                };
+            }
+        }
+        match SubdivisionOperator::from_columns(rows, entries) {
+            Ok((operator, corrected)) => {
+                if corrected > 0.0 {
+                    let message =
+                        format!("column sums were off 1 by up to {corrected:.1e}, as in exports with few digits; they were corrected");
+                    draft.warn(&place, "automaton.column-sum-corrected", message);
+                }
+                Some((StateId::new(self.offset + target), operator))
+            }
+            Err(error) => {
+                let code = match error {
+                    OperatorError::ColumnSum { .. } => "automaton.column-sum",
+                    OperatorError::NotFinite { .. } => "model.not-finite",
+                };
+                self.fault(draft, state, &place, code, error.to_string());
+                None
+            }
+        }
+    }
+
+    fn value(&self, entry: &Entry) -> Result<f64, (&'static str, String)> {
+        match entry {
+            Entry::Number(value) => Ok(*value),
+            Entry::Unknown => Err(("automaton.unknown-entry", "the entry is unknown (null); give it a value".into())),
+            Entry::Parameter(name) => {
+                let found = self.model.parameters.iter().find(|(known, _)| known == name);
+                found.map(|(_, value)| *value).ok_or_else(|| ("automaton.unknown-parameter", format!("parameter '{name}' does not exist")))
+            }
+        }
+    }
+
+    fn roots(&self, draft: &mut Draft) {
+        for (index, cell) in self.model.cells.iter().enumerate() {
+            let place = format!("/cells/{index}");
+            let Some(state) = self.model.index_of(&cell.state) else {
+                draft.error(&format!("{place}/state"), "automaton.unknown-state", format!("state '{}' does not exist", cell.state));
+                continue;
+            };
+            let (found, wanted) = (cell.control_points.len(), self.model.states[state].dimension);
+            if found != wanted {
+                let message = format!("{found} control points, and state '{}' has {wanted}", cell.state);
+                draft.error(&format!("{place}/control_points"), "automaton.dimension-mismatch", message);
+                continue;
+            }
+            for (k, point) in cell.control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || point.w <= 0.0) {
+                let message = format!("control point {k} is {point}: coordinates must be finite and the weight positive");
+                draft.error(&format!("{place}/control_points/{k}"), "model.not-finite", message);
+            }
+            let rational = cell.control_points.iter().any(|point| point.w != cell.control_points[0].w);
+            let homogeneous = |p: &glam::DVec4| {
+                let w = if rational { p.w } else { 1.0 };
+                [w * p.x, w * p.y, w * p.z, w]
+            };
+            let points = cell.control_points.iter().map(homogeneous).collect();
+            draft.roots.push(Root { state: StateId::new(self.offset + state), points, rational, solid: None });
+        }
+    }
+
+    /// Checks the stated incidences and adjacencies; the residual is the largest difference of entries.
+    fn constraints(&self, states: &[State], draft: &mut Draft) {
+        for (index, incidence) in self.model.incidences.iter().enumerate() {
+            let place = format!("/incidences/{index}");
+            let sides = self.incidence(incidence, states);
+            self.judge(draft, &place, "automaton.incidence-mismatch", sides);
+        }
+        for (index, adjacency) in self.model.adjacencies.iter().enumerate() {
+            let place = format!("/adjacencies/{index}");
+            let sides = self.adjacency(adjacency, states);
+            self.judge(draft, &place, "automaton.adjacency-mismatch", sides);
+        }
+    }
+
+    fn judge(&self, draft: &mut Draft, place: &str, code: &'static str, sides: Result<Vec<(String, Columns, Columns)>, String>) {
+        match sides {
+            Err(message) => draft.error(place, code, message),
+            Ok(sides) => {
+                for (paths, left, right) in sides {
+                    if left.len() != right.len() || left.iter().zip(&right).any(|(a, b)| a.len() != b.len()) {
+                        draft.error(place, code, format!("{paths}: the two sides have different sizes"));
+                        continue;
+                    }
+                    let residual = left.iter().flatten().zip(right.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    draft.constraint_residual = draft.constraint_residual.max(residual);
+                    if residual > RESIDUAL_ALLOWED {
+                        draft.error(place, code, format!("{paths} differ by {residual:.3e}, and may differ by {RESIDUAL_ALLOWED:.0e}"));
+                    }
+                }
+            }
+        }
+    }
+
+    fn local<'s>(&self, states: &'s [State], id: StateId) -> &'s State {
+        &states[id.index() - self.offset]
+    }
+
+    fn child_boundary(&self, states: &[State], state: &State, (child, boundary): (usize, usize)) -> Result<(Columns, StateId), String> {
+        let transition = state.transitions.get(child).ok_or_else(|| format!("state '{}' has no child {child}", state.name))?;
+        let target = self.local(states, transition.to);
+        let missing = || format!("state '{}' has no boundary {boundary}", target.name);
+        let inner = target.boundaries.get(boundary).ok_or_else(missing)?;
+        let columns = (0..inner.incidence.columns()).map(|j| transition.operator.apply(inner.incidence.column(j))).collect();
+        Ok((columns, inner.state))
+    }
+
+    fn find<'s>(&self, states: &'s [State], name: &str) -> Result<&'s State, String> {
+        self.model.index_of(name).map(|index| &states[index]).ok_or_else(|| format!("state '{name}' does not exist"))
+    }
+
+    /// b_k T^bd_j = T_i b_m for every j, (i, m) = children[j].
+    fn incidence(&self, incidence: &Incidence, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
+        let state = self.find(states, &incidence.state)?;
+        let missing = || format!("state '{}' has no boundary {}", state.name, incidence.boundary);
+        let boundary = state.boundaries.get(incidence.boundary).ok_or_else(missing)?;
+        let edge = self.local(states, boundary.state);
+        if edge.transitions.len() != incidence.children.len() {
+            return Err(format!(
+                "{} children are listed, and state '{}' has {}",
+                incidence.children.len(),
+                edge.name,
+                edge.transitions.len()
+            ));
+        }
+        let mut sides = Vec::new();
+        for (j, (transition, &(i, m))) in edge.transitions.iter().zip(&incidence.children).enumerate() {
+            let left = (0..transition.operator.columns()).map(|c| boundary.incidence.apply(transition.operator.column(c))).collect();
+            let (right, inner) = self.child_boundary(states, state, (i, m))?;
+            if inner != transition.to {
+                return Err(format!("child {j} of boundary {} and boundary {m} of child {i} are of different states", incidence.boundary));
+            }
+            let paths = format!("child {j} of boundary {} and boundary {m} of child {i} of state '{}'", incidence.boundary, state.name);
+            sides.push((paths, left, right));
+        }
+        Ok(sides)
+    }
+
+    /// T_i b_m = T_j b_m2, the second side's control points in reverse order when `reversed`.
+    fn adjacency(&self, adjacency: &Adjacency, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
+        let state = self.find(states, &adjacency.state)?;
+        let [first, second] = adjacency.between;
+        let (left, left_state) = self.child_boundary(states, state, first)?;
+        let (mut right, right_state) = self.child_boundary(states, state, second)?;
+        if left_state != right_state {
+            return Err(format!(
+                "boundary {} of child {} and boundary {} of child {} are of different states",
+                first.1, first.0, second.1, second.0
+            ));
+        }
+        if adjacency.reversed {
+            right.reverse();
+        }
+        let paths =
+            format!("boundary {} of child {} and boundary {} of child {} of state '{}'", first.1, first.0, second.1, second.0, state.name);
+        Ok(vec![(paths, left, right)])
+    }
+}
+
+/// The columns of a product of operators.
+type Columns = Vec<Vec<f64>>;

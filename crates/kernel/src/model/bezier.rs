@@ -1,5 +1,9 @@
 //! Bezier curves.
 
+use super::CellKind;
+use super::lower::Draft;
+use crate::attractor::Root;
+use crate::automaton::{Ends, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
 use glam::DVec3;
 
 /// A polynomial or rational Bezier curve of degree n - 1, n control points.
@@ -9,4 +13,86 @@ pub struct BezierCurve {
     pub control_points: Vec<DVec3>,
     /// Positive weights, one per control point; polynomial when absent.
     pub weights: Option<Vec<f64>>,
+}
+
+/// Control points allowed: beyond it the binomials of the midpoint operators lose digits.
+const MOST_POINTS: usize = 64;
+
+impl BezierCurve {
+    pub(super) fn lower(&self, draft: &mut Draft) {
+        let count = self.control_points.len();
+        if count == 0 || count > MOST_POINTS {
+            return draft.error("/control_points", "bezier.degree", format!("{count} control points: 1 to {MOST_POINTS} are possible"));
+        }
+        for (index, point) in self.control_points.iter().enumerate().filter(|(_, point)| !point.is_finite()) {
+            draft.error(
+                &format!("/control_points/{index}"),
+                "model.not-finite",
+                format!("control point {index} is {point}, and must be finite"),
+            );
+        }
+        let weights = self.weights.clone().unwrap_or_else(|| vec![1.0; count]);
+        if weights.len() != count {
+            draft.error("/weights", "bezier.weights", format!("{} weights for {count} control points", weights.len()));
+        }
+        for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| !(weight.is_finite() && **weight > 0.0)) {
+            draft.error(
+                &format!("/weights/{index}"),
+                "bezier.weights",
+                format!("weight {index} is {weight}, and must be positive and finite"),
+            );
+        }
+        let rational = weights.iter().any(|&weight| weight != weights[0]);
+        let points = self
+            .control_points
+            .iter()
+            .zip(&weights)
+            .map(|(point, &weight)| {
+                let w = if rational { weight } else { 1.0 };
+                [w * point.x, w * point.y, w * point.z, w]
+            })
+            .collect();
+        let state = draft.state(bezier_state(count, StateId::new(draft.states.len())));
+        draft.roots.push(Root { state, points, rational, solid: None });
+    }
+}
+
+/// The state of a Bezier curve with n control points: de Casteljau's two halves. One point is a point, two
+/// are a segment.
+fn bezier_state(n: usize, own: StateId) -> State {
+    let unit = |at: usize| {
+        let mut point = vec![0.0; n];
+        point[at] = 1.0;
+        point
+    };
+    let leaf = if n <= 2 { LeafPrimitive::Simplex } else { LeafPrimitive::Chord(Ends { start: unit(0), end: unit(n - 1) }) };
+    let subdivide = || halves(n).into_iter().enumerate().map(|(label, operator)| Transition { to: own, operator, label }).collect();
+    State {
+        name: format!("bezier curve of degree {}", n - 1),
+        kind: Some(if n == 1 { CellKind::Vertex } else { CellKind::Edge }),
+        dimension: n,
+        transitions: if n <= 2 { Vec::new() } else { subdivide() },
+        boundaries: Vec::new(),
+        leaf,
+        frame: false,
+    }
+}
+
+/// De Casteljau at 1/2: column j of the left half holds binomial(j, k) / 2^j, the right half mirrors it.
+pub(super) fn halves(n: usize) -> [SubdivisionOperator; 2] {
+    let mut left = vec![0.0; n * n];
+    for j in 0..n {
+        let mut value = 0.5_f64.powi(j as i32);
+        for k in 0..=j {
+            left[j * n + k] = value;
+            value *= (j - k) as f64 / (k + 1) as f64;
+        }
+    }
+    let mut right = vec![0.0; n * n];
+    for j in 0..n {
+        for k in 0..n {
+            right[j * n + k] = left[(n - 1 - j) * n + (n - 1 - k)];
+        }
+    }
+    [SubdivisionOperator::exact(n, left), SubdivisionOperator::exact(n, right)]
 }

@@ -1,6 +1,11 @@
 //! Polygon meshes as shapes.
 
+use super::CellKind;
+use super::lower::Draft;
+use crate::attractor::{Root, SolidSurface};
+use crate::automaton::{LeafPrimitive, State, StateId};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// Whether a mesh stands for its surface or for the solid it bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -24,4 +29,191 @@ pub struct PolygonMesh {
     pub faces: Vec<Vec<u32>>,
     /// Surface or solid.
     pub interior: Interior,
+}
+
+/// Faces by number of corners, polygons fanned into triangles.
+#[derive(Default)]
+pub(super) struct Elements {
+    pub(super) points: Vec<u32>,
+    pub(super) segments: Vec<[u32; 2]>,
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
+/// Findings of one kind are listed up to this number.
+const MOST_FINDINGS: usize = 20;
+
+/// Sorts faces by kind and fans polygons from their first corner. `None` after an error.
+pub(super) fn elements(vertices: &[DVec3], faces: &[Vec<u32>], draft: &mut Draft) -> Option<Elements> {
+    let mut elements = Elements::default();
+    let mut errors = 0;
+    for (index, face) in faces.iter().enumerate() {
+        let fault = face_fault(vertices, face);
+        if let Some((code, message)) = fault {
+            errors += 1;
+            if errors <= MOST_FINDINGS {
+                draft.error(&format!("/faces/{index}"), code, format!("face {index}: {message}"));
+            }
+            continue;
+        }
+        match face.as_slice() {
+            [point] => elements.points.push(*point),
+            [start, end] => elements.segments.push([*start, *end]),
+            corners => elements.triangles.extend((1..corners.len() - 1).map(|k| [corners[0], corners[k], corners[k + 1]])),
+        }
+    }
+    (errors == 0).then_some(elements)
+}
+
+fn face_fault(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, String)> {
+    if face.is_empty() {
+        return Some(("mesh.face-empty", "it has no corner, and needs at least one".into()));
+    }
+    if let Some(&corner) = face.iter().find(|&&corner| corner as usize >= vertices.len()) {
+        return Some(("mesh.index", format!("vertex {corner} does not exist: there are {}", vertices.len())));
+    }
+    if let Some(&corner) = face.iter().find(|&&corner| !vertices[corner as usize].is_finite()) {
+        return Some(("model.not-finite", format!("vertex {corner} is not finite")));
+    }
+    let mut sorted = face.to_vec();
+    sorted.sort_unstable();
+    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Some(("mesh.repeated-vertex", format!("vertex {} occurs twice", pair[0])));
+    }
+    if face.len() > 3 {
+        // A fan is the polygon when no triangle of it turns against the whole.
+        let corner = |k: usize| vertices[face[k] as usize];
+        let turns: Vec<DVec3> = (1..face.len() - 1).map(|k| (corner(k) - corner(0)).cross(corner(k + 1) - corner(0))).collect();
+        let whole: DVec3 = turns.iter().copied().sum();
+        if turns.iter().any(|turn| turn.dot(whole) < -1e-12 * whole.length_squared()) {
+            return Some(("mesh.concave-face", "it is not star-shaped from its first corner; split it into convex faces".into()));
+        }
+    }
+    None
+}
+
+impl PolygonMesh {
+    pub(super) fn lower(&self, draft: &mut Draft) {
+        if self.faces.is_empty() {
+            return draft.error(
+                "/faces",
+                "automaton.empty",
+                "the mesh has no face; a face may have one corner (a point), two (a segment) or more".into(),
+            );
+        }
+        let Some(elements) = elements(&self.vertices, &self.faces, draft) else { return };
+        let corner = |index: u32| {
+            let p = self.vertices[index as usize];
+            [p.x, p.y, p.z, 1.0]
+        };
+        let mut simplices = |corners: usize, lists: &mut dyn Iterator<Item = Vec<u32>>, solid: Option<u32>| {
+            let mut state = None;
+            for list in lists {
+                let state = *state.get_or_insert_with(|| simplex(draft, corners));
+                draft.roots.push(Root { state, points: list.iter().map(|&index| corner(index)).collect(), rational: false, solid });
+            }
+        };
+        simplices(1, &mut elements.points.iter().map(|&a| vec![a]), None);
+        simplices(2, &mut elements.segments.iter().map(|ends| ends.to_vec()), None);
+        let first_root = draft.roots.len();
+        let Some(solid) = self.solid(&elements, draft) else { return };
+        let index = solid.then_some(draft.solids.len() as u32);
+        let state = simplex(draft, 3);
+        draft.roots.extend(elements.triangles.iter().map(|corners| Root {
+            state,
+            points: corners.iter().map(|&index| corner(index)).collect(),
+            rational: false,
+            solid: index,
+        }));
+        if solid {
+            let surface = SolidSurface { first_root, triangles: elements.triangles, normals: Vec::new() };
+            let surface = with_normals(surface, &draft.roots);
+            draft.solids.push(surface);
+        }
+    }
+
+    /// Whether the triangles stand for the solid they bound; `None` after an error.
+    fn solid(&self, elements: &Elements, draft: &mut Draft) -> Option<bool> {
+        if self.interior == Interior::Surface || elements.triangles.is_empty() {
+            return Some(false);
+        }
+        let fault = closed_fault(&elements.triangles).or_else(|| {
+            let corner = |index: u32| self.vertices[index as usize];
+            let origin = corner(elements.triangles[0][0]);
+            let six = |t: &[u32; 3]| (corner(t[0]) - origin).dot((corner(t[1]) - origin).cross(corner(t[2]) - origin));
+            let volume = elements.triangles.iter().map(six).sum::<f64>() / 6.0;
+            (volume <= 0.0).then(|| format!("its faces look inwards (signed volume {volume} mm3); reverse them"))
+        });
+        match (fault, self.interior) {
+            (None, _) => Some(true),
+            (Some(fault), Interior::Solid) => {
+                draft.error("/interior", "mesh.not-closed", format!("the mesh does not bound a solid: {fault}"));
+                None
+            }
+            (Some(_), _) => Some(false),
+        }
+    }
+}
+
+/// Why triangles are no closed, oriented surface, naming the edge.
+fn closed_fault(triangles: &[[u32; 3]]) -> Option<String> {
+    let mut edges: Vec<(u32, u32)> = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
+    edges.sort_unstable();
+    if let Some(pair) = edges.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Some(format!("two faces run along the edge {} - {} in the same direction", pair[0].0, pair[0].1));
+    }
+    let open = edges.iter().find(|&&(a, b)| edges.binary_search(&(b, a)).is_err());
+    open.map(|&(a, b)| format!("the edge {a} - {b} has one face only"))
+}
+
+fn simplex(draft: &mut Draft, corners: usize) -> StateId {
+    let (name, kind) = match corners {
+        1 => ("point", CellKind::Vertex),
+        2 => ("segment", CellKind::Edge),
+        _ => ("triangle", CellKind::Face),
+    };
+    draft.state(State {
+        name: name.into(),
+        kind: Some(kind),
+        dimension: corners,
+        transitions: Vec::new(),
+        boundaries: Vec::new(),
+        leaf: LeafPrimitive::Simplex,
+        frame: false,
+    })
+}
+
+/// Computes the pseudo-normals from the corners that the roots hold.
+pub(super) fn with_normals(mut surface: SolidSurface, roots: &[Root]) -> SolidSurface {
+    let corners: Vec<[DVec3; 3]> = roots[surface.first_root..surface.first_root + surface.triangles.len()]
+        .iter()
+        .map(|root| std::array::from_fn(|k| DVec3::new(root.points[k][0], root.points[k][1], root.points[k][2])))
+        .collect();
+    let count = surface.triangles.iter().flatten().max().map_or(0, |&index| index as usize + 1);
+    let mut at_corner = vec![DVec3::ZERO; count];
+    let mut at_side: BTreeMap<(u32, u32), DVec3> = BTreeMap::new();
+    let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
+    for (triangle, points) in surface.triangles.iter().zip(&corners) {
+        let face = normal(points);
+        for k in 0..3 {
+            let (here, next, last) = (points[k], points[(k + 1) % 3], points[(k + 2) % 3]);
+            let angle = (next - here).angle_between(last - here);
+            at_corner[triangle[k] as usize] += if angle.is_finite() { angle * face } else { DVec3::ZERO };
+            let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+            *at_side.entry((a.min(b), a.max(b))).or_insert(DVec3::ZERO) += face;
+        }
+    }
+    surface.normals = surface
+        .triangles
+        .iter()
+        .zip(&corners)
+        .map(|(triangle, points)| {
+            let side = |k: usize| {
+                let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+                at_side[&(a.min(b), a.max(b))]
+            };
+            let at = |k: usize| at_corner[triangle[k] as usize];
+            [normal(points), side(0), side(1), side(2), at(0), at(1), at(2)]
+        })
+        .collect();
+    surface
 }

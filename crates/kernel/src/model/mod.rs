@@ -6,6 +6,7 @@ mod bezier;
 mod corner_cutting;
 mod group;
 mod ifs;
+mod lower;
 mod mesh;
 
 pub use bcifs::{Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec};
@@ -13,6 +14,7 @@ pub use bezier::BezierCurve;
 pub use corner_cutting::CornerCutting;
 pub use group::{Group, Part};
 pub use ifs::{AffineMap, Ifs, Primitive};
+pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
 
 /// A model: a name and a shape in mm.

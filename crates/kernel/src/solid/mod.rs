@@ -1,6 +1,11 @@
 //! Indexed triangle meshes and proven solids.
 
+mod topology;
+
+use crate::budget::{Budget, Stopped};
+use crate::measure::mass::volume;
 use glam::DVec3;
+pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -11,45 +16,63 @@ pub struct TriMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Counts of a triangle mesh's topology.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Topology {
-    /// Vertices that triangles use.
-    pub vertices: u64,
-    /// Edges.
-    pub edges: u64,
-    /// Triangles.
-    pub triangles: u64,
-    /// Connected surfaces.
-    pub shells: u64,
-    /// Shells that face inwards: sealed voids.
-    pub cavities: u64,
-    /// Connected pieces of material: shells that face outwards.
-    pub components: u64,
-    /// Sum of the shells' genera: shells - euler / 2.
-    pub genus: i64,
-    /// vertices - edges + triangles.
-    pub euler: i64,
-    /// Edges with one triangle.
-    pub boundary_edges: u64,
-    /// Edges with three triangles or more.
-    pub nonmanifold_edges: u64,
-    /// Vertices whose triangles form several fans.
-    pub nonmanifold_vertices: u64,
-    /// Pairs of triangles that run along their edge in the same direction.
-    pub flipped_pairs: u64,
-    /// Triangles with a repeated or coincident corner, or no area.
-    pub degenerate_triangles: u64,
-}
-
-/// A closed, oriented 2-manifold triangle mesh with outward normals.
+/// A closed, oriented 2-manifold triangle mesh with outward normals, in mm.
+///
+/// Invariant, proven by [`Solid::new`]: every directed edge has exactly one opposite, the triangles around
+/// every vertex form one fan, no triangle has a repeated corner, and the enclosed volume is positive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
     mesh: TriMesh,
     topology: Topology,
 }
 
+/// Why a mesh is no solid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolidError {
+    /// There is no triangle.
+    #[error("the mesh has no triangle")]
+    Empty,
+    /// A corner names no vertex.
+    #[error("triangle {triangle} names vertex {vertex}, and there are {vertices}")]
+    Index {
+        /// The triangle.
+        triangle: usize,
+        /// The missing vertex.
+        vertex: u32,
+        /// How many there are.
+        vertices: usize,
+    },
+    /// Some edge or vertex is not manifold.
+    #[error("{} open, {} non-manifold edges, {} flipped pairs, {} non-manifold vertices, {} degenerate triangles", .0.boundary_edges, .0.nonmanifold_edges, .0.flipped_pairs, .0.nonmanifold_vertices, .0.degenerate_triangles)]
+    NotManifold(Box<Topology>),
+    /// The mesh encloses no positive volume.
+    #[error("the mesh encloses {0} mm3: its triangles look inwards")]
+    Inward(f64),
+    /// Somebody stopped the check.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
 impl Solid {
+    /// Proves that the mesh is a solid. Cost: linear.
+    ///
+    /// # Errors
+    /// [`SolidError`] with the counts that were found.
+    pub fn new(mesh: TriMesh, budget: &Budget) -> Result<Self, SolidError> {
+        if mesh.triangles.is_empty() {
+            return Err(SolidError::Empty);
+        }
+        let topology = Topology::of(&mesh, budget)?;
+        if !topology.is_closed_manifold() {
+            return Err(SolidError::NotManifold(Box::new(topology)));
+        }
+        let volume = volume(&mesh);
+        if volume <= 0.0 {
+            return Err(SolidError::Inward(volume));
+        }
+        Ok(Self { mesh, topology })
+    }
+
     /// The mesh; it cannot be changed.
     #[must_use]
     pub fn mesh(&self) -> &TriMesh {

@@ -1,0 +1,334 @@
+//! Cells: instances of states. Their control points, their bounding ball, and what stands for them
+//! when they are small enough.
+
+use super::{Attractor, Root, StateBound};
+use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator};
+
+/// A point or vector of space in mm.
+pub type Point = [f64; 3];
+/// A homogeneous control point (w x, w y, w z, w).
+pub type ControlPoint = [f64; 4];
+
+/// A ball that contains a cell and everything drawn for its descendants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre in mm.
+    pub centre: Point,
+    /// Its radius in mm.
+    pub radius: f64,
+}
+
+impl Ball {
+    pub(super) fn is_finite(&self) -> bool {
+        self.radius.is_finite() && self.centre.iter().all(|x| x.is_finite())
+    }
+}
+
+/// Whether cells stand for a set to dilate (any set near the cell will do) or are to be drawn as the
+/// model says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Sites of a dilation: the fewest cells for the error.
+    Sites,
+    /// An evaluation: the model's own primitives.
+    Drawing,
+}
+
+/// What stands for a leaf cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Site {
+    /// A point.
+    Point(Point),
+    /// A segment.
+    Segment([Point; 2]),
+    /// A triangle.
+    Triangle([Point; 3]),
+}
+
+/// A bounded cell. `stretch` is, for frames, a bound of the norm of the root's frame times the product
+/// of the ratios on the way: with the state's radius it bounds the cell again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Its kind.
+    pub state: StateId,
+    /// The root that it descends from.
+    pub root: u32,
+    /// Where it is.
+    pub ball: Ball,
+    /// See above.
+    pub stretch: f64,
+}
+
+/// The bounded cell of a root.
+pub(super) struct RootCell {
+    pub(super) ball: Ball,
+}
+
+impl RootCell {
+    pub(super) fn new(attractor: &Attractor, root: &Root) -> Self {
+        Self { ball: attractor.root_cell_of(root, 0).ball }
+    }
+}
+
+#[inline]
+fn project(point: &ControlPoint, rational: bool) -> Point {
+    if rational {
+        let inverse = 1.0 / point[3];
+        [point[0] * inverse, point[1] * inverse, point[2] * inverse]
+    } else {
+        [point[0], point[1], point[2]]
+    }
+}
+
+#[inline]
+pub(crate) fn subtract(a: &Point, b: &Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline]
+pub(crate) fn dot(a: &Point, b: &Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline]
+pub(crate) fn distance_squared(a: &Point, b: &Point) -> f64 {
+    let difference = subtract(a, b);
+    dot(&difference, &difference)
+}
+
+/// The point of segment ab closest to x.
+#[inline]
+pub(crate) fn closest_on_segment(x: &Point, a: &Point, b: &Point) -> Point {
+    let direction = subtract(b, a);
+    let length = dot(&direction, &direction);
+    let along = if length > 0.0 { (dot(&subtract(x, a), &direction) / length).clamp(0.0, 1.0) } else { 0.0 };
+    [a[0] + along * direction[0], a[1] + along * direction[1], a[2] + along * direction[2]]
+}
+
+#[inline]
+fn combine<const N: usize, const M: usize>(parent: &[ControlPoint], entries: &[f64], child: &mut [ControlPoint]) {
+    let parent: &[ControlPoint; N] = parent.try_into().expect("the parent has the operator's rows");
+    for (column, point) in child.iter_mut().take(M).enumerate() {
+        let weights: &[f64; N] = entries[column * N..column * N + N].try_into().expect("one weight per row");
+        let mut sum = [0.0; 4];
+        for (source, &weight) in parent.iter().zip(weights) {
+            for (total, &coordinate) in sum.iter_mut().zip(source) {
+                *total += weight * coordinate;
+            }
+        }
+        *point = sum;
+    }
+}
+
+/// The child's control points P T. Unrolled for the common sizes.
+#[inline]
+pub(crate) fn child_points(parent: &[ControlPoint], operator: &SubdivisionOperator, child: &mut [ControlPoint]) {
+    let entries = operator.entries();
+    match (operator.rows(), operator.columns()) {
+        (2, 2) => combine::<2, 2>(parent, entries, child),
+        (3, 3) => combine::<3, 3>(parent, entries, child),
+        (4, 4) => combine::<4, 4>(parent, entries, child),
+        (9, 9) => combine::<9, 9>(parent, entries, child),
+        (16, 16) => combine::<16, 16>(parent, entries, child),
+        (rows, columns) => {
+            for (column, point) in child.iter_mut().take(columns).enumerate() {
+                let mut sum = [0.0; 4];
+                for (source, &weight) in parent.iter().zip(&entries[column * rows..(column + 1) * rows]) {
+                    for (total, &coordinate) in sum.iter_mut().zip(source) {
+                        *total += weight * coordinate;
+                    }
+                }
+                *point = sum;
+            }
+        }
+    }
+}
+
+/// A bound of the spectral norm of the 3 x 3 matrix with these columns: the square root of the largest
+/// absolute row sum of A A^T (exact for similarities) or of its Frobenius norm, whichever is less.
+#[inline]
+fn matrix_norm(columns: &[Point; 3]) -> f64 {
+    let entry = |i: usize, j: usize| columns[0][i] * columns[0][j] + columns[1][i] * columns[1][j] + columns[2][i] * columns[2][j];
+    let (xx, yy, zz) = (entry(0, 0), entry(1, 1), entry(2, 2));
+    let (xy, xz, yz) = (entry(0, 1), entry(0, 2), entry(1, 2));
+    let rows = (xx + xy.abs() + xz.abs()).max(yy + xy.abs() + yz.abs()).max(zz + xz.abs() + yz.abs());
+    let frobenius = (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)).sqrt();
+    rows.min(frobenius).sqrt()
+}
+
+#[inline]
+fn frame_columns(points: &[ControlPoint]) -> [Point; 3] {
+    let column = |j: usize| [points[j][0] - points[0][0], points[j][1] - points[0][1], points[j][2] - points[0][2]];
+    [column(1), column(2), column(3)]
+}
+
+#[inline]
+fn times(columns: &[Point; 3], x: &Point) -> Point {
+    let row = |i: usize| columns[0][i] * x[0] + columns[1][i] * x[1] + columns[2][i] * x[2];
+    [row(0), row(1), row(2)]
+}
+
+impl Attractor {
+    /// The bounded cell of root `index`.
+    #[must_use]
+    pub fn root_cell(&self, index: usize) -> Cell {
+        self.root_cell_of(&self.roots()[index], u32::try_from(index).expect("fewer than 2^32 roots"))
+    }
+
+    fn root_cell_of(&self, root: &Root, index: u32) -> Cell {
+        let stretch = match self.bound(root.state) {
+            StateBound::Frame { reach, radius, .. } => {
+                let columns = frame_columns(&root.points);
+                let unit = |j: usize| times(&columns, &reach[j]).map(|x| if *radius > 0.0 { x / radius } else { 0.0 });
+                matrix_norm(&[unit(0), unit(1), unit(2)])
+            }
+            StateBound::Hull { .. } => 0.0,
+        };
+        let ball = self.ball(root.state, &root.points, root.rational, stretch);
+        Cell { state: root.state, root: index, ball, stretch }
+    }
+
+    /// The child of `cell` through transition `index`, whose control points are `points`.
+    #[inline]
+    pub(crate) fn child_cell(&self, cell: &Cell, index: usize, points: &[ControlPoint]) -> Cell {
+        let state = self.automaton().state(cell.state).transitions[index].to;
+        let stretch = match self.bound(cell.state) {
+            StateBound::Frame { ratios, .. } => cell.stretch * ratios[index],
+            StateBound::Hull { .. } => 0.0,
+        };
+        let ball = self.ball(state, points, self.roots()[cell.root as usize].rational, stretch);
+        Cell { state, root: cell.root, ball, stretch }
+    }
+
+    /// The bounding ball of a cell; see `StateBound` for the proof.
+    #[inline]
+    fn ball(&self, state: StateId, points: &[ControlPoint], rational: bool, stretch: f64) -> Ball {
+        match self.bound(state) {
+            StateBound::Frame { centre, reach, radius, similar, .. } => {
+                let columns = frame_columns(points);
+                let offset = times(&columns, centre);
+                let centre = [points[0][0] + offset[0], points[0][1] + offset[1], points[0][2] + offset[2]];
+                let product = stretch * radius;
+                if *similar {
+                    return Ball { centre, radius: product };
+                }
+                let image = [times(&columns, &reach[0]), times(&columns, &reach[1]), times(&columns, &reach[2])];
+                Ball { centre, radius: product.min(matrix_norm(&image)) }
+            }
+            StateBound::Hull { centre: weights, margin } => {
+                let mut sum = [0.0; 4];
+                for (point, &weight) in points.iter().zip(weights) {
+                    for (total, &coordinate) in sum.iter_mut().zip(point) {
+                        *total += weight * coordinate;
+                    }
+                }
+                let centre = project(&sum, rational);
+                let farthest = points.iter().map(|point| distance_squared(&project(point, rational), &centre)).fold(0.0, f64::max).sqrt();
+                // A signed centre may lie outside the hull, but the hull is within `farthest` of it anyway.
+                let radius = if *margin > 0.0 { farthest + margin * diameter_bound(points) } else { farthest };
+                Ball { centre, radius }
+            }
+        }
+    }
+
+    /// The error of replacing the cell by what stands for it, in mm: a bound of their Hausdorff distance.
+    #[inline]
+    pub(crate) fn leaf_error(&self, cell: &Cell, points: &[ControlPoint], purpose: Purpose) -> f64 {
+        let rational = self.roots()[cell.root as usize].rational;
+        match &self.automaton().state(cell.state).leaf {
+            LeafPrimitive::Centre => cell.ball.radius,
+            LeafPrimitive::Simplex => 0.0,
+            LeafPrimitive::Chord(ends) => {
+                // The curve lies within `off` of the chord because its hull does, the distance to a segment being
+                // convex; the projection of a connected set that contains both ends covers the chord, so every point
+                // of the chord has a point of the curve as near.
+                let (start, end) = (self.barycentric(points, &ends.start, rational), self.barycentric(points, &ends.end, rational));
+                let off = |point: &ControlPoint| {
+                    let x = project(point, rational);
+                    distance_squared(&x, &closest_on_segment(&x, &start, &end))
+                };
+                let chord = points.iter().map(off).fold(0.0, f64::max).sqrt();
+                let margin = self.bound(cell.state).margin();
+                if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord }
+            }
+            LeafPrimitive::Polygon(_) if purpose == Purpose::Sites => cell.ball.radius,
+            // Corners belong to the surface and every point of the polygon and of the cell is within the ball:
+            // no two points of them are farther apart than its diameter.
+            LeafPrimitive::Polygon(_) => 2.0 * cell.ball.radius,
+            LeafPrimitive::Drawn(drawing) => {
+                let drawn = matrix_norm(&frame_columns(points)) * drawing.defect;
+                if purpose == Purpose::Sites { drawn.min(cell.ball.radius) } else { drawn }
+            }
+        }
+    }
+
+    /// Emits what stands for a leaf cell.
+    #[inline]
+    pub(crate) fn emit(&self, cell: &Cell, points: &[ControlPoint], purpose: Purpose, sink: &mut impl FnMut(Site)) {
+        let rational = self.roots()[cell.root as usize].rational;
+        let corner = |j: usize| project(&points[j], rational);
+        match &self.automaton().state(cell.state).leaf {
+            LeafPrimitive::Centre => sink(Site::Point(cell.ball.centre)),
+            LeafPrimitive::Simplex => match points.len() {
+                1 => sink(Site::Point(corner(0))),
+                2 => sink(Site::Segment([corner(0), corner(1)])),
+                _ => sink(Site::Triangle([corner(0), corner(1), corner(2)])),
+            },
+            LeafPrimitive::Chord(ends) => {
+                sink(Site::Segment([self.barycentric(points, &ends.start, rational), self.barycentric(points, &ends.end, rational)]));
+            }
+            LeafPrimitive::Polygon(_) if purpose == Purpose::Sites => sink(Site::Point(cell.ball.centre)),
+            LeafPrimitive::Polygon(corners) => {
+                let first = self.barycentric(points, &corners[0], rational);
+                for pair in corners[1..].windows(2) {
+                    sink(Site::Triangle([
+                        first,
+                        self.barycentric(points, &pair[0], rational),
+                        self.barycentric(points, &pair[1], rational),
+                    ]));
+                }
+            }
+            LeafPrimitive::Drawn(drawing) => {
+                let columns = frame_columns(points);
+                if purpose == Purpose::Sites && cell.ball.radius < matrix_norm(&columns) * drawing.defect {
+                    return sink(Site::Point(cell.ball.centre));
+                }
+                let place = |index: u32| {
+                    let offset = times(&columns, &drawing.vertices[index as usize]);
+                    [points[0][0] + offset[0], points[0][1] + offset[1], points[0][2] + offset[2]]
+                };
+                drawing.points.iter().for_each(|&a| sink(Site::Point(place(a))));
+                drawing.segments.iter().for_each(|&[a, b]| sink(Site::Segment([place(a), place(b)])));
+                drawing.triangles.iter().for_each(|&[a, b, c]| sink(Site::Triangle([place(a), place(b), place(c)])));
+            }
+        }
+    }
+
+    fn barycentric(&self, points: &[ControlPoint], weights: &[f64], rational: bool) -> Point {
+        let mut sum = [0.0; 4];
+        for (point, &weight) in points.iter().zip(weights) {
+            for (total, &coordinate) in sum.iter_mut().zip(point) {
+                *total += weight * coordinate;
+            }
+        }
+        project(&sum, rational)
+    }
+
+    /// The cell's kind.
+    #[inline]
+    pub(crate) fn state_of(&self, cell: &Cell) -> &State {
+        self.automaton().state(cell.state)
+    }
+}
+
+/// The diagonal of the box of polynomial control points: at least their diameter.
+fn diameter_bound(points: &[ControlPoint]) -> f64 {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for point in points {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point[axis]);
+            high[axis] = high[axis].max(point[axis]);
+        }
+    }
+    distance_squared(&low, &high).sqrt()
+}

@@ -1,0 +1,220 @@
+//! The limit set of an automaton and control points: bounded once per state, so that every cell is
+//! bounded by a few multiplications, whatever the signs of its operators.
+
+mod bound;
+pub mod cell;
+mod defect;
+mod refine;
+
+use crate::automaton::{Automaton, AutomatonError, Contraction, StateId, convergence};
+use crate::error::Kind;
+pub use bound::StateBound;
+pub use refine::{RefineError, count_cells, refine};
+
+/// Where a shape begins: a state and its control points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Root {
+    /// Its state.
+    pub state: StateId,
+    /// Homogeneous control points (w x, w y, w z, w); w = 1 unless `rational`.
+    pub points: Vec<[f64; 4]>,
+    /// Whether points are projected (divided by w) when emitted.
+    pub rational: bool,
+    /// The solid whose surface the cell belongs to, as an index into [`Attractor::solids`].
+    pub solid: Option<u32>,
+}
+
+/// A closed, outward triangle surface that stands for the solid it bounds. Its triangles are
+/// consecutive roots.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct SolidSurface {
+    /// Index of the root of its first triangle.
+    pub first_root: usize,
+    /// Corner indices of the triangles: which of them are neighbours.
+    pub triangles: Vec<[u32; 3]>,
+    /// Outward pseudo-normals of every triangle: the face's, the edges' (opposite to corner 0, 1, 2: the
+    /// sum of the two faces'), the corners' (angle-weighted sums). The sign of the offset from the
+    /// closest point along its pseudo-normal tells inside from outside (Baerentzen and Aanaes, "Signed
+    /// distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005).
+    pub normals: Vec<[glam::DVec3; 7]>,
+}
+
+/// The limit set of an automaton and control points. Owns bounds, never points.
+///
+/// Invariant: the automaton converges (its joint spectral radius is below 1), and every state that a
+/// root reaches is bounded.
+#[derive(Clone, Debug)]
+pub struct Attractor {
+    automaton: Automaton,
+    roots: Vec<Root>,
+    solids: Vec<SolidSurface>,
+    bounds: Vec<StateBound>,
+    contraction: Contraction,
+    warnings: Vec<String>,
+}
+
+/// Why an automaton has no attractor that can be evaluated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AttractorError {
+    /// The states do not fit together.
+    #[error(transparent)]
+    Automaton(#[from] AutomatonError),
+    /// A cycle does not contract.
+    #[error(
+        "the maps do not contract: along the cycle {cycle} from state '{state}' lengths are multiplied by {rate:.6} at each step, and must shrink"
+    )]
+    NotContractive {
+        /// First state of the cycle.
+        state: String,
+        /// Indices of the transitions, joined by blanks.
+        cycle: String,
+        /// Spectral radius of the cycle's product to the power 1 / length.
+        rate: f64,
+    },
+    /// Neither proven nor refuted within the search's work.
+    #[error("convergence is undecided at depth {depth}: the joint spectral radius lies in [{lower:.6}, {upper:.6}], and must be below 1")]
+    Undecided {
+        /// Proven lower bound.
+        lower: f64,
+        /// Proven upper bound.
+        upper: f64,
+        /// Longest path examined.
+        depth: usize,
+    },
+    /// Rational cells are bounded by the hull of their control points, which needs non-negative operators.
+    #[error(
+        "state '{state}' has operators with negative entries and control points with weights: such cells cannot be bounded; give all weights the value 1 or use operators without negative entries"
+    )]
+    SignedRational {
+        /// The state.
+        state: String,
+    },
+    /// Coordinates overflow.
+    #[error("the shape's bounds overflow double precision; move or scale the model below 1e150 mm")]
+    Overflow,
+    /// Nothing to evaluate.
+    #[error("the model is empty: it has no cell, no map and no face")]
+    Empty,
+}
+
+impl AttractorError {
+    /// How to react.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Undecided { .. } => Kind::Unreachable,
+            _ => Kind::Invalid,
+        }
+    }
+
+    /// Stable code.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Automaton(AutomatonError::Dimension { .. }) => "automaton.dimension-mismatch",
+            Self::Automaton(AutomatonError::NoTransition { .. }) => "automaton.no-transition",
+            Self::NotContractive { .. } => "automaton.not-contractive",
+            Self::Undecided { .. } => "automaton.convergence-undecided",
+            Self::SignedRational { .. } => "automaton.signed-rational",
+            Self::Overflow => "automaton.overflow",
+            Self::Empty => "automaton.empty",
+        }
+    }
+}
+
+/// The transitions of the contraction's cycle, by their labels in the model.
+fn labels(automaton: &Automaton, contraction: &Contraction) -> String {
+    let mut state = contraction.cycle.0;
+    let mut words = Vec::new();
+    for &index in &contraction.cycle.1 {
+        let transition = &automaton.state(state).transitions[index];
+        words.push(transition.label.to_string());
+        state = transition.to;
+    }
+    words.join(" ")
+}
+
+/// A cycle whose rate is this close to 1 does not contract beyond rounding.
+const RATE_ONE: f64 = 1.0 - 1e-9;
+
+impl Attractor {
+    /// Proves convergence and bounds every state.
+    ///
+    /// # Errors
+    /// [`AttractorError`]; see its variants.
+    pub fn new(
+        mut automaton: Automaton,
+        roots: Vec<Root>,
+        solids: Vec<SolidSurface>,
+        warnings: Vec<String>,
+    ) -> Result<Self, AttractorError> {
+        if roots.is_empty() {
+            return Err(AttractorError::Empty);
+        }
+        let contraction = convergence::contraction(&automaton);
+        if contraction.lower >= RATE_ONE {
+            let (state, cycle) = (automaton.state(contraction.cycle.0).name.clone(), labels(&automaton, &contraction));
+            return Err(AttractorError::NotContractive { state, cycle, rate: contraction.lower });
+        }
+        if contraction.upper >= 1.0 {
+            return Err(AttractorError::Undecided { lower: contraction.lower, upper: contraction.upper, depth: contraction.depth });
+        }
+        let bounds = bound::bound_states(&automaton, &contraction);
+        if bounds.iter().any(|bound| !bound.is_finite()) {
+            return Err(AttractorError::Overflow);
+        }
+        defect::measure_drawings(&mut automaton, &bounds);
+        let attractor = Self { automaton, roots, solids, bounds, contraction, warnings };
+        attractor.check_roots()?;
+        Ok(attractor)
+    }
+
+    fn check_roots(&self) -> Result<(), AttractorError> {
+        for root in &self.roots {
+            if root.rational && self.bounds[root.state.index()].margin() > 0.0 {
+                return Err(AttractorError::SignedRational { state: self.automaton.state(root.state).name.clone() });
+            }
+            let ball = cell::RootCell::new(self, root).ball;
+            if !ball.is_finite() || ball.radius > 1e150 || ball.centre.iter().any(|x| x.abs() > 1e150) {
+                return Err(AttractorError::Overflow);
+            }
+        }
+        Ok(())
+    }
+
+    /// The control graph.
+    #[must_use]
+    pub fn automaton(&self) -> &Automaton {
+        &self.automaton
+    }
+
+    /// Where the shape begins.
+    #[must_use]
+    pub fn roots(&self) -> &[Root] {
+        &self.roots
+    }
+
+    /// Surfaces that stand for solids.
+    #[must_use]
+    pub fn solids(&self) -> &[SolidSurface] {
+        &self.solids
+    }
+
+    /// Proven bounds of the joint spectral radius.
+    #[must_use]
+    pub fn contraction(&self) -> &Contraction {
+        &self.contraction
+    }
+
+    /// What the lowering corrected or found odd.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The bound of a state.
+    #[must_use]
+    pub(crate) fn bound(&self, state: StateId) -> &StateBound {
+        &self.bounds[state.index()]
+    }
+}

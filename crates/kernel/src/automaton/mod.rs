@@ -1,0 +1,196 @@
+//! The control graph of a BC-IFS: kinds of cells, how they subdivide, and what is drawn of them.
+
+mod connection;
+pub mod convergence;
+mod matrix;
+pub mod operator;
+
+pub use connection::Ends;
+pub use convergence::Contraction;
+pub use operator::{OperatorError, SubdivisionOperator};
+
+use crate::model::CellKind;
+
+/// Index of a [`State`] in its [`Automaton`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct StateId(u32);
+
+impl StateId {
+    /// The state of position `index`.
+    ///
+    /// # Panics
+    /// When there are 2^32 states: the document's limits are far below.
+    #[must_use]
+    pub fn new(index: usize) -> Self {
+        Self(u32::try_from(index).expect("fewer than 2^32 states"))
+    }
+
+    /// Its position.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// state -> child state, labelled by the operator that gives the child's control points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transition {
+    /// The child's state.
+    pub to: StateId,
+    /// T, n x n_child.
+    pub operator: SubdivisionOperator,
+    /// Its position in the model's own list of maps or transitions, for messages.
+    pub label: usize,
+}
+
+/// A boundary of a state: a state of lower dimension and its embedding b, n x n_boundary.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Boundary {
+    /// The boundary's state.
+    pub state: StateId,
+    /// b.
+    pub incidence: SubdivisionOperator,
+}
+
+/// What stands for a leaf cell in an approximation, and how its error is bounded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LeafPrimitive {
+    /// The centre of the cell's bounding ball: its radius is the error.
+    Centre,
+    /// The cell is the convex hull of its one, two or three control points: no error.
+    Simplex,
+    /// The segment between the two ends of a cell that is a curve from one to the other: the error is
+    /// the largest distance of a control point from the segment.
+    Chord(Ends),
+    /// The polygon of a face's corners (barycentric points), in order around the face.
+    Polygon(Vec<Vec<f64>>),
+    /// A compact drawn in the affine frame (o, o+e1, o+e2, o+e3) that the four control points hold.
+    Drawn(Drawing),
+}
+
+/// Points, segments and triangles in coordinates of an affine frame, with their distance from the
+/// attractor of the state.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Drawing {
+    /// Corner positions in the frame.
+    pub vertices: Vec<[f64; 3]>,
+    /// Corners that stand alone.
+    pub points: Vec<u32>,
+    /// Segments.
+    pub segments: Vec<[u32; 2]>,
+    /// Triangles.
+    pub triangles: Vec<[u32; 3]>,
+    /// Hausdorff distance between the drawing and the state's attractor, in the frame's unit: a
+    /// proven upper bound. Filled in by the attractor's analysis.
+    pub defect: f64,
+}
+
+/// A kind of cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Its name in the model.
+    pub name: String,
+    /// Its topological kind, when the model states one.
+    pub kind: Option<CellKind>,
+    /// n, the number of control points, which is the dimension of its barycentric space plus one.
+    pub dimension: usize,
+    /// How it subdivides; empty only for [`LeafPrimitive::Simplex`].
+    pub transitions: Vec<Transition>,
+    /// Its boundary cells.
+    pub boundaries: Vec<Boundary>,
+    /// What stands for a leaf cell.
+    pub leaf: LeafPrimitive,
+    /// Whether its four control points are an affine frame (o, o+e1, o+e2, o+e3) rather than points
+    /// near the shape: then it is bounded by balls, else by the hull of its control points.
+    pub frame: bool,
+}
+
+/// States and transitions. Invariant: operators fit their states, and every transition and boundary
+/// names a state of the automaton.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Automaton {
+    states: Vec<State>,
+}
+
+/// Why states do not form an automaton.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AutomatonError {
+    /// An operator's size does not fit.
+    #[error("state '{state}', {what}: the operator is {rows} x {columns}, and must be {expected_rows} x {expected_columns}")]
+    Dimension {
+        /// The state.
+        state: String,
+        /// Which transition or boundary.
+        what: String,
+        /// Rows found.
+        rows: usize,
+        /// Columns found.
+        columns: usize,
+        /// n of the state.
+        expected_rows: usize,
+        /// n of the child or boundary.
+        expected_columns: usize,
+    },
+    /// A state neither subdivides nor is a simplex.
+    #[error("state '{state}' has no transition, so it has no attractor")]
+    NoTransition {
+        /// The state.
+        state: String,
+    },
+}
+
+impl Automaton {
+    /// # Errors
+    /// [`AutomatonError`] for the first operator that does not fit or the first state without
+    /// transition.
+    pub fn new(states: Vec<State>) -> Result<Self, AutomatonError> {
+        for state in &states {
+            let dimension = |to: StateId| states[to.index()].dimension;
+            let check = |what: String, to: StateId, operator: &SubdivisionOperator| {
+                if operator.rows() == state.dimension && operator.columns() == dimension(to) {
+                    return Ok(());
+                }
+                Err(AutomatonError::Dimension {
+                    state: state.name.clone(),
+                    what,
+                    rows: operator.rows(),
+                    columns: operator.columns(),
+                    expected_rows: state.dimension,
+                    expected_columns: dimension(to),
+                })
+            };
+            if state.transitions.is_empty() && state.leaf != LeafPrimitive::Simplex {
+                return Err(AutomatonError::NoTransition { state: state.name.clone() });
+            }
+            for (index, transition) in state.transitions.iter().enumerate() {
+                check(format!("transition {index}"), transition.to, &transition.operator)?;
+            }
+            for (index, boundary) in state.boundaries.iter().enumerate() {
+                check(format!("boundary {index}"), boundary.state, &boundary.incidence)?;
+            }
+        }
+        Ok(Self { states })
+    }
+
+    /// The states, in order of their ids.
+    #[must_use]
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    /// One state.
+    #[must_use]
+    pub fn state(&self, id: StateId) -> &State {
+        &self.states[id.index()]
+    }
+
+    /// Chooses chords for edges that are proven to be curves, and polygons for faces whose sides close.
+    pub(crate) fn connect(&mut self) {
+        connection::connect(self);
+    }
+
+    /// Replaces what stands for a leaf cell of a state.
+    pub(crate) fn set_leaf(&mut self, id: StateId, leaf: LeafPrimitive) {
+        self.states[id.index()].leaf = leaf;
+    }
+}

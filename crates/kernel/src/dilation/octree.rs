@@ -1,0 +1,241 @@
+//! Space and automaton refined together: cubes of space that the surface cannot meet are dropped with all
+//! their cells, cells are expanded only as far as the cube's size asks.
+
+use super::block::{BlockSurface, SIDE, Workshop, signed_side};
+use super::tree::{Candidate, Candidates, closest_on_site};
+use super::{DilationError, Setting};
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Point, Purpose, child_points, distance_squared};
+use crate::budget::Budget;
+use rayon::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// What all tasks of one pass share.
+pub(super) struct Pass<'a> {
+    pub(super) attractor: &'a Attractor,
+    pub(super) setting: &'a Setting,
+    pub(super) budget: &'a Budget,
+    /// Largest outer bound that is acceptable: beyond it the pass is given up and a finer one begins.
+    pub(super) outer_allowed: f64,
+    pub(super) too_coarse: AtomicBool,
+    pub(super) triangles: AtomicU64,
+    /// Cubes of the lattice that are done, of those of the whole space.
+    pub(super) done: AtomicU64,
+    pub(super) space: f64,
+    /// Working memories that no thread uses now.
+    pub(super) workshops: Mutex<Vec<Workshop<'a>>>,
+}
+
+/// A cube of space: `blocks` blocks along its side, a power of two.
+#[derive(Clone, Copy)]
+struct Node {
+    first_block: [i64; 3],
+    blocks: i64,
+}
+
+/// Cells larger than this share of a cube's half diagonal are expanded.
+const CELL_SHARE: f64 = 0.4;
+
+impl<'a> Pass<'a> {
+    /// The surface in the cube of `blocks` blocks a side that begins at block `first`.
+    pub(super) fn run(&self, first: [i64; 3], blocks: i64, candidates: &Candidates) -> Result<Vec<BlockSurface>, DilationError> {
+        let solids: Vec<u32> = (0..self.attractor.solids().len() as u32).collect();
+        self.node(Node { first_block: first, blocks }, candidates, &solids)
+    }
+
+    fn node(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Vec<BlockSurface>, DilationError> {
+        self.budget.cancel.check()?;
+        if self.too_coarse.load(Ordering::Relaxed) {
+            return Ok(Vec::new());
+        }
+        let Some((kept, open)) = self.reduce(node, candidates, open) else {
+            self.finish(node);
+            return Ok(Vec::new());
+        };
+        if node.blocks == 1 {
+            let surface = self.block(node, &kept, &open)?;
+            self.finish(node);
+            return Ok(surface.into_iter().collect());
+        }
+        let half = node.blocks / 2;
+        let children: Vec<Node> = (0..8_i64)
+            .map(|octant| Node {
+                first_block: std::array::from_fn(|axis| node.first_block[axis] + half * (octant >> axis & 1)),
+                blocks: half,
+            })
+            .collect();
+        let parts: Vec<Result<Vec<BlockSurface>, DilationError>> =
+            children.into_par_iter().with_max_len(1).map(|child| self.node(child, &kept, &open)).collect();
+        let mut surfaces = Vec::new();
+        for part in parts {
+            surfaces.extend(part?);
+        }
+        Ok(surfaces)
+    }
+
+    fn finish(&self, node: Node) {
+        let blocks = node.blocks.unsigned_abs().pow(3);
+        let before = self.done.fetch_add(blocks, Ordering::Relaxed);
+        let fraction = |done: u64| done as f64 / self.space;
+        if (fraction(before) * 200.0).floor() < (fraction(before + blocks) * 200.0).floor() {
+            self.budget.report("dilate", fraction(before + blocks).min(1.0), self.triangles.load(Ordering::Relaxed));
+        }
+    }
+
+    /// Middle and half diagonal of all lattice vertices that the cube's tetrahedra use.
+    fn extent(&self, node: Node) -> (Point, f64) {
+        let lattice = &self.setting.lattice;
+        let cubes = node.blocks as f64 * SIDE as f64 + 0.5;
+        let corner = lattice.corner(node.first_block.map(|block| block * SIDE as i64));
+        let half = 0.5 * cubes * lattice.pitch;
+        (corner.map(|x| x + half), half * 3.0_f64.sqrt() * 1.000_001)
+    }
+
+    /// The cells that may hold the nearest site of a vertex of the cube that matters, and the solids whose
+    /// surface meets the cube, of those that are still `open`; `None` when the result's surface cannot meet
+    /// the cube.
+    fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Option<(Candidates, Vec<u32>)> {
+        let (middle, half) = self.extent(node);
+        let size = CELL_SHARE * half;
+        let mut brackets = Vec::with_capacity(candidates.cells.len());
+        let mut expanded = Candidates::default();
+        let mut upper = f64::INFINITY;
+        // Distances above this matter to no vertex of the cube, except to tell the inside of a solid.
+        let horizon = self.setting.radius + self.setting.band + half;
+        for candidate in &candidates.cells {
+            self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded);
+        }
+        if upper + half < self.setting.radius {
+            return None;
+        }
+        let reaches = self.solids(&middle, half, &brackets, &expanded, open)?;
+        let slack = self.setting.slack;
+        let threshold = (upper + 2.0 * half).min(horizon) + slack;
+        let mut kept = Candidates::default();
+        let mut lowest = f64::INFINITY;
+        for ((lower, _), candidate) in brackets.iter().zip(&expanded.cells) {
+            let solid = self.attractor.roots()[candidate.cell.root as usize].solid;
+            let own = solid.map_or(f64::NEG_INFINITY, |solid| reaches[solid as usize]);
+            if *lower <= threshold || *lower <= own {
+                lowest = lowest.min(*lower);
+                kept.push(candidate.cell, expanded.points_of(self.attractor, candidate), candidate.leaf);
+            }
+        }
+        let still_open = open.iter().copied().filter(|&solid| reaches[solid as usize] > f64::NEG_INFINITY).collect();
+        (lowest <= self.setting.radius + half + slack).then_some((kept, still_open))
+    }
+
+    /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances.
+    #[allow(clippy::too_many_arguments)]
+    fn expand(
+        &self,
+        middle: &Point,
+        size: f64,
+        candidate: &Candidate,
+        from: &Candidates,
+        horizon: f64,
+        upper: &mut f64,
+        brackets: &mut Vec<(f64, f64)>,
+        to: &mut Candidates,
+    ) {
+        let points = from.points_of(self.attractor, candidate);
+        let ball = candidate.cell.ball;
+        let distance = distance_squared(middle, &ball.centre).sqrt();
+        if candidate.leaf {
+            let mut nearest = f64::INFINITY;
+            self.attractor.emit(&candidate.cell, points, Purpose::Sites, &mut |site| {
+                nearest = nearest.min(distance_squared(middle, &closest_on_site(middle, &site)));
+            });
+            let nearest = nearest.sqrt();
+            *upper = upper.min(nearest + self.setting.slack);
+            brackets.push((nearest - self.setting.slack, nearest));
+            to.push(candidate.cell, points, true);
+            return;
+        }
+        let in_solid = self.attractor.roots()[candidate.cell.root as usize].solid.is_some();
+        if ball.radius <= size || (distance - ball.radius > horizon && !in_solid) {
+            *upper = upper.min(distance + ball.radius + self.setting.slack);
+            brackets.push((distance - ball.radius - self.setting.slack, distance + ball.radius));
+            to.push(candidate.cell, points, false);
+            return;
+        }
+        let state = self.attractor.state_of(&candidate.cell);
+        for (index, transition) in state.transitions.iter().enumerate() {
+            let mut child = Candidates::default();
+            let mut child_control = vec![[0.0; 4]; transition.operator.columns()];
+            child_points(points, &transition.operator, &mut child_control);
+            let cell = self.attractor.child_cell(&candidate.cell, index, &child_control);
+            let leaf = self.attractor.leaf_error(&cell, &child_control, Purpose::Sites) <= self.setting.leaf_error;
+            child.push(cell, &child_control, leaf);
+            let only = child.cells[0];
+            self.expand(middle, size, &only, &child, horizon, upper, brackets, to);
+        }
+    }
+
+    /// Per solid, the distance up to which its triangles must be kept: where its surface meets the cube, all
+    /// that may be nearest to a vertex; elsewhere none, once it is known that the cube lies outside. `None`
+    /// when the cube lies inside a solid.
+    fn solids(&self, middle: &Point, half: f64, brackets: &[(f64, f64)], candidates: &Candidates, open: &[u32]) -> Option<Vec<f64>> {
+        let count = self.attractor.solids().len();
+        let mut nearest: Vec<Option<(f64, u32)>> = vec![None; count];
+        for ((_, distance), candidate) in brackets.iter().zip(&candidates.cells) {
+            let root = candidate.cell.root;
+            if let Some(solid) = self.attractor.roots()[root as usize].solid {
+                let best = &mut nearest[solid as usize];
+                if best.is_none_or(|(known, _)| *distance < known) {
+                    *best = Some((*distance, root));
+                }
+            }
+        }
+        let mut keep = vec![f64::NEG_INFINITY; count];
+        // A solid that is no longer open has the cube outside, and not all of its triangles are here.
+        for &solid in open {
+            let Some((distance, root)) = nearest[solid as usize] else { continue };
+            if distance > half {
+                if signed_side(self.attractor, solid, root, middle) < 0.0 {
+                    return None;
+                }
+            } else {
+                keep[solid as usize] = distance + 2.0 * half + self.setting.slack;
+            }
+        }
+        Some(keep)
+    }
+
+    fn block(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<BlockSurface>, DilationError> {
+        let idle = self.workshops.lock().map(|mut idle| idle.pop()).unwrap_or_default();
+        let mut workshop = idle.unwrap_or_else(|| Workshop::new(self.attractor, self.setting));
+        let surface = self.surface(&mut workshop, node, candidates, open);
+        if let Ok(mut idle) = self.workshops.lock() {
+            idle.push(workshop);
+        }
+        surface
+    }
+
+    fn surface(
+        &self,
+        workshop: &mut Workshop<'a>,
+        node: Node,
+        candidates: &Candidates,
+        open: &[u32],
+    ) -> Result<Option<BlockSurface>, DilationError> {
+        let first_cube = node.first_block.map(|block| block * SIDE as i64);
+        let mut surface = workshop.surface(self.setting, first_cube, candidates, open);
+        if surface.triangles.is_empty() && surface.outer <= 0.0 {
+            return Ok(None);
+        }
+        if surface.outer > self.outer_allowed {
+            self.too_coarse.store(true, Ordering::Relaxed);
+            return Ok(None);
+        }
+        workshop.finish(&mut surface);
+        let made = surface.triangles.len() as u64;
+        let total = self.triangles.fetch_add(made, Ordering::Relaxed) + made;
+        let allowed = self.budget.limits.triangles;
+        if total > allowed {
+            return Err(DilationError::triangles(self.setting, total as f64, allowed));
+        }
+        Ok(Some(surface))
+    }
+}

@@ -1,0 +1,331 @@
+//! Cells near a block of space, expanded only where a query needs them: nearest-site search by branch and
+//! bound.
+//!
+//! The distance to the sites is a function of the point alone, to the last bit: sites are computed along
+//! their address from the root, whatever block asks, pruning keeps every cell whose lower bound is within
+//! `slack` of the best distance, and among equal distances the lexicographically first closest point wins.
+//! So blocks agree on shared lattice vertices, and results do not depend on the number of threads.
+
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Cell, ControlPoint, Point, Purpose, Site, child_points, closest_on_segment, distance_squared};
+use crate::measure::triangle::closest_on_triangle;
+
+/// A cell with its control points, as a candidate for holding the nearest site.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    pub(super) cells: Vec<Candidate>,
+    pub(super) points: Vec<ControlPoint>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub(super) cell: Cell,
+    /// Where its control points start.
+    pub(super) first: u32,
+    /// Whether it is small enough to be replaced by its sites.
+    pub(super) leaf: bool,
+}
+
+impl Candidates {
+    pub(super) fn push(&mut self, cell: Cell, points: &[ControlPoint], leaf: bool) {
+        let first = self.points.len() as u32;
+        self.points.extend_from_slice(points);
+        self.cells.push(Candidate { cell, first, leaf });
+    }
+
+    pub(super) fn points_of(&self, attractor: &Attractor, candidate: &Candidate) -> &[ControlPoint] {
+        let dimension = attractor.state_of(&candidate.cell).dimension;
+        &self.points[candidate.first as usize..candidate.first as usize + dimension]
+    }
+}
+
+/// The point of a site closest to x.
+#[inline]
+pub(super) fn closest_on_site(x: &Point, site: &Site) -> Point {
+    match site {
+        Site::Point(point) => *point,
+        Site::Segment([a, b]) => closest_on_segment(x, a, b),
+        Site::Triangle([a, b, c]) => closest_on_triangle(x, a, b, c),
+    }
+}
+
+/// Index of a node.
+pub(super) type NodeId = u32;
+
+#[derive(Clone, Copy, Debug)]
+enum Content {
+    /// Not expanded yet; control points start here.
+    Closed(u32),
+    /// Children `first .. first + count`.
+    Open(u32, u32),
+    /// The site is the point at the ball's centre.
+    Point,
+    /// Sites `first .. first + count`.
+    Sites(u32, u32),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    centre: Point,
+    /// Bounds everything below, rounding included.
+    radius: f64,
+    content: Content,
+}
+
+/// A site of the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SiteId {
+    /// The centre of a node.
+    Centre(NodeId),
+    /// An entry of the site list.
+    Listed(u32),
+}
+
+/// The nearest site of a query.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hit {
+    pub(super) distance_squared: f64,
+    pub(super) closest: Point,
+    pub(super) site: SiteId,
+    pub(super) node: NodeId,
+}
+
+pub(super) struct Tree<'a> {
+    attractor: &'a Attractor,
+    leaf_error: f64,
+    slack: f64,
+    nodes: Vec<Node>,
+    cells: Vec<Cell>,
+    points: Vec<ControlPoint>,
+    sites: Vec<Site>,
+    stack: Vec<NodeId>,
+    scratch: [Vec<ControlPoint>; 2],
+    /// Leaf cells met.
+    pub(super) leaves: u64,
+    /// Largest error of a leaf that was met.
+    pub(super) largest_error: f64,
+}
+
+impl<'a> Tree<'a> {
+    pub(super) fn new(attractor: &'a Attractor, leaf_error: f64, slack: f64) -> Self {
+        Self {
+            attractor,
+            leaf_error,
+            slack,
+            nodes: Vec::new(),
+            cells: Vec::new(),
+            points: Vec::new(),
+            sites: Vec::new(),
+            stack: Vec::new(),
+            scratch: [Vec::new(), Vec::new()],
+            leaves: 0,
+            largest_error: 0.0,
+        }
+    }
+
+    /// Empties the tree and adds the candidates as its roots; returns their ids.
+    pub(super) fn reset(&mut self, candidates: &Candidates) -> std::ops::Range<NodeId> {
+        self.nodes.clear();
+        self.cells.clear();
+        self.points.clear();
+        self.sites.clear();
+        self.leaves = 0;
+        self.largest_error = 0.0;
+        for candidate in &candidates.cells {
+            self.add(candidate.cell, candidates.points_of(self.attractor, candidate));
+        }
+        0..self.nodes.len() as NodeId
+    }
+
+    fn add(&mut self, cell: Cell, points: &[ControlPoint]) {
+        let error = self.attractor.leaf_error(&cell, points, Purpose::Sites);
+        let content = if error <= self.leaf_error {
+            self.leaves += 1;
+            self.largest_error = self.largest_error.max(error);
+            let first = self.sites.len();
+            let sites = &mut self.sites;
+            self.attractor.emit(&cell, points, Purpose::Sites, &mut |site| sites.push(site));
+            match self.sites[first..] {
+                [Site::Point(point)] if point == cell.ball.centre => {
+                    self.sites.truncate(first);
+                    Content::Point
+                }
+                _ => Content::Sites(first as u32, (self.sites.len() - first) as u32),
+            }
+        } else {
+            let first = self.points.len() as u32;
+            self.points.extend_from_slice(points);
+            Content::Closed(first)
+        };
+        self.nodes.push(Node { centre: cell.ball.centre, radius: cell.ball.radius + self.slack, content });
+        self.cells.push(cell);
+    }
+
+    /// The children of a node, made when first asked for.
+    fn expand(&mut self, id: NodeId, first_point: u32) -> (u32, u32) {
+        let cell = self.cells[id as usize];
+        let state = self.attractor.state_of(&cell);
+        let first = self.nodes.len() as u32;
+        // Taken out of the tree while `add` grows its lists.
+        let [mut parent, mut child] = std::mem::take(&mut self.scratch);
+        parent.clear();
+        parent.extend_from_slice(&self.points[first_point as usize..first_point as usize + state.dimension]);
+        for (index, transition) in state.transitions.iter().enumerate() {
+            child.resize(transition.operator.columns(), [0.0; 4]);
+            child_points(&parent, &transition.operator, &mut child);
+            self.add(self.attractor.child_cell(&cell, index, &child), &child);
+        }
+        self.scratch = [parent, child];
+        let count = self.nodes.len() as u32 - first;
+        self.nodes[id as usize].content = Content::Open(first, count);
+        (first, count)
+    }
+
+    /// A site by its id.
+    pub(super) fn site(&self, id: SiteId) -> Site {
+        match id {
+            SiteId::Centre(node) => Site::Point(self.nodes[node as usize].centre),
+            SiteId::Listed(index) => self.sites[index as usize],
+        }
+    }
+
+    /// The root cell that a node descends from.
+    pub(super) fn root_of(&self, id: NodeId) -> u32 {
+        self.cells[id as usize].root
+    }
+
+    /// The nearest site among those below `starts`, if one is nearer than `reach`. `seed`, a node that was
+    /// the answer nearby, makes the search quicker and never changes its answer.
+    pub(super) fn nearest(&mut self, x: &Point, starts: &[NodeId], seed: Option<NodeId>, reach: f64) -> Option<Hit> {
+        let mut best = Best { distance: reach, hit: None, limit: reach * reach };
+        if let Some(seed) = seed {
+            self.visit_sites(x, seed, &mut best);
+        }
+        let mut stack = std::mem::take(&mut self.stack);
+        for &start in starts {
+            self.descend(x, start, &mut best, &mut stack);
+        }
+        self.stack = stack;
+        best.hit
+    }
+
+    #[inline]
+    fn descend(&mut self, x: &Point, start: NodeId, best: &mut Best, stack: &mut Vec<NodeId>) {
+        stack.clear();
+        stack.push(start);
+        while let Some(id) = stack.pop() {
+            let node = &self.nodes[id as usize];
+            let square = distance_squared(x, &node.centre);
+            let threshold = best.distance + node.radius + self.slack;
+            if square > threshold * threshold {
+                continue;
+            }
+            match node.content {
+                Content::Point => best.offer(square, &node.centre, SiteId::Centre(id), id),
+                Content::Sites(..) => self.visit_sites(x, id, best),
+                Content::Open(first, count) => self.push_near(x, first, count, best, stack),
+                Content::Closed(points) => {
+                    let (first, count) = self.expand(id, points);
+                    self.push_near(x, first, count, best, stack);
+                }
+            }
+        }
+    }
+
+    /// Puts the children that may hold the nearest site on the stack, the nearest last.
+    #[inline]
+    fn push_near(&self, x: &Point, first: u32, count: u32, best: &mut Best, stack: &mut Vec<NodeId>) {
+        let base = stack.len();
+        let mut nearest = f64::INFINITY;
+        for id in first..first + count {
+            let node = &self.nodes[id as usize];
+            let square = distance_squared(x, &node.centre);
+            if let Content::Point = node.content {
+                if square <= best.limit {
+                    best.offer(square, &node.centre, SiteId::Centre(id), id);
+                }
+                continue;
+            }
+            let threshold = best.distance + node.radius + self.slack;
+            if square <= threshold * threshold {
+                stack.push(id);
+                // One pass keeps the nearest on top; full sorting costs more than it saves.
+                if square < nearest {
+                    nearest = square;
+                } else {
+                    let top = stack.len() - 1;
+                    if top > base {
+                        stack.swap(top, top - 1);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn visit_sites(&self, x: &Point, id: NodeId, best: &mut Best) {
+        match self.nodes[id as usize].content {
+            Content::Point => {
+                let centre = &self.nodes[id as usize].centre;
+                best.offer(distance_squared(x, centre), centre, SiteId::Centre(id), id);
+            }
+            Content::Sites(first, count) => {
+                for index in first..first + count {
+                    let closest = closest_on_site(x, &self.sites[index as usize]);
+                    best.offer(distance_squared(x, &closest), &closest, SiteId::Listed(index), id);
+                }
+            }
+            Content::Open(..) | Content::Closed(_) => {}
+        }
+    }
+
+    /// Nodes that may hold a site within `reach` of x, none much larger than `size` unless it is a leaf.
+    pub(super) fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, size: f64, found: &mut Vec<NodeId>) {
+        found.clear();
+        let mut stack = std::mem::take(&mut self.stack);
+        stack.clear();
+        stack.extend(starts.iter().rev());
+        while let Some(id) = stack.pop() {
+            let node = &self.nodes[id as usize];
+            let threshold = reach + node.radius + self.slack;
+            if distance_squared(x, &node.centre) > threshold * threshold {
+                continue;
+            }
+            match node.content {
+                Content::Open(first, count) if node.radius > size => stack.extend((first..first + count).rev()),
+                Content::Closed(points) if node.radius > size => {
+                    let (first, count) = self.expand(id, points);
+                    stack.extend((first..first + count).rev());
+                }
+                _ => found.push(id),
+            }
+        }
+        self.stack = stack;
+    }
+}
+
+struct Best {
+    /// Distance of the hit, or the reach.
+    distance: f64,
+    /// Its square, so that most offers are refused without a root.
+    limit: f64,
+    hit: Option<Hit>,
+}
+
+impl Best {
+    #[inline]
+    fn offer(&mut self, square: f64, closest: &Point, site: SiteId, node: NodeId) {
+        if square > self.limit {
+            return;
+        }
+        if let Some(hit) = &self.hit {
+            let first = |a: &Point, b: &Point| a.iter().zip(b).find(|(p, q)| p != q).is_some_and(|(p, q)| p < q);
+            if square == hit.distance_squared && !first(closest, &hit.closest) {
+                return;
+            }
+        }
+        self.limit = square;
+        self.distance = square.sqrt();
+        self.hit = Some(Hit { distance_squared: square, closest: *closest, site, node });
+    }
+}

@@ -1,0 +1,80 @@
+//! Volume and area of meshes, and what they say of the exact shape.
+
+use crate::attractor::Attractor;
+use crate::automaton::LeafPrimitive;
+use crate::measure::Interval;
+use crate::solid::TriMesh;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Triangles summed together: sums of one chunk are added in order, so results do not depend on threads.
+const CHUNK: usize = 1 << 15;
+
+fn sum(mesh: &TriMesh, term: impl Fn(DVec3, DVec3, DVec3) -> f64 + Sync) -> f64 {
+    let corner = |index: u32| mesh.vertices[index as usize];
+    let chunk = |triangles: &[[u32; 3]]| triangles.iter().map(|&[a, b, c]| term(corner(a), corner(b), corner(c))).sum::<f64>();
+    let parts: Vec<f64> = mesh.triangles.par_chunks(CHUNK).map(chunk).collect();
+    parts.iter().sum()
+}
+
+/// Signed volume that a closed mesh encloses, in mm^3: sum of det(a, b, c) / 6, from the first vertex as
+/// the origin to keep digits far from zero.
+#[must_use]
+pub fn volume(mesh: &TriMesh) -> f64 {
+    let Some(&origin) = mesh.vertices.first() else { return 0.0 };
+    sum(mesh, |a, b, c| (a - origin).dot((b - origin).cross(c - origin))) / 6.0
+}
+
+/// Area of a mesh, in mm^2.
+#[must_use]
+pub fn area(mesh: &TriMesh) -> f64 {
+    0.5 * sum(mesh, |a, b, c| (b - a).cross(c - a).length())
+}
+
+/// Relative rounding of a sum over any mesh that fits in memory.
+const ROUNDING: f64 = 1e-10;
+
+/// Volume of D_r, from the volume of a mesh M with D(r - inner) in M in D(r + outer).
+///
+/// V(s) / s^3 does not increase with s (Kneser, "Ueber den Rand von Parallelkoerpern", Math. Nachr. 5,
+/// 1951: a union of balls loses volume when its centres contract), so V(r) <= (r / (r - inner))^3 V(r - inner)
+/// <= (r / (r - inner))^3 V(M), and V(r) >= (r / (r + outer))^3 V(M).
+#[must_use]
+pub fn dilated_volume(mesh_volume: f64, radius: f64, inner: f64, outer: f64) -> Interval {
+    let low = mesh_volume * (radius / (radius + outer)).powi(3) * (1.0 - ROUNDING);
+    let high = if inner < radius { mesh_volume * (radius / (radius - inner)).powi(3) * (1.0 + ROUNDING) } else { f64::INFINITY };
+    Interval { low, high }
+}
+
+/// Area of the boundary of D_r, from an interval of its volume.
+///
+/// S(s) / s^2 does not increase (Kneser again, S = V'), so V(r) >= integral of S(r) (s / r)^2 = S(r) r / 3; and no
+/// set of volume V has less area than the ball: S >= (36 pi V^2)^(1/3).
+#[must_use]
+pub fn dilated_area(volume: Interval, radius: f64) -> Interval {
+    let low = (36.0 * std::f64::consts::PI * volume.low * volume.low).cbrt() * (1.0 - ROUNDING);
+    Interval { low, high: 3.0 * volume.high / radius * (1.0 + ROUNDING) }
+}
+
+/// Volume and area of a shape that is one mesh of triangles: of the solid and its surface when the mesh
+/// stands for a solid, else no volume and the sheet's area (one side). `None` for other shapes.
+#[must_use]
+pub fn mesh_measures(attractor: &Attractor) -> Option<(Interval, Interval)> {
+    let roots = attractor.roots();
+    let triangle = |state| {
+        matches!(attractor.automaton().state(state).leaf, LeafPrimitive::Simplex) && attractor.automaton().state(state).dimension == 3
+    };
+    let solid = roots.first()?.solid;
+    if roots.iter().any(|root| !triangle(root.state) || root.rational || root.solid != solid) || attractor.solids().len() > 1 {
+        return None;
+    }
+    let mut mesh = TriMesh::default();
+    for root in roots {
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(root.points.iter().map(|point| DVec3::new(point[0], point[1], point[2])));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    let around = |value: f64| Interval::new(value * (1.0 - ROUNDING), value * (1.0 + ROUNDING));
+    let enclosed = if solid.is_some() { around(volume(&mesh)) } else { Interval { low: 0.0, high: 0.0 } };
+    Some((enclosed, around(area(&mesh))))
+}

@@ -1,0 +1,30 @@
+//! Measures of shapes and solids, as intervals that are proven.
+
+pub mod bounds;
+pub mod mass;
+pub mod triangle;
+
+pub use bounds::{AxisBox, bounding_box};
+
+/// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// The interval between two ends, in either order.
+    #[must_use]
+    pub fn new(a: f64, b: f64) -> Self {
+        Self { low: a.min(b), high: a.max(b) }
+    }
+
+    /// high - low.
+    #[must_use]
+    pub fn width(self) -> f64 {
+        self.high - self.low
+    }
+}

@@ -1,0 +1,152 @@
+//! From shapes to one automaton: every family adds states and roots to a [`Draft`], which becomes an
+//! [`Attractor`] once.
+
+use super::{AffineMap, Model, Shape};
+use crate::attractor::{Attractor, AttractorError, Root, SolidSurface};
+use crate::automaton::{Automaton, State, StateId};
+
+/// Something about a model that its author should know: an error, or a warning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// Where: a JSON pointer relative to the model's shape, for example `/maps/3/linear`.
+    pub pointer: String,
+    /// Stable code.
+    pub code: &'static str,
+    /// What, in words, with values and the way out.
+    pub message: String,
+    /// Whether the model can be used all the same.
+    pub warning: bool,
+}
+
+/// A model that can be evaluated.
+#[derive(Clone, Debug)]
+pub struct Lowered {
+    /// The attractor.
+    pub attractor: Attractor,
+    /// Warnings.
+    pub findings: Vec<Finding>,
+    /// Largest violation of a stated constraint.
+    pub constraint_residual: f64,
+}
+
+/// States, roots and findings in the making.
+#[derive(Default)]
+pub(super) struct Draft {
+    pub(super) states: Vec<State>,
+    pub(super) roots: Vec<Root>,
+    pub(super) solids: Vec<SolidSurface>,
+    pub(super) findings: Vec<Finding>,
+    pub(super) constraint_residual: f64,
+    /// Where the family that is being lowered stands in the model.
+    pub(super) place: String,
+}
+
+impl Draft {
+    /// Notes an error at `pointer` below the current place.
+    pub(super) fn error(&mut self, pointer: &str, code: &'static str, message: String) {
+        let pointer = format!("{}{pointer}", self.place);
+        self.findings.push(Finding { pointer, code, message, warning: false });
+    }
+
+    /// Notes a warning.
+    pub(super) fn warn(&mut self, pointer: &str, code: &'static str, message: String) {
+        let pointer = format!("{}{pointer}", self.place);
+        self.findings.push(Finding { pointer, code, message, warning: true });
+    }
+
+    /// Adds a state and returns its id.
+    pub(super) fn state(&mut self, state: State) -> StateId {
+        self.states.push(state);
+        StateId::new(self.states.len() - 1)
+    }
+
+    fn has_errors(&self) -> bool {
+        self.findings.iter().any(|finding| !finding.warning)
+    }
+
+    fn shape(&mut self, shape: &Shape) {
+        match shape {
+            Shape::Ifs(ifs) => ifs.lower(self),
+            Shape::Bcifs(bcifs) => bcifs.lower(self),
+            Shape::BezierCurve(curve) => curve.lower(self),
+            Shape::CornerCutting(curve) => curve.lower(self),
+            Shape::Mesh(mesh) => mesh.lower(self),
+            Shape::Group(group) => self.group(group),
+        }
+    }
+
+    fn group(&mut self, group: &super::Group) {
+        if group.parts.is_empty() {
+            self.error("/parts", "automaton.empty", "the group has no part".into());
+        }
+        let place = self.place.clone();
+        for (index, part) in group.parts.iter().enumerate() {
+            self.place = format!("{place}/parts/{index}");
+            if let Some(map) = &part.transform {
+                if !(map.linear.is_finite() && map.translation.is_finite()) {
+                    self.error("/transform", "model.not-finite", "the transform has an entry that is not finite".into());
+                    continue;
+                }
+            }
+            self.place = format!("{place}/parts/{index}/shape");
+            let (first_root, first_solid) = (self.roots.len(), self.solids.len());
+            self.shape(&part.shape);
+            if let Some(map) = &part.transform {
+                self.place = format!("{place}/parts/{index}");
+                self.transform(map, first_root, first_solid);
+            }
+        }
+        self.place = place;
+    }
+
+    fn transform(&mut self, map: &AffineMap, first_root: usize, first_solid: usize) {
+        for root in &mut self.roots[first_root..] {
+            for point in &mut root.points {
+                let weight = point[3];
+                let moved = map.linear * glam::DVec3::new(point[0], point[1], point[2]) + weight * map.translation;
+                *point = [moved.x, moved.y, moved.z, weight];
+            }
+        }
+        let determinant = map.linear.determinant();
+        if self.solids.len() > first_solid && determinant <= 0.0 {
+            self.error(
+                "/transform",
+                "model.reflected-solid",
+                format!("the transform has determinant {determinant}: it would turn the solid inside out; use a positive one"),
+            );
+            return;
+        }
+        // Normals of a transformed surface are recomputed from its corners.
+        for surface in &mut self.solids[first_solid..] {
+            *surface = super::mesh::with_normals(std::mem::take(surface), &self.roots);
+        }
+    }
+}
+
+impl Model {
+    /// Lowers the shape to an automaton with control points, proves that it converges and bounds it.
+    ///
+    /// # Errors
+    /// All findings, at least one of which is an error.
+    pub fn lower(&self) -> Result<Lowered, Vec<Finding>> {
+        let mut draft = Draft::default();
+        draft.shape(&self.shape);
+        if draft.has_errors() {
+            return Err(draft.findings);
+        }
+        let fail = |mut findings: Vec<Finding>, error: &AttractorError| {
+            findings.push(Finding { pointer: String::new(), code: error.code(), message: error.to_string(), warning: false });
+            findings
+        };
+        let mut automaton = match Automaton::new(std::mem::take(&mut draft.states)) {
+            Ok(automaton) => automaton,
+            Err(error) => return Err(fail(draft.findings, &error.into())),
+        };
+        automaton.connect();
+        let warnings = draft.findings.iter().map(|finding| finding.message.clone()).collect();
+        match Attractor::new(automaton, draft.roots, draft.solids, warnings) {
+            Ok(attractor) => Ok(Lowered { attractor, findings: draft.findings, constraint_residual: draft.constraint_residual }),
+            Err(error) => Err(fail(draft.findings, &error)),
+        }
+    }
+}
