@@ -273,14 +273,20 @@ impl Problem {
         self
     }
 
-    /// As strangers may see it: the cause of a defect goes to the log, once, and they get an id to quote.
+    /// As strangers may see it: the cause of a defect is for the log, and they get an id to quote.
     #[must_use]
-    pub fn in_public(mut self, job: &str) -> Self {
-        if matches!(self.kind, ProblemKind::Internal | ProblemKind::InputOutput) {
-            tracing::error!(job, code = %self.code, detail = %self.detail, "defect");
-            "A defect of the service; the id of this request or job finds its cause in the log".clone_into(&mut self.detail);
+    pub fn in_public(&self) -> Self {
+        let mut shown = self.clone();
+        if self.is_defect() {
+            "A defect of the service; the id of this request or job finds its cause in the log".clone_into(&mut shown.detail);
         }
-        self
+        shown
+    }
+
+    /// Whether the cause is ours, and nothing that the caller could mend.
+    #[must_use]
+    pub fn is_defect(&self) -> bool {
+        matches!(self.kind, ProblemKind::Internal | ProblemKind::InputOutput)
     }
 
     /// With the place at which the model stands in the caller's document put before every pointer.
@@ -324,10 +330,11 @@ impl From<JobError> for Problem {
 }
 
 impl IntoResponse for Problem {
-    fn into_response(mut self) -> Response<Body> {
-        self = self.in_public("");
+    /// The body is fit for strangers; the problem itself goes along for the outermost layer, which logs it
+    /// and adds the request's id.
+    fn into_response(self) -> Response<Body> {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let mut response = Response::new(Body::from(serde_json::to_vec(&self).unwrap_or_default()));
+        let mut response = Response::new(Body::from(serde_json::to_vec(&self.in_public()).unwrap_or_default()));
         *response.status_mut() = status;
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
@@ -338,7 +345,6 @@ impl IntoResponse for Problem {
         if self.kind == ProblemKind::Unauthenticated {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
-        // The outermost layer adds the request id to the body.
         response.extensions_mut().insert(self);
         response
     }
@@ -383,7 +389,9 @@ mod tests {
     fn an_internal_cause_stays_inside() {
         let response = Problem::internal("index 7 of 3").into_response();
         assert_eq!(response.status(), 500);
-        assert!(!response.extensions().get::<Problem>().unwrap().detail.contains("index"));
+        let text = serde_json::to_string(&Problem::internal("index 7 of 3").in_public()).unwrap();
+        assert!(!text.contains("index"));
+        assert_eq!(response.extensions().get::<Problem>().unwrap().detail, "index 7 of 3");
     }
 
     #[test]

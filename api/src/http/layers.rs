@@ -53,6 +53,9 @@ async fn guard(state: &Shared, request: Request, next: Next) -> Response {
 
 fn as_problem(mut response: Response, id: &str) -> Response {
     let mut problem = response.extensions_mut().remove::<Problem>().unwrap_or_else(|| Problem::from_status(response.status().as_u16()));
+    if problem.is_defect() {
+        tracing::error!(request_id = %id, code = %problem.code, detail = %problem.detail, "defect");
+    }
     problem.request_id = Some(id.to_owned());
     let kept = [header::ALLOW, header::CONTENT_RANGE].map(|name| (name.clone(), response.headers().get(&name).cloned()));
     let mut answer = problem.into_response();

@@ -151,7 +151,12 @@ fn conclude(job: &LiveJob, result: Result<Answer, Problem>) -> JobState {
             }
             // The service goes down: the next start takes the job up again.
             Err(_) if stopped => view.state = JobState::Queued,
-            Err(problem) => desk::fail(view, problem.in_public(&id)),
+            Err(problem) => {
+                if problem.is_defect() {
+                    tracing::error!(job = %id, code = %problem.code, detail = %problem.detail, "defect");
+                }
+                desk::fail(view, problem.in_public());
+            }
         }
         view.state
     })
