@@ -19,12 +19,8 @@ const EDGES: [(&str, &[&str]); 6] = [
 ];
 
 /// Dependencies of others that only these crates of ours may name.
-const KEEPERS: [(&str, &[&str]); 4] = [
-    ("tokio", &["lacuna-api"]),
-    ("axum", &["lacuna-api"]),
-    ("manifold-rust", &["lacuna-boolean"]),
-    ("manifold-rs", &["lacuna-boolean"]),
-];
+const KEEPERS: [(&str, &[&str]); 4] =
+    [("tokio", &["lacuna-api"]), ("axum", &["lacuna-api"]), ("manifold-rust", &["lacuna-boolean"]), ("manifold-rs", &["lacuna-boolean"])];
 
 /// Longest source file, in lines.
 const LINES: usize = 1000;
@@ -54,7 +50,9 @@ fn crates_use_only_what_lies_below_them() {
     let allowed: BTreeMap<&str, &[&str]> = EDGES.into_iter().collect();
     let mut seen = 0;
     for (from, to, _) in named_dependencies() {
-        let below = allowed.get(from.as_str()).unwrap_or_else(|| panic!("{from} has no place in the house: add it to EDGES and to crates/README.md"));
+        let below = allowed
+            .get(from.as_str())
+            .unwrap_or_else(|| panic!("{from} has no place in the house: add it to EDGES and to crates/README.md"));
         if to.starts_with("lacuna-") {
             assert!(below.contains(&to.as_str()), "{from} must not use {to}");
             seen += 1;
@@ -144,7 +142,8 @@ fn pages_stay_readable() {
 #[test]
 fn nothing_names_the_machine_it_was_made_on() {
     // In two halves, so that this page passes itself.
-    let words = [["/ro", "ot/"], ["/ho", "me/"], ["/Us", "ers/"], ["/wo", "rk/"], ["C:\\", "Users"], ["arti", "factory"]].map(|half| half.concat());
+    let words =
+        [["/ro", "ot/"], ["/ho", "me/"], ["/Us", "ers/"], ["/wo", "rk/"], ["C:\\", "Users"], ["arti", "factory"]].map(|half| half.concat());
     let mut read = 0;
     for path in texts() {
         let text = fs::read_to_string(&path).unwrap();

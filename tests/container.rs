@@ -23,7 +23,20 @@ fn last_stage(keyword: &str) -> Vec<String> {
 #[test]
 fn every_instruction_is_one() {
     let known = [
-        "FROM", "RUN", "COPY", "WORKDIR", "USER", "ENV", "VOLUME", "EXPOSE", "STOPSIGNAL", "HEALTHCHECK", "ENTRYPOINT", "CMD", "ARG", "LABEL",
+        "FROM",
+        "RUN",
+        "COPY",
+        "WORKDIR",
+        "USER",
+        "ENV",
+        "VOLUME",
+        "EXPOSE",
+        "STOPSIGNAL",
+        "HEALTHCHECK",
+        "ENTRYPOINT",
+        "CMD",
+        "ARG",
+        "LABEL",
     ];
     for (word, rest) in instructions() {
         assert!(known.contains(&word.as_str()), "{word} {rest}");

@@ -1,7 +1,7 @@
 //! Every solid case as STL and 3MF, read back by libraries that we did not write (`independent/check.py`).
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use lacuna_tests::support::binary::succeed;
 use lacuna_tests::support::cases::{self, Case};
@@ -55,8 +55,8 @@ fn near(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs()).max(1.0)
 }
 
-/// Writes the solid in a format and gives its certificate.
-fn solidify(case: &Case, file: &Path, certificate: &Path) -> Value {
+/// Writes the solid in both formats and gives its certificate.
+fn solidify(case: &Case, files: &[PathBuf; 2], certificate: &Path) -> Value {
     let expected = &case.expected;
     succeed([
         "solidify".into(),
@@ -66,7 +66,9 @@ fn solidify(case: &Case, file: &Path, certificate: &Path) -> Value {
         "--radius".into(),
         expected.radius_mm.unwrap().to_string().into(),
         "-o".into(),
-        file.as_os_str().to_owned(),
+        files[0].as_os_str().to_owned(),
+        "-o".into(),
+        files[1].as_os_str().to_owned(),
         "--certificate".into(),
         certificate.as_os_str().to_owned(),
     ]);
@@ -94,7 +96,9 @@ fn judge(case: &Case, format: &str, report: &Value, certificate: &Value, found: 
     for opinion in [&report["trimesh"]["volume"], &report["manifold"]["volume"], &certificate["mesh_volume_mm3"]] {
         found.expect(near(volume, number(opinion)), || format!("{name}: volume {volume}, another opinion is {opinion}"));
     }
-    found.expect(report["trimesh"]["watertight"] == true && report["trimesh"]["winding"] == true, || format!("{name}: {}", report["trimesh"]));
+    found.expect(report["trimesh"]["watertight"] == true && report["trimesh"]["winding"] == true, || {
+        format!("{name}: {}", report["trimesh"])
+    });
     found.expect(report["trimesh"]["euler"] == report["euler"], || format!("{name}: trimesh counts {}", report["trimesh"]["euler"]));
     found.expect(report["manifold"]["status"] == "NoError", || format!("{name}: Manifold says {}", report["manifold"]["status"]));
     found.expect(report["manifold"]["shells"] == report["shells"], || format!("{name}: Manifold counts {}", report["manifold"]["shells"]));
@@ -103,7 +107,8 @@ fn judge(case: &Case, format: &str, report: &Value, certificate: &Value, found: 
     }
     if format == "3mf" {
         let read = &report["lib3mf"];
-        let sound = read["valid"] == true && read["oriented"] == true && read["millimetres"] == true && read["warnings"] == serde_json::json!([]);
+        let sound =
+            read["valid"] == true && read["oriented"] == true && read["millimetres"] == true && read["warnings"] == serde_json::json!([]);
         found.expect(sound, || format!("{name}: lib3mf says {read}"));
     }
     judge_measures(case, &name, report, volume, found);
@@ -136,15 +141,14 @@ fn other_peoples_libraries_find_what_the_cases_say() {
     let cases = cases::solids();
     assert!(cases.len() >= 30, "only {} solid cases were found", cases.len());
     for case in &cases {
-        let mut reports = Vec::new();
-        for format in ["stl", "3mf"] {
-            let file = scratch.join(&format!("part.{format}"));
-            let certificate = solidify(case, &file, &scratch.join("certificate.json"));
-            let search = format == "stl" && certificate["triangles"].as_i64().is_some_and(|count| count <= EXACT_SEARCH);
-            let report = judge_process.report(&file, search);
+        let files = ["part.stl", "part.3mf"].map(|name| scratch.join(name));
+        let certificate = solidify(case, &files, &scratch.join("certificate.json"));
+        let few = certificate["triangles"].as_i64().is_some_and(|count| count <= EXACT_SEARCH);
+        let reports = [("stl", few), ("3mf", false)].map(|(format, search)| {
+            let report = judge_process.report(&scratch.join(&format!("part.{format}")), search);
             judge(case, format, &report, &certificate, &mut found);
-            reports.push(report);
-        }
+            report
+        });
         let (a, b) = (number(&reports[0]["volume"]), number(&reports[1]["volume"]));
         found.expect(near(a, b), || format!("{}: STL holds {a} mm3, 3MF {b} mm3", case.name));
     }

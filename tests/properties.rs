@@ -272,8 +272,8 @@ fn balls_that_touch_are_two_pieces_or_refused() {
 
 /// The Sierpinski tetrahedron of edge 40, and its vertices.
 fn tetrahedron(map: impl Fn(DVec3) -> DVec3) -> (Ifs, [DVec3; 4]) {
-    let points = [[0.0; 3], [40.0, 0.0, 0.0], [20.0, 34.641016151377546, 0.0], [20.0, 11.547005383792516, 32.659863237109044]];
-    let points = points.map(|p| map(DVec3::from_array(p)));
+    let (depth, height) = (20.0 * 3f64.sqrt(), 40.0 * (2.0 / 3.0f64).sqrt());
+    let points = [[0.0; 3], [40.0, 0.0, 0.0], [20.0, depth, 0.0], [20.0, depth / 3.0, height]].map(|p| map(DVec3::from_array(p)));
     let maps = points.map(|p| AffineMap { linear: DMat3::from_diagonal(DVec3::splat(0.5)), translation: p * 0.5 });
     (Ifs { maps: maps.to_vec(), primitive: None, graph: None }, points)
 }
@@ -287,9 +287,8 @@ fn computed_boxes_turn_with_the_attractor() {
         let low = points.iter().fold(DVec3::INFINITY, |a, p| a.min(*p)).to_array();
         let high = points.iter().fold(DVec3::NEG_INFINITY, |a, p| a.max(*p)).to_array();
         for (corner, exact) in [low, high].iter().enumerate() {
-            for axis in 0..3 {
-                let [lo, hi] = outcome.certificate.bbox_mm[corner][axis];
-                assert!(lo - ROUNDING <= exact[axis] && exact[axis] <= hi + ROUNDING, "{} is not in [{lo}, {hi}]", exact[axis]);
+            for ([lo, hi], exact) in outcome.certificate.bbox_mm[corner].iter().zip(exact) {
+                assert!(lo - ROUNDING <= *exact && *exact <= hi + ROUNDING, "{exact} is not in [{lo}, {hi}]");
                 assert!(hi - lo <= 0.05, "[{lo}, {hi}] is wider than the tolerance");
             }
         }

@@ -71,8 +71,7 @@ impl Service {
         let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
         let (sender, addresses) = channel();
-        let pipes: [Box<dyn Read + Send>; 2] =
-            [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
+        let pipes: [Box<dyn Read + Send>; 2] = [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
         for pipe in pipes {
             let sender = sender.clone();
             std::thread::spawn(move || {
