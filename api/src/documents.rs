@@ -176,7 +176,7 @@ pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
         states: Some(found.states),
         degrees_of_freedom: Some(found.degrees_of_freedom),
         constraint_residual: Some(found.constraint_residual),
-        spectral_radius: Some(found.spectral_radius.map(|bound| bound.is_finite().then_some(bound))),
+        spectral_radius: found.spectral_radius.map(|bounds| bounds.map(|bound| bound.is_finite().then_some(bound))),
     })
 }
 

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use lacuna_exchange::format::{self, MeshFile, ReadLimits, Unit};
-use lacuna_kernel::solid::TriMesh;
+use lacuna_kernel::budget::Budget;
+use lacuna_kernel::measure::mass;
+use lacuna_kernel::solid::{Topology, TriMesh};
 use serde_json::{Value, json};
 
 use super::{print_json, read_input};
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, format_problem};
 
 /// Slicers of the PrusaSlicer line ask whether an object of less volume was saved in inches.
@@ -22,12 +24,16 @@ pub(super) fn inspect(path: &Path) -> Result<(), Problem> {
     let limits = ReadLimits::default();
     let bytes = read_input(path, limits.file_bytes)?;
     let file = production::guarded(|| format::read(&bytes, None, &limits))?.map_err(|error| format_problem(&error))?;
-    print_json(&report(&file, bytes.len()))
+    let topology = production::guarded(|| Topology::of(&file.mesh, &Budget::default()))?;
+    let topology = topology.map_err(|error| {
+        Problem::new(ProblemKind::InvalidFile, format!("{}: {error}", path.display())).code("inspect.topology")
+    })?;
+    print_json(&report(&file, bytes.len(), &topology))
 }
 
-fn report(file: &MeshFile, bytes: usize) -> Value {
+fn report(file: &MeshFile, bytes: usize, topology: &Topology) -> Value {
     let (mesh, facts) = (&file.mesh, &file.facts);
-    let (volume, area) = volume_and_area(mesh);
+    let (volume, area) = (mass::volume(mesh), mass::area(mesh));
     json!({
         "format": facts.format.facts().ending,
         "encoding": facts.encoding,
@@ -37,10 +43,22 @@ fn report(file: &MeshFile, bytes: usize) -> Value {
         "polygons_fanned": facts.polygons_fanned,
         "vertices": mesh.vertices.len(),
         "triangles": mesh.triangles.len(),
+        "edges": topology.edges,
+        "components": topology.components,
+        "shells": topology.shells,
+        "cavities": topology.cavities,
+        "genus": topology.is_closed_manifold().then_some(topology.genus),
+        "euler": topology.euler,
+        "boundary_edges": topology.boundary_edges,
+        "nonmanifold_edges": topology.nonmanifold_edges,
+        "nonmanifold_vertices": topology.nonmanifold_vertices,
+        "flipped_pairs": topology.flipped_pairs,
+        "degenerate_triangles": topology.degenerate_triangles,
+        "closed_manifold": topology.is_closed_manifold(),
         "bbox_mm": bounding_box(mesh),
         "volume_mm3": volume,
         "area_mm2": area,
-        "prompts": prompts(file, volume),
+        "prompts": prompts(file, volume, topology),
     })
 }
 
@@ -61,18 +79,8 @@ fn bounding_box(mesh: &TriMesh) -> Option<[[f64; 3]; 2]> {
     Some([low.to_array(), high.to_array()])
 }
 
-/// Enclosed volume (signed tetrahedra about the first vertex, so that a far origin costs no digits) and area.
-fn volume_and_area(mesh: &TriMesh) -> (f64, f64) {
-    let Some(&origin) = mesh.vertices.first() else { return (0.0, 0.0) };
-    let corner = |index: u32| mesh.vertices.get(index as usize).copied().unwrap_or(origin) - origin;
-    mesh.triangles.iter().fold((0.0, 0.0), |(volume, area), &[a, b, c]| {
-        let (a, b, c) = (corner(a), corner(b), corner(c));
-        (volume + a.dot(b.cross(c)) / 6.0, area + (b - a).cross(c - a).length() / 2.0)
-    })
-}
-
 /// What a slicer will ask or suffer from, with the way out.
-fn prompts(file: &MeshFile, volume: f64) -> Vec<Value> {
+fn prompts(file: &MeshFile, volume: f64, topology: &Topology) -> Vec<Value> {
     let mut prompts = Vec::new();
     let mut prompt = |code: &str, message: String| prompts.push(json!({ "code": code, "message": message }));
     let size = volume.abs();
@@ -90,7 +98,9 @@ fn prompts(file: &MeshFile, volume: f64) -> Vec<Value> {
     if file.facts.unit.is_none() {
         prompt("file.no-unit", "the file names no unit; programs take its numbers for mm".to_owned());
     }
-    if volume < 0.0 {
+    if !topology.is_closed_manifold() {
+        prompt("mesh.not-manifold", "the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing".to_owned());
+    } else if volume < 0.0 {
         prompt("mesh.inside-out", format!("the enclosed volume is {volume} mm3: the faces look inwards"));
     }
     if file.mesh.triangles.len() > MANY_TRIANGLES {
@@ -109,7 +119,9 @@ mod tests {
     #[test]
     fn a_tetrahedron_is_told_as_it_is() {
         let file = format::read(TETRAHEDRON, None, &ReadLimits::default()).unwrap();
-        let report = report(&file, TETRAHEDRON.len());
+        let topology = Topology::of(&file.mesh, &Budget::default()).unwrap();
+        let report = report(&file, TETRAHEDRON.len(), &topology);
+        assert_eq!((&report["closed_manifold"], &report["genus"], &report["edges"]), (&json!(true), &json!(0), &json!(6)));
         assert!((report["volume_mm3"].as_f64().unwrap() - 4.5).abs() < 1e-12);
         assert_eq!(report["bbox_mm"], json!([[0.0, 0.0, 0.0], [3.0, 3.0, 3.0]]));
         let codes: Vec<_> = report["prompts"].as_array().unwrap().iter().map(|p| p["code"].as_str().unwrap()).collect();
