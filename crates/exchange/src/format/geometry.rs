@@ -77,9 +77,7 @@ impl<'a> Geometry<'a> {
     pub fn content(&self) -> Carries {
         match self {
             Self::Solid(mesh) => Carries { solid: !mesh.triangles.is_empty(), ..Carries::default() },
-            Self::Parts(parts) => {
-                Carries { solid: parts.iter().any(|part| !part.mesh.triangles.is_empty()), ..Carries::default() }
-            }
+            Self::Parts(parts) => Carries { solid: parts.iter().any(|part| !part.mesh.triangles.is_empty()), ..Carries::default() },
             Self::Sample(sample) => Carries {
                 solid: false,
                 surface: !sample.triangles.is_empty(),
@@ -137,8 +135,7 @@ pub(crate) fn check(pieces: &[Piece<'_>]) -> Result<(), FormatError> {
             check_position(position, vertex, piece.exact)?;
         }
         let vertices = piece.vertices.len() as u64;
-        let out_of_range =
-            |place, index: u32| FormatError::IndexOutOfRange { place, index: i64::from(index), vertices };
+        let out_of_range = |place, index: u32| FormatError::IndexOutOfRange { place, index: i64::from(index), vertices };
         let beyond = |index: &&u32| u64::from(**index) >= vertices;
         for (triangle, corners) in (before.triangles..).zip(piece.triangles) {
             if let Some(&index) = corners.iter().find(beyond) {

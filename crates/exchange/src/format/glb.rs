@@ -87,11 +87,7 @@ fn document(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> Result<(Value, u64
     for (number, piece) in pieces.iter().enumerate() {
         let position = layout.positions(piece);
         let mut primitives = Vec::new();
-        for (mode, count) in [
-            (TRIANGLES, piece.triangles.len() * 3),
-            (LINES, piece.segments.len() * 2),
-            (POINTS, piece.points.len()),
-        ] {
+        for (mode, count) in [(TRIANGLES, piece.triangles.len() * 3), (LINES, piece.segments.len() * 2), (POINTS, piece.points.len())] {
             if count > 0 {
                 let indices = layout.indices(count);
                 primitives.push(json!({
@@ -133,9 +129,7 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
         words.push(b' ');
     }
     let total = FRAME_BYTES + words.len() as u64 + binary_bytes;
-    let length = |bytes: u64| {
-        u32::try_from(bytes).map_err(|_| FormatError::limit(Place::File, "file_bytes", total, u64::from(u32::MAX)))
-    };
+    let length = |bytes: u64| u32::try_from(bytes).map_err(|_| FormatError::limit(Place::File, "file_bytes", total, u64::from(u32::MAX)));
     let mut bytes = Vec::with_capacity(CHUNK_BYTES + 4096);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&VERSION.to_le_bytes());

@@ -1,8 +1,8 @@
 //! How much a file that somebody sent may ask for.
 
 use super::error::{FormatError, Place};
-use lacuna_kernel::solid::TriMesh;
 use glam::DVec3;
+use lacuna_kernel::solid::TriMesh;
 
 /// Bounds on a file that is read. Each is checked before memory is taken for what it bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,10 +49,9 @@ pub(crate) fn within(place: Place, limit: &'static str, asked: u64, allowed: u64
 
 /// Reserves room for `count` more elements, or says that there is none.
 pub(crate) fn reserve<T>(vector: &mut Vec<T>, count: usize, place: &Place) -> Result<(), FormatError> {
-    vector.try_reserve(count).map_err(|_| FormatError::OutOfMemory {
-        place: place.clone(),
-        bytes: (count as u64).saturating_mul(size_of::<T>() as u64),
-    })
+    vector
+        .try_reserve(count)
+        .map_err(|_| FormatError::OutOfMemory { place: place.clone(), bytes: (count as u64).saturating_mul(size_of::<T>() as u64) })
 }
 
 /// A mesh under construction, kept within the limits.
@@ -73,13 +72,7 @@ impl<'a> MeshBuilder<'a> {
     }
 
     /// Refuses announced counts over the limits; takes memory only for what the file has bytes for.
-    pub(crate) fn announce(
-        &mut self,
-        vertices: u64,
-        triangles: u64,
-        bytes_left: u64,
-        place: &Place,
-    ) -> Result<(), FormatError> {
+    pub(crate) fn announce(&mut self, vertices: u64, triangles: u64, bytes_left: u64, place: &Place) -> Result<(), FormatError> {
         within(place.clone(), "vertices", vertices, self.limits.vertices)?;
         within(place.clone(), "triangles", triangles, self.limits.triangles)?;
         // Neither a vertex nor a face is shorter than four bytes in any format read here.

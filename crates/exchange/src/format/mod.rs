@@ -4,6 +4,22 @@
 //! [`verify_written`] are the only doors. Lengths are millimetres throughout; every coordinate
 //! that is written is a single-precision number, and a zero is never negative, so that programs
 //! which join vertices by their bits join the same ones as those which compare numbers.
+//!
+//! ```
+//! use lacuna_exchange::format::{Format, Metadata, ReadLimits, read, verify_written, write};
+//! use lacuna_kernel::solid::TriMesh;
+//! use glam::DVec3;
+//!
+//! let tetrahedron = TriMesh {
+//!     vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
+//!     triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+//! };
+//! let mut file = std::io::Cursor::new(Vec::new());
+//! write(Format::ThreeMf, &tetrahedron, &Metadata::default(), &mut file)?;
+//! verify_written(Format::ThreeMf, &mut file, &tetrahedron)?;
+//! assert_eq!(read(file.get_ref(), None, &ReadLimits::default())?.mesh, tetrahedron);
+//! # Ok::<(), lacuna_exchange::format::FormatError>(())
+//! ```
 
 mod error;
 mod geometry;
@@ -102,14 +118,7 @@ pub const FORMATS: [FormatFacts; 7] = [
         carries: Carries { solid: true, surface: false, wires: false, points: false },
         reads: true,
     },
-    FormatFacts {
-        format: Format::Glb,
-        name: "GLB",
-        ending: "glb",
-        media_type: "model/gltf-binary",
-        carries: EVERYTHING,
-        reads: false,
-    },
+    FormatFacts { format: Format::Glb, name: "GLB", ending: "glb", media_type: "model/gltf-binary", carries: EVERYTHING, reads: false },
     FormatFacts { format: Format::Obj, name: "OBJ", ending: "obj", media_type: "model/obj", carries: EVERYTHING, reads: true },
     FormatFacts {
         format: Format::Ply,
@@ -203,12 +212,7 @@ pub struct Metadata<'a> {
 
 impl Default for Metadata<'_> {
     fn default() -> Self {
-        Self {
-            title: None,
-            application: concat!("lacuna ", env!("CARGO_PKG_VERSION")),
-            certificate: None,
-            thumbnail_png: None,
-        }
+        Self { title: None, application: concat!("lacuna ", env!("CARGO_PKG_VERSION")), certificate: None, thumbnail_png: None }
     }
 }
 
@@ -268,11 +272,7 @@ fn fit_pieces<'a>(format: Format, geometry: &Geometry<'a>) -> Result<Vec<Piece<'
 /// # Errors
 /// [`FormatError::Differs`] names the first difference; [`FormatError::CannotVerify`] for
 /// pictures and evaluations, of which nothing is proven that a file could carry on.
-pub fn verify_written<'a, R: Read + Seek>(
-    format: Format,
-    source: &mut R,
-    geometry: impl Into<Geometry<'a>>,
-) -> Result<(), FormatError> {
+pub fn verify_written<'a, R: Read + Seek>(format: Format, source: &mut R, geometry: impl Into<Geometry<'a>>) -> Result<(), FormatError> {
     let geometry = geometry.into();
     if matches!(geometry, Geometry::Sample(_)) || format == Format::Png {
         return Err(FormatError::CannotVerify { format });

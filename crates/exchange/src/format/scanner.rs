@@ -118,8 +118,7 @@ impl<R: Read> Scanner<R> {
     pub(crate) fn bytes<const LENGTH: usize>(&mut self) -> Result<[u8; LENGTH], FormatError> {
         const { assert!(LENGTH <= LONGEST) };
         self.fill()?;
-        let bytes: Option<[u8; LENGTH]> =
-            self.window[self.start..self.end].first_chunk::<LENGTH>().copied();
+        let bytes: Option<[u8; LENGTH]> = self.window[self.start..self.end].first_chunk::<LENGTH>().copied();
         let Some(bytes) = bytes else {
             return Err(self.differs(format!("{LENGTH} bytes"), format!("{} bytes", self.end - self.start)));
         };

@@ -49,8 +49,7 @@ fn normal(corners: [DVec3; 3]) -> [f32; 3] {
 /// Writes 84 + 50 n bytes.
 pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
     let facets = counts(pieces).triangles;
-    let count = u32::try_from(facets)
-        .map_err(|_| FormatError::limit(Place::File, "triangles", facets, u64::from(u32::MAX)))?;
+    let count = u32::try_from(facets).map_err(|_| FormatError::limit(Place::File, "triangles", facets, u64::from(u32::MAX)))?;
     sink.write_all(&header(metadata))?;
     sink.write_all(&count.to_le_bytes())?;
     let mut chunk = vec![0_u8; CHUNK_BYTES / FACET_BYTES * FACET_BYTES];
@@ -212,9 +211,7 @@ impl<'a> Joined<'a> {
         within(place.clone(), "triangles", facets, self.limits.triangles)?;
         let vertices = usize::try_from(facets / 2).unwrap_or(usize::MAX);
         let asked = (vertices as u64).saturating_mul(40);
-        self.known
-            .try_reserve(vertices)
-            .map_err(|_| FormatError::OutOfMemory { place: place.clone(), bytes: asked })?;
+        self.known.try_reserve(vertices).map_err(|_| FormatError::OutOfMemory { place: place.clone(), bytes: asked })?;
         self.builder.announce(facets / 2, facets, facets * FACET_BYTES as u64, place)
     }
 
@@ -224,16 +221,14 @@ impl<'a> Joined<'a> {
             // Adding zero makes -0 and 0 one number.
             let next = self.builder.vertex_count();
             if self.known.len() == self.known.capacity() {
-                self.known
-                    .try_reserve(next.max(1024))
-                    .map_err(|_| FormatError::OutOfMemory { place: place(), bytes: next as u64 * 40 })?;
+                self.known.try_reserve(next.max(1024)).map_err(|_| FormatError::OutOfMemory { place: place(), bytes: next as u64 * 40 })?;
             }
             *index = match self.known.entry(corner.map(|value| (value + 0.0).to_bits())) {
                 Entry::Occupied(known) => *known.get(),
                 Entry::Vacant(vacant) => {
                     self.builder.vertex(DVec3::from_array(corner) + DVec3::ZERO, place)?;
-                    let index = u32::try_from(next)
-                        .map_err(|_| FormatError::limit(place(), "vertices", next as u64, u64::from(u32::MAX)))?;
+                    let index =
+                        u32::try_from(next).map_err(|_| FormatError::limit(place(), "vertices", next as u64, u64::from(u32::MAX)))?;
                     *vacant.insert(index)
                 }
             };

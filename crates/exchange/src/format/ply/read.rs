@@ -216,7 +216,11 @@ impl Body<'_> {
         let place = self.place();
         let value = self.value(scalar)?;
         #[expect(clippy::cast_possible_truncation, reason = "whole and small, by the test")]
-        if value.fract() == 0.0 && value.abs() < 9e15 { Ok(value as i64) } else { Err(malformed(place, "a whole number", value.to_string().as_bytes())) }
+        if value.fract() == 0.0 && value.abs() < 9e15 {
+            Ok(value as i64)
+        } else {
+            Err(malformed(place, "a whole number", value.to_string().as_bytes()))
+        }
     }
 
     /// The length of a list, which the rest of the file must have room for.

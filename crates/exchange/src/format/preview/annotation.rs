@@ -103,9 +103,7 @@ impl Drawing<'_> {
     fn hidden(&self, [row, column]: [usize; 2], depth: f32) -> f32 {
         // An edge that a face of the shape runs along belongs before it.
         let depth = depth + SAMPLES as f32;
-        let before = |(y, x): &(usize, usize)| {
-            self.samples.depths[(row * SAMPLES + y) * self.samples.side + column * SAMPLES + x] > depth
-        };
+        let before = |(y, x): &(usize, usize)| self.samples.depths[(row * SAMPLES + y) * self.samples.side + column * SAMPLES + x] > depth;
         [(0, 0), (0, 1), (1, 0), (1, 1)].iter().filter(|sample| before(sample)).count() as f32 / 4.0
     }
 
@@ -210,8 +208,7 @@ mod tests {
 
     #[test]
     fn dimensions_have_four_digits_at_most() {
-        for (value, expected) in
-            [(54.0, "54"), (53.987_6, "53.99"), (0.125, "0.125"), (1234.56, "1235"), (120.0, "120"), (1e-7, "1.00e-7")]
+        for (value, expected) in [(54.0, "54"), (53.987_6, "53.99"), (0.125, "0.125"), (1234.56, "1235"), (120.0, "120"), (1e-7, "1.00e-7")]
         {
             assert_eq!(number(value), expected);
         }

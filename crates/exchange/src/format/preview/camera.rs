@@ -36,8 +36,7 @@ impl Camera {
         let up = toward.cross(right);
         // Half the box's extent along a direction of the picture.
         let half = |direction: DVec3| 0.5 * direction.abs().dot(size);
-        let [left_margin, right_margin, top_margin, bottom_margin] =
-            if options.annotated { MARGINS } else { PLAIN_MARGINS };
+        let [left_margin, right_margin, top_margin, bottom_margin] = if options.annotated { MARGINS } else { PLAIN_MARGINS };
         let side = f64::from(options.pixels) * SAMPLES as f64;
         let free = [side * (1.0 - left_margin - right_margin), side * (1.0 - top_margin - bottom_margin)];
         let fit = (0.5 * free[0] / half(right)).min(0.5 * free[1] / half(up));

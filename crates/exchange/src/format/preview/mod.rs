@@ -80,11 +80,7 @@ struct Scene<'a> {
 /// [`FormatError::Empty`] if there is nothing to see, [`FormatError::NotFinite`] and
 /// [`FormatError::IndexOutOfRange`] for an unfit geometry, [`FormatError::Limit`] for a side out of
 /// range, more than 4 thousand million elements, or layers over layers of them, [`FormatError::Stream`] if the sink fails.
-pub fn write<'a, W: Write>(
-    geometry: impl Into<Geometry<'a>>,
-    options: &PreviewOptions,
-    sink: &mut W,
-) -> Result<(), FormatError> {
+pub fn write<'a, W: Write>(geometry: impl Into<Geometry<'a>>, options: &PreviewOptions, sink: &mut W) -> Result<(), FormatError> {
     let geometry = geometry.into();
     let pieces = geometry.pieces();
     let counts = geometry::counts(&pieces);
@@ -154,11 +150,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The elements of all pieces over one run of vertices; a single piece's are borrowed.
-fn joined<'a, T: Copy>(
-    pieces: &[Piece<'a>],
-    elements: impl Fn(&Piece<'a>) -> &'a [T],
-    shift: impl Fn(T, u32) -> T,
-) -> Cow<'a, [T]> {
+fn joined<'a, T: Copy>(pieces: &[Piece<'a>], elements: impl Fn(&Piece<'a>) -> &'a [T], shift: impl Fn(T, u32) -> T) -> Cow<'a, [T]> {
     if let [piece] = pieces {
         return Cow::Borrowed(elements(piece));
     }

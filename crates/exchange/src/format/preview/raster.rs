@@ -4,8 +4,8 @@
 //! then the bands are filled independently, each in the order of the elements, so that the result
 //! is the same for any number of threads.
 
-use super::Scene;
 use super::super::error::{FormatError, Place};
+use super::Scene;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -83,8 +83,7 @@ pub(super) fn rasterise(scene: &Scene<'_>, side: usize) -> Result<Samples, Forma
     if work > MOST_SAMPLES {
         return Err(FormatError::limit(Place::File, "preview_samples", work, MOST_SAMPLES));
     }
-    let mut samples =
-        Samples { side, depths: vec![f32::NEG_INFINITY; side * side], elements: vec![NOTHING; side * side] };
+    let mut samples = Samples { side, depths: vec![f32::NEG_INFINITY; side * side], elements: vec![NOTHING; side * side] };
     let depths = samples.depths.par_chunks_mut(side * BAND_ROWS);
     let elements = samples.elements.par_chunks_mut(side * BAND_ROWS);
     depths.zip(elements).enumerate().for_each(|(band, (depths, elements))| {
@@ -195,11 +194,7 @@ impl Band<'_> {
             let mut span = columns.clone();
             if columns.len() > WIDE {
                 // The shares are affine along the row: each sign gives a bound on x.
-                let bounds = [
-                    (down * to_b.y, to_b.x),
-                    (down * to_c.y, to_c.x),
-                    (1.0 - down * (to_b.y + to_c.y), -to_b.x - to_c.x),
-                ];
+                let bounds = [(down * to_b.y, to_b.x), (down * to_c.y, to_c.x), (1.0 - down * (to_b.y + to_c.y), -to_b.x - to_c.x)];
                 span = within_bounds(span, a.x, bounds);
             }
             for column in span {

@@ -86,8 +86,10 @@ fn lying_counts_take_no_memory() {
     assert_eq!(code(b"OFF\n-1 4 0\n", Format::Off), "format.malformed");
     assert_eq!(code(b"OFF\n99999999999 4 0\n", Format::Off), "format.limit");
     let ply = |count: &str, rest: &[u8]| {
-        let head = format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\nproperty float x\n\
-            property float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n");
+        let head = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {count}\nproperty float x\n\
+            property float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"
+        );
         code(&[head.as_bytes(), rest].concat(), Format::Ply)
     };
     assert_eq!(ply("18446744073709551615", b""), "format.truncated");
@@ -113,7 +115,10 @@ fn errors_name_the_place() {
     assert_eq!(refused(text, None, &ReadLimits::default()).1, "line 4: STL expects a coordinate, found \"\"");
     assert_eq!(refused(b"v 0 0 0\nf 0 1 1", None, &ReadLimits::default()).0, "format.malformed");
     assert_eq!(refused(b"hello", None, &ReadLimits::default()).0, "format.unknown");
-    assert_eq!(refused(b"v 0 0 0\nf 9223372036854775807 -9223372036854775808 1", None, &ReadLimits::default()).0, "format.index-out-of-range");
+    assert_eq!(
+        refused(b"v 0 0 0\nf 9223372036854775807 -9223372036854775808 1", None, &ReadLimits::default()).0,
+        "format.index-out-of-range"
+    );
 }
 
 #[test]
@@ -122,11 +127,9 @@ fn limits_hold_in_every_format() {
     for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off] {
         let bytes = written(format, &mesh, &Metadata::default());
         let default = ReadLimits::default();
-        for limits in [
-            ReadLimits { vertices: 95, ..default },
-            ReadLimits { triangles: 191, ..default },
-            ReadLimits { file_bytes: 100, ..default },
-        ] {
+        for limits in
+            [ReadLimits { vertices: 95, ..default }, ReadLimits { triangles: 191, ..default }, ReadLimits { file_bytes: 100, ..default }]
+        {
             assert_eq!(refused(&bytes, Some(format), &limits).0, "format.limit", "{format}");
         }
         let enough = ReadLimits { vertices: 96, triangles: 192, ..default };
@@ -156,7 +159,8 @@ fn units_components_and_transforms_are_applied() {
 fn what_a_3mf_file_must_not_do_is_refused() {
     let item = "<build><item objectid='1'/></build>";
     let code = |root: &str, body: &str| threemf(root, body).unwrap_err().code();
-    let loops = "<resources><object id='1'><components><component objectid='1'/><component objectid='1'/></components></object></resources>";
+    let loops =
+        "<resources><object id='1'><components><component objectid='1'/><component objectid='1'/></components></object></resources>";
     assert_eq!(code("", &format!("{loops}{item}")), "format.limit");
     assert_eq!(code("", item), "format.malformed");
     assert_eq!(code("unit='parsec'", item), "format.malformed");
@@ -172,6 +176,17 @@ fn what_a_3mf_file_must_not_do_is_refused() {
     assert_eq!(parts(&[RELATIONSHIPS]).code(), "format.malformed");
     assert_eq!(parts(&[("_rels/.rels", "<Relationships><Relationship TargetMode='External'/></Relationships>")]).code(), "format.refused");
     assert_eq!(parts(&[("readme.txt", "hello")]).code(), "format.malformed");
+}
+
+#[test]
+fn two_entries_of_one_name_are_refused() {
+    let mut bytes = package(&[RELATIONSHIPS, ("3D/3dmodel.model", "<a/>"), ("3D/3dmodel.other", "<b/>")]);
+    for at in 0..bytes.len() - 5 {
+        if &bytes[at..at + 5] == b"other" {
+            bytes[at..at + 5].copy_from_slice(b"model");
+        }
+    }
+    assert_eq!(read(&bytes, None, &ReadLimits::default()).unwrap_err().code(), "format.refused");
 }
 
 #[test]

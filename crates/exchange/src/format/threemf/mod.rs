@@ -87,11 +87,7 @@ impl Block<'_> {
 }
 
 /// Writes the archive: content types, relationships, the picture if there is one, the model.
-pub(crate) fn write<W: Write + Seek>(
-    pieces: &[Piece<'_>],
-    metadata: &Metadata<'_>,
-    sink: &mut W,
-) -> Result<(), FormatError> {
+pub(crate) fn write<W: Write + Seek>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
     for piece in pieces {
         check_countable(piece)?;
     }
@@ -112,8 +108,7 @@ pub(crate) fn write<W: Write + Seek>(
     let blocks = blocks(&head, &objects, pieces);
     // Two blocks for each thread at a time: the threads seldom wait, and memory stays flat.
     for batch in blocks.chunks(2 * rayon::current_num_threads()) {
-        let deflated: Result<Vec<Deflated>, FormatError> =
-            batch.par_iter().map(|block| Deflated::new(&block.text(), false)).collect();
+        let deflated: Result<Vec<Deflated>, FormatError> = batch.par_iter().map(|block| Deflated::new(&block.text(), false)).collect();
         for block in deflated? {
             archive.append(&block)?;
         }

@@ -80,9 +80,11 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
 }
 
 fn open<'a>(bytes: &'a [u8], limits: &'a ReadLimits) -> Result<Package<'a>, FormatError> {
-    let archive =
-        ZipArchive::new(Cursor::new(bytes)).map_err(|source| FormatError::Archive { place: Place::File, source })?;
+    let archive = ZipArchive::new(Cursor::new(bytes)).map_err(|source| FormatError::Archive { place: Place::File, source })?;
     within(Place::File, "archive_entries", archive.len() as u64, limits.archive_entries)?;
+    if archive.has_duplicate_names() {
+        return Err(FormatError::Refused { place: Place::File, what: "two archive entries of one name" });
+    }
     for name in archive.file_names_raw() {
         let climbs = name.split(|&byte| byte == b'/').any(|step| step == b"..");
         if climbs || name.starts_with(b"/") || name.contains(&b'\\') || name.contains(&0) {
@@ -91,7 +93,9 @@ fn open<'a>(bytes: &'a [u8], limits: &'a ReadLimits) -> Result<Package<'a>, Form
             return Err(FormatError::Refused { place, what: "an archive entry whose name is a path out of it" });
         }
     }
-    let ratio_most = (bytes.len() as u64).saturating_mul(limits.inflation_ratio);
+    // A few lines that repeat deflate better than any mesh, and harm nobody.
+    const ALWAYS_ALLOWED: u64 = 1 << 20;
+    let ratio_most = (bytes.len() as u64).saturating_mul(limits.inflation_ratio).max(ALWAYS_ALLOWED);
     let archive_most = limits.inflated_bytes.min(ratio_most);
     let allowance = Allowance { archive_left: archive_most, archive_most };
     Ok(Package { archive, allowance, limits, parsed: (0, 0) })
@@ -119,11 +123,7 @@ fn start_part(package: &mut Package<'_>) -> Result<String, FormatError> {
 
 impl Package<'_> {
     /// Goes through the tags of a part, whose name is compared without regard to case.
-    fn visit(
-        &mut self,
-        part: &str,
-        visitor: &mut dyn FnMut(Tag<'_, '_>, u64) -> Result<(), FormatError>,
-    ) -> Result<(), FormatError> {
+    fn visit(&mut self, part: &str, visitor: &mut dyn FnMut(Tag<'_, '_>, u64) -> Result<(), FormatError>) -> Result<(), FormatError> {
         let same = |name: &[u8]| name.eq_ignore_ascii_case(part.as_bytes());
         let index = self.archive.file_names_raw().position(same);
         let index = index.ok_or_else(|| malformed(part, 0, "the part in the archive", b"none"))?;
@@ -227,8 +227,7 @@ impl ModelReading<'_> {
                 }
             }
         }
-        let declared =
-            |namespace: &str| prefixes.iter().find(|(_, value)| *value == namespace).map(|(prefix, _)| prefix.clone());
+        let declared = |namespace: &str| prefixes.iter().find(|(_, value)| *value == namespace).map(|(prefix, _)| prefix.clone());
         self.core_prefix = declared(CORE_NAMESPACE);
         self.production_prefix = declared(PRODUCTION_NAMESPACE);
         if self.core(element.name().0) != Some("model") {
@@ -367,9 +366,8 @@ impl Placing<'_> {
             self.models.insert(part.clone(), model);
         }
         let object = self.models.get_mut(&part).and_then(|model| model.objects.get_mut(&reference.object));
-        let object = object.ok_or_else(|| {
-            malformed(&part, 0, "the object that is referred to", reference.object.to_string().as_bytes())
-        })?;
+        let object =
+            object.ok_or_else(|| malformed(&part, 0, "the object that is referred to", reference.object.to_string().as_bytes()))?;
         if !object.is_model {
             return Ok(());
         }

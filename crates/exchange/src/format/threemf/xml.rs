@@ -86,8 +86,7 @@ pub(super) fn visit<R: Read>(
     allowance: &mut Allowance,
     visitor: &mut dyn FnMut(Tag<'_, '_>, u64) -> Result<(), FormatError>,
 ) -> Result<(), FormatError> {
-    let counted =
-        Counted { source: BufReader::with_capacity(64 << 10, source), allowance, event_left: 0, exceeded: None };
+    let counted = Counted { source: BufReader::with_capacity(64 << 10, source), allowance, event_left: 0, exceeded: None };
     let mut reader = Reader::from_reader(counted);
     let mut buffer = Vec::new();
     let mut depth = 0_u64;
