@@ -3,6 +3,7 @@
 
 use super::{Attractor, Root, StateBound};
 use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator};
+use crate::measure::triangle::closest_on_triangle;
 
 /// A point or vector of space in mm.
 pub type Point = [f64; 3];
@@ -24,16 +25,6 @@ impl Ball {
     }
 }
 
-/// Whether cells stand for a set to dilate (any set near the cell will do) or are to be drawn as the
-/// model says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
-    /// Sites of a dilation: the fewest cells for the error.
-    Sites,
-    /// An evaluation: the model's own primitives.
-    Drawing,
-}
-
 /// What stands for a leaf cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Site {
@@ -43,6 +34,26 @@ pub enum Site {
     Segment([Point; 2]),
     /// A triangle.
     Triangle([Point; 3]),
+}
+
+impl Site {
+    /// The point of the site closest to x.
+    #[inline]
+    #[must_use]
+    pub fn closest(&self, x: &Point) -> Point {
+        match self {
+            Self::Point(point) => *point,
+            Self::Segment([a, b]) => closest_on_segment(x, a, b),
+            Self::Triangle([a, b, c]) => closest_on_triangle(x, a, b, c),
+        }
+    }
+
+    /// The squared distance of x from the site.
+    #[inline]
+    #[must_use]
+    pub fn distance_squared(&self, x: &Point) -> f64 {
+        distance_squared(x, &self.closest(x))
+    }
 }
 
 /// A bounded cell. `stretch` is, for frames, a bound of the norm of the root's frame times the product
@@ -147,7 +158,7 @@ pub(crate) fn child_points(parent: &[ControlPoint], operator: &SubdivisionOperat
 /// A bound of the spectral norm of the 3 x 3 matrix with these columns: the square root of the largest
 /// absolute row sum of A A^T (exact for similarities) or of its Frobenius norm, whichever is less.
 #[inline]
-fn matrix_norm(columns: &[Point; 3]) -> f64 {
+pub(super) fn matrix_norm(columns: &[Point; 3]) -> f64 {
     let entry = |i: usize, j: usize| columns[0][i] * columns[0][j] + columns[1][i] * columns[1][j] + columns[2][i] * columns[2][j];
     let (xx, yy, zz) = (entry(0, 0), entry(1, 1), entry(2, 2));
     let (xy, xz, yz) = (entry(0, 1), entry(0, 2), entry(1, 2));
@@ -157,13 +168,13 @@ fn matrix_norm(columns: &[Point; 3]) -> f64 {
 }
 
 #[inline]
-fn frame_columns(points: &[ControlPoint]) -> [Point; 3] {
+pub(super) fn frame_columns(points: &[ControlPoint]) -> [Point; 3] {
     let column = |j: usize| [points[j][0] - points[0][0], points[j][1] - points[0][1], points[j][2] - points[0][2]];
     [column(1), column(2), column(3)]
 }
 
 #[inline]
-fn times(columns: &[Point; 3], x: &Point) -> Point {
+pub(super) fn times(columns: &[Point; 3], x: &Point) -> Point {
     let row = |i: usize| columns[0][i] * x[0] + columns[1][i] * x[1] + columns[2][i] * x[2];
     [row(0), row(1), row(2)]
 }
@@ -233,7 +244,7 @@ impl Attractor {
 
     /// The error of replacing the cell by what stands for it, in mm: a bound of their Hausdorff distance.
     #[inline]
-    pub(crate) fn leaf_error(&self, cell: &Cell, points: &[ControlPoint], purpose: Purpose) -> f64 {
+    pub(crate) fn leaf_error(&self, cell: &Cell, points: &[ControlPoint]) -> f64 {
         let rational = self.roots()[cell.root as usize].rational;
         match &self.automaton().state(cell.state).leaf {
             LeafPrimitive::Centre => cell.ball.radius,
@@ -251,20 +262,16 @@ impl Attractor {
                 let margin = self.bound(cell.state).margin();
                 if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord }
             }
-            LeafPrimitive::Polygon(_) if purpose == Purpose::Sites => cell.ball.radius,
             // Corners belong to the surface and every point of the polygon and of the cell is within the ball:
             // no two points of them are farther apart than its diameter.
             LeafPrimitive::Polygon(_) => 2.0 * cell.ball.radius,
-            LeafPrimitive::Drawn(drawing) => {
-                let drawn = matrix_norm(&frame_columns(points)) * drawing.defect;
-                if purpose == Purpose::Sites { drawn.min(cell.ball.radius) } else { drawn }
-            }
+            LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
         }
     }
 
     /// Emits what stands for a leaf cell.
     #[inline]
-    pub(crate) fn emit(&self, cell: &Cell, points: &[ControlPoint], purpose: Purpose, sink: &mut impl FnMut(Site)) {
+    pub(crate) fn emit(&self, cell: &Cell, points: &[ControlPoint], sink: &mut impl FnMut(Site)) {
         let rational = self.roots()[cell.root as usize].rational;
         let corner = |j: usize| project(&points[j], rational);
         match &self.automaton().state(cell.state).leaf {
@@ -277,7 +284,6 @@ impl Attractor {
             LeafPrimitive::Chord(ends) => {
                 sink(Site::Segment([self.barycentric(points, &ends.start, rational), self.barycentric(points, &ends.end, rational)]));
             }
-            LeafPrimitive::Polygon(_) if purpose == Purpose::Sites => sink(Site::Point(cell.ball.centre)),
             LeafPrimitive::Polygon(corners) => {
                 let first = self.barycentric(points, &corners[0], rational);
                 for pair in corners[1..].windows(2) {
@@ -290,9 +296,6 @@ impl Attractor {
             }
             LeafPrimitive::Drawn(drawing) => {
                 let columns = frame_columns(points);
-                if purpose == Purpose::Sites && cell.ball.radius < matrix_norm(&columns) * drawing.defect {
-                    return sink(Site::Point(cell.ball.centre));
-                }
                 let place = |index: u32| {
                     let offset = times(&columns, &drawing.vertices[index as usize]);
                     [points[0][0] + offset[0], points[0][1] + offset[1], points[0][2] + offset[2]]

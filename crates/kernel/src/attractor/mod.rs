@@ -3,12 +3,15 @@
 
 mod bound;
 pub mod cell;
+mod cover;
 mod defect;
 mod refine;
+pub(crate) mod sites;
 
 use crate::automaton::{Automaton, AutomatonError, Contraction, StateId, convergence};
 use crate::error::Kind;
 pub use bound::StateBound;
+pub use cover::PointCover;
 pub use refine::{RefineError, count_cells, refine};
 
 /// Where a shape begins: a state and its control points.
@@ -49,6 +52,7 @@ pub struct Attractor {
     roots: Vec<Root>,
     solids: Vec<SolidSurface>,
     bounds: Vec<StateBound>,
+    covers: Vec<Option<PointCover>>,
     contraction: Contraction,
     warnings: Vec<String>,
 }
@@ -164,7 +168,8 @@ impl Attractor {
             return Err(AttractorError::Overflow);
         }
         defect::measure_drawings(&mut automaton, &bounds);
-        let attractor = Self { automaton, roots, solids, bounds, contraction, warnings };
+        let covers = cover::covers(&automaton, &bounds, &contraction);
+        let attractor = Self { automaton, roots, solids, bounds, covers, contraction, warnings };
         attractor.check_roots()?;
         Ok(attractor)
     }
@@ -210,6 +215,19 @@ impl Attractor {
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// The points that stand for a state, where they are known.
+    pub(crate) fn cover(&self, state: StateId) -> Option<&PointCover> {
+        self.covers[state.index()].as_ref()
+    }
+
+    /// Radius of a frame state's ball, in the frame's unit.
+    pub(crate) fn ball_radius(&self, state: StateId) -> f64 {
+        match self.bound(state) {
+            StateBound::Frame { reach, .. } => cell::matrix_norm(reach),
+            StateBound::Hull { .. } => f64::INFINITY,
+        }
     }
 
     /// The bound of a state.

@@ -2,7 +2,7 @@
 //! the tolerance.
 
 use super::Attractor;
-use super::cell::{Cell, ControlPoint, Point, Purpose, Site, child_points, distance_squared};
+use super::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::tessellation::Tessellation;
@@ -88,7 +88,6 @@ struct Walker<'a> {
     attractor: &'a Attractor,
     budget: &'a Budget,
     tolerance_mm: f64,
-    purpose: Purpose,
     total: &'a AtomicU64,
     /// Control points of the children on the current path, one buffer per depth.
     buffers: Vec<Vec<ControlPoint>>,
@@ -98,14 +97,14 @@ struct Walker<'a> {
 
 impl Walker<'_> {
     fn descend(&mut self, cell: &Cell, points: &[ControlPoint], depth: u32, sink: &mut impl FnMut(Site)) -> Result<(), RefineError> {
-        let error = self.attractor.leaf_error(cell, points, self.purpose);
+        let error = self.attractor.leaf_error(cell, points);
         if error <= self.tolerance_mm {
             self.leaves += 1;
             self.deviation = self.deviation.max(error);
             if self.leaves.is_multiple_of(LEAVES_PER_CHECK) {
                 self.check(error)?;
             }
-            self.attractor.emit(cell, points, self.purpose, sink);
+            self.attractor.emit(cell, points, sink);
             return Ok(());
         }
         if depth >= self.budget.limits.depth {
@@ -146,7 +145,7 @@ impl Walker<'_> {
 }
 
 /// Splits the roots into about [`TASKS`] cells, in address order.
-fn tasks(attractor: &Attractor, tolerance_mm: f64, purpose: Purpose) -> Vec<(Cell, Vec<ControlPoint>, u32)> {
+fn tasks(attractor: &Attractor, tolerance_mm: f64) -> Vec<(Cell, Vec<ControlPoint>, u32)> {
     let roots = attractor.roots();
     let mut level: Vec<_> = (0..roots.len()).map(|index| (attractor.root_cell(index), roots[index].points.clone(), 0)).collect();
     for _ in 0..24 {
@@ -156,7 +155,7 @@ fn tasks(attractor: &Attractor, tolerance_mm: f64, purpose: Purpose) -> Vec<(Cel
         let mut next = Vec::with_capacity(level.len() * 2);
         let mut split = false;
         for (cell, points, depth) in level {
-            if attractor.leaf_error(&cell, &points, purpose) <= tolerance_mm {
+            if attractor.leaf_error(&cell, &points) <= tolerance_mm {
                 next.push((cell, points, depth));
                 continue;
             }
@@ -184,7 +183,7 @@ fn tasks(attractor: &Attractor, tolerance_mm: f64, purpose: Purpose) -> Vec<(Cel
 pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, RefineError> {
     let total = AtomicU64::new(0);
     let tolerance_mm = tolerance.mm();
-    let parts: Vec<Result<Part, RefineError>> = tasks(attractor, tolerance_mm, Purpose::Drawing)
+    let parts: Vec<Result<Part, RefineError>> = tasks(attractor, tolerance_mm)
         .par_iter()
         .with_max_len(1)
         .map(|(cell, points, depth)| {
@@ -192,7 +191,6 @@ pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> R
                 attractor,
                 budget,
                 tolerance_mm,
-                purpose: Purpose::Drawing,
                 total: &total,
                 buffers: vec![Vec::new(); *depth as usize],
                 leaves: 0,
@@ -229,7 +227,7 @@ fn largest_coordinate(vertices: &[glam::DVec3]) -> f64 {
 /// As [`refine`].
 pub fn count_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<u64, RefineError> {
     let total = AtomicU64::new(0);
-    tasks(attractor, tolerance.mm(), Purpose::Sites)
+    tasks(attractor, tolerance.mm())
         .par_iter()
         .with_max_len(1)
         .map(|(cell, points, depth)| {
@@ -237,7 +235,6 @@ pub fn count_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget)
                 attractor,
                 budget,
                 tolerance_mm: tolerance.mm(),
-                purpose: Purpose::Sites,
                 total: &total,
                 buffers: vec![Vec::new(); *depth as usize],
                 leaves: 0,

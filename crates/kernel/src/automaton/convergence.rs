@@ -65,11 +65,12 @@ impl Contraction {
 }
 
 /// Work allowed for the search, in multiplications: some tens of milliseconds.
-const SEARCH_WORK: f64 = 6e7;
+const SEARCH_WORK: f64 = 1.5e7;
 /// Longest path examined.
 const MAXIMUM_DEPTH: usize = 64;
-/// The upper bound may exceed the lower by this share before the search stops.
-const RELATIVE_GAP: f64 = 1e-3;
+/// The search stops when the upper bound exceeds the lower by this share of what is left to 1: bounds far
+/// from 1 decide, whatever their digits.
+const GAP: f64 = 0.02;
 
 struct Step {
     to: usize,
@@ -259,7 +260,7 @@ fn search(steps: &[Vec<Step>], result: &mut Contraction) {
         }
         result.depth = depth;
         // A path whose rate is low enough needs no extension: it ends a leaf of the tree.
-        let enough = result.lower * (1.0 + RELATIVE_GAP);
+        let enough = result.lower + GAP * (1.0 - result.lower).max(1e-6 * result.lower);
         closed_rate = next.iter().filter(|path| path.rate <= enough).map(|path| path.rate).fold(closed_rate, f64::max);
         next.retain(|path| path.rate > enough);
         if exhausted || next.is_empty() || depth == MAXIMUM_DEPTH {

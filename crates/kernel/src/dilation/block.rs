@@ -21,9 +21,10 @@
 
 use super::Setting;
 use super::lattice::{CUTS, EDGE_ENDS, EDGES, Tetrahedron};
-use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, closest_on_site};
+use super::tree::{Candidates, Hit, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, distance_squared, dot, subtract};
+use crate::attractor::sites::{SiteError, SiteRule};
 use crate::measure::triangle::{Feature, closest_feature};
 
 /// Cubes along a block's side.
@@ -59,8 +60,8 @@ pub(super) struct BlockSurface {
     pub(super) inner_square: f64,
     /// Leaf cells met.
     pub(super) leaves: u64,
-    /// Largest error of a leaf met.
-    pub(super) leaf_error: f64,
+    /// Largest errors of leaves met.
+    pub(super) site_error: SiteError,
 }
 
 /// A vertex on an edge that belongs to a following block.
@@ -93,10 +94,10 @@ pub(super) struct Workshop<'a> {
 }
 
 impl<'a> Workshop<'a> {
-    pub(super) fn new(attractor: &'a Attractor, setting: &Setting) -> Self {
+    pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
         Self {
-            attractor,
-            tree: Tree::new(attractor, setting.leaf_error, setting.slack),
+            attractor: rule.attractor(),
+            tree: Tree::new(rule, setting.slack),
             tetrahedra: super::lattice::tetrahedra(),
             values: [vec![UNKNOWN; VERTICES], vec![UNKNOWN; VERTICES]],
             closest: [vec![[0.0; 3]; VERTICES], vec![[0.0; 3]; VERTICES]],
@@ -126,7 +127,7 @@ impl<'a> Workshop<'a> {
             }
         }
         surface.leaves = self.tree.leaves;
-        surface.leaf_error = self.tree.largest_error;
+        surface.site_error = self.tree.largest_error;
         surface.shared.sort_unstable();
         surface
     }
@@ -142,7 +143,9 @@ impl<'a> Workshop<'a> {
         let band = setting.band;
         // Sites farther than this from the middle are nearest to no vertex that matters.
         let horizon = setting.radius + band + reach;
-        let hit = self.tree.nearest(&middle, starts, self.seed, if solid { f64::INFINITY } else { horizon });
+        let enough = setting.radius - reach;
+        let hit =
+            self.tree.nearest(&middle, starts, self.seed, if solid { f64::INFINITY } else { horizon }, if solid { 0.0 } else { enough });
         let Some(hit) = hit else { return };
         let distance = hit.distance_squared.sqrt();
         if (distance - setting.radius).abs() > reach {
@@ -151,7 +154,7 @@ impl<'a> Workshop<'a> {
         self.seed = Some(hit.node);
         let gathered = if solid { distance + 2.0 * reach } else { (distance + 2.0 * reach).min(horizon) };
         let mut near = std::mem::take(&mut self.near);
-        self.tree.gather(&middle, starts, gathered, 0.35 * reach, &mut near);
+        self.tree.gather(&middle, starts, gathered, &mut near);
         self.near = near;
         self.gather_solids(starts, open, &middle, reach);
         for k in first[2]..first[2] + SUB {
@@ -172,9 +175,9 @@ impl<'a> Workshop<'a> {
             if nodes.is_empty() {
                 continue;
             }
-            if let Some(hit) = self.tree.nearest(middle, &nodes, None, f64::INFINITY) {
+            if let Some(hit) = self.tree.nearest(middle, &nodes, None, f64::INFINITY, 0.0) {
                 let mut near = Vec::new();
-                self.tree.gather(middle, &nodes, hit.distance_squared.sqrt() + 2.0 * reach, 0.0, &mut near);
+                self.tree.gather(middle, &nodes, hit.distance_squared.sqrt() + 2.0 * reach, &mut near);
                 self.solid_nodes.push((solid, near));
             }
         }
@@ -198,7 +201,7 @@ impl<'a> Workshop<'a> {
             return known;
         }
         let x = Self::position(setting, surface, centre, cube);
-        let hit = self.tree.nearest(&x, &self.near, self.seed, setting.radius + setting.band);
+        let hit = self.tree.nearest(&x, &self.near, self.seed, setting.radius + setting.band, setting.radius - setting.band);
         let value = match hit {
             None => {
                 if self.inside_solid(&x) {
@@ -227,7 +230,7 @@ impl<'a> Workshop<'a> {
     fn inside_solid(&mut self, x: &Point) -> bool {
         let solids = std::mem::take(&mut self.solid_nodes);
         let inside = solids.iter().any(|(solid, nodes)| {
-            let Some(hit) = self.tree.nearest(x, nodes, None, f64::INFINITY) else { return false };
+            let Some(hit) = self.tree.nearest(x, nodes, None, f64::INFINITY, 0.0) else { return false };
             signed_side(self.attractor, *solid, self.tree.root_of(hit.node), x) < 0.0
         });
         self.solid_nodes = solids;
@@ -320,7 +323,7 @@ impl<'a> Workshop<'a> {
                 continue;
             }
             let site = self.tree.site(self.sites[kind][index]);
-            let largest = part.iter().map(|corner| distance_squared(corner, &closest_on_site(corner, &site))).fold(0.0, f64::max);
+            let largest = part.iter().map(|corner| site.distance_squared(corner)).fold(0.0, f64::max);
             best = best.min(largest);
             if best <= allowed {
                 return;
@@ -438,10 +441,10 @@ fn crossing(setting: &Setting, from: &End, to: &End) -> (Point, f64) {
     if let Some((_, exit)) = exits(&from.closest) {
         at = at.max(exit);
     }
-    if let Some((enter, exit)) = exits(&to.closest) {
-        if enter <= at {
-            at = at.max(exit);
-        }
+    if let Some((enter, exit)) = exits(&to.closest)
+        && enter <= at
+    {
+        at = at.max(exit);
     }
     let at = at.clamp(setting.clamp, 1.0 - setting.clamp);
     let interpolated = from.square + at * (to.square - from.square);

@@ -23,7 +23,7 @@ mod stitch;
 mod tree;
 
 use crate::attractor::Attractor;
-use crate::attractor::cell::Purpose;
+use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::measure::bounds::{AxisBox, bounding_box};
@@ -183,8 +183,6 @@ pub(crate) struct Setting {
     enclosing: f64,
     /// t.
     clamp: f64,
-    /// Leaves are replaced when their error is at most this.
-    leaf_error: f64,
     /// Rounding of positions and distances: far above what double precision loses, far below everything else.
     slack: f64,
     /// What was asked.
@@ -193,8 +191,6 @@ pub(crate) struct Setting {
     rounding: f64,
 }
 
-/// Share of the tolerance that leaves may use.
-const LEAF_SHARE: f64 = 0.2;
 /// Vertices keep at least this share t of an edge away from its ends, more when single precision asks.
 const LEAST_CLAMP: f64 = 1.0 / 512.0;
 /// t is at most this: beyond it the pitch is too fine for single precision.
@@ -223,7 +219,6 @@ impl Setting {
             deep_square: (radius - band).max(0.0).powi(2),
             enclosing: ENCLOSING * pitch,
             clamp: (CLAMP_ROUNDINGS * rounding(extent) / pitch).clamp(LEAST_CLAMP, MOST_CLAMP),
-            leaf_error: LEAF_SHARE * tolerance,
             slack: 1e-13 * extent,
             tolerance,
             rounding: rounding(extent),
@@ -337,34 +332,38 @@ struct Attempt {
 }
 
 /// Pitches and bounds of a dilation before it begins.
-struct Planned {
+struct Planned<'a> {
     radius: f64,
     /// The tolerance that is aimed at: smaller than asked when the radius is.
     tolerance: f64,
     coarsest: f64,
     finest: f64,
     bounds: AxisBox,
+    rule: SiteRule<'a>,
 }
 
-impl Planned {
-    fn new(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Self, DilationError> {
+impl<'a> Planned<'a> {
+    fn new(attractor: &'a Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Self, DilationError> {
         let bounds = bounding_box(attractor, budget)?;
         let radius = radius.mm();
         // A tolerance of the radius' order would allow an empty result.
         let aimed = tolerance.mm().min(0.5 * radius);
         let rounding = rounding(extent(&bounds, 2.0 * radius));
-        let allowed = aimed * (1.0 - LEAF_SHARE) - rounding;
+        let rule = SiteRule::new(attractor, radius, aimed);
+        let allowed = aimed - rule.outer_reserve() - rounding;
         // a (sqrt(5)/4 + t) = allowed, with t = max(least clamp, roundings / a).
         let apart = 1.01 * CLAMP_ROUNDINGS * rounding;
         let finest = (allowed / (ENCLOSING + 1.01 * LEAST_CLAMP)).min((allowed - apart) / ENCLOSING).min(COARSEST * radius);
         let least = apart / MOST_CLAMP;
         if finest < least {
-            let reachable_mm = 1.01 * (least * (ENCLOSING + MOST_CLAMP) + rounding) / (1.0 - LEAF_SHARE);
+            let reachable_mm = 1.01 * (least * (ENCLOSING + MOST_CLAMP) + rounding) / (1.0 - rule.outer_reserve() / aimed);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        // inner = R^2 / 2r at most, with R = 0.559 a: the coarsest pitch that the inner bound allows.
-        let coarsest = ((2.0 * allowed * radius).sqrt() / ENCLOSING).min(COARSEST * radius).max(finest);
-        Ok(Self { radius, tolerance: aimed, coarsest, finest, bounds })
+        // inner = r - sqrt(r^2 - R^2 - R_site^2) with R = 0.559 a: the coarsest pitch that the inner bound allows,
+        // with something left for clamping.
+        let square = (radius - rule.inner_reserve()).powi(2) - (radius - 0.95 * aimed + rounding).powi(2);
+        let coarsest = (square.max(0.0).sqrt() / ENCLOSING).min(COARSEST * radius).max(finest);
+        Ok(Self { radius, tolerance: aimed, coarsest, finest, bounds, rule })
     }
 
     /// The pitch of a pass: a geometric sequence from the coarsest to the finest.
@@ -397,10 +396,11 @@ impl Planned {
     /// One pass at a pitch. With `hasty` it is given up at the first block that is not good enough.
     fn pass(&self, attractor: &Attractor, pitch: f64, hasty: bool, budget: &Budget) -> Result<Attempt, DilationError> {
         let setting = Setting::new(self.radius, self.tolerance, pitch, &self.bounds);
-        let allowed = self.tolerance - setting.leaf_error - setting.extra();
+        let allowed = self.tolerance - self.rule.outer_reserve() - setting.extra();
         let (blocks, candidates) = self.space(attractor, &setting);
         let pass = Pass {
             attractor,
+            rule: &self.rule,
             setting: &setting,
             budget,
             outer_allowed: if hasty { allowed } else { f64::INFINITY },
@@ -431,7 +431,7 @@ impl Planned {
         let mut candidates = Candidates::default();
         for (index, root) in attractor.roots().iter().enumerate() {
             let cell = attractor.root_cell(index);
-            let leaf = attractor.leaf_error(&cell, &root.points, Purpose::Sites) <= setting.leaf_error;
+            let leaf = self.rule.leaf(&cell, &root.points).is_some();
             candidates.push(cell, &root.points, leaf);
         }
         (blocks.next_power_of_two() as i64, candidates)
@@ -441,9 +441,10 @@ impl Planned {
         let largest = |value: fn(&block::BlockSurface) -> f64| surfaces.iter().map(value).fold(0.0, f64::max);
         let outer_lattice = largest(|surface| surface.outer).min(setting.enclosing);
         let inner_square = largest(|surface| surface.inner_square) + setting.enclosing.powi(2);
-        let leaf = largest(|surface| surface.leaf_error);
-        let inner_lattice = self.radius - (setting.square - inner_square).max(0.0).sqrt();
-        let (inner, outer) = (inner_lattice + leaf + setting.extra(), outer_lattice + leaf + setting.extra());
+        let site = surfaces.iter().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
+        // x is in the solid if d(x, S)^2 <= r^2 - R^2, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
+        let inner_lattice = self.radius - (setting.square - inner_square - site.inner_square).max(0.0).sqrt();
+        let (inner, outer) = (inner_lattice + site.inner + setting.extra(), outer_lattice + site.outer + setting.extra());
         if inner.max(outer) > self.tolerance && setting.lattice.pitch > self.finest {
             return Ok(None);
         }

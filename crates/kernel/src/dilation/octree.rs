@@ -2,10 +2,11 @@
 //! their cells, cells are expanded only as far as the cube's size asks.
 
 use super::block::{BlockSurface, SIDE, Workshop, signed_side};
-use super::tree::{Candidate, Candidates, closest_on_site};
+use super::tree::{Candidate, Candidates};
 use super::{DilationError, Setting};
 use crate::attractor::Attractor;
-use crate::attractor::cell::{Point, Purpose, child_points, distance_squared};
+use crate::attractor::cell::{Point, child_points, distance_squared};
+use crate::attractor::sites::SiteRule;
 use crate::budget::Budget;
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// What all tasks of one pass share.
 pub(super) struct Pass<'a> {
     pub(super) attractor: &'a Attractor,
+    pub(super) rule: &'a SiteRule<'a>,
     pub(super) setting: &'a Setting,
     pub(super) budget: &'a Budget,
     /// Largest outer bound that is acceptable: beyond it the pass is given up and a finer one begins.
@@ -143,11 +145,7 @@ impl<'a> Pass<'a> {
         let ball = candidate.cell.ball;
         let distance = distance_squared(middle, &ball.centre).sqrt();
         if candidate.leaf {
-            let mut nearest = f64::INFINITY;
-            self.attractor.emit(&candidate.cell, points, Purpose::Sites, &mut |site| {
-                nearest = nearest.min(distance_squared(middle, &closest_on_site(middle, &site)));
-            });
-            let nearest = nearest.sqrt();
+            let nearest = self.rule.nearest(middle, &candidate.cell, points).sqrt();
             *upper = upper.min(nearest + self.setting.slack);
             brackets.push((nearest - self.setting.slack, nearest));
             to.push(candidate.cell, points, true);
@@ -166,7 +164,7 @@ impl<'a> Pass<'a> {
             let mut child_control = vec![[0.0; 4]; transition.operator.columns()];
             child_points(points, &transition.operator, &mut child_control);
             let cell = self.attractor.child_cell(&candidate.cell, index, &child_control);
-            let leaf = self.attractor.leaf_error(&cell, &child_control, Purpose::Sites) <= self.setting.leaf_error;
+            let leaf = self.rule.leaf(&cell, &child_control).is_some();
             child.push(cell, &child_control, leaf);
             let only = child.cells[0];
             self.expand(middle, size, &only, &child, horizon, upper, brackets, to);
@@ -205,7 +203,7 @@ impl<'a> Pass<'a> {
 
     fn block(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<BlockSurface>, DilationError> {
         let idle = self.workshops.lock().map(|mut idle| idle.pop()).unwrap_or_default();
-        let mut workshop = idle.unwrap_or_else(|| Workshop::new(self.attractor, self.setting));
+        let mut workshop = idle.unwrap_or_else(|| Workshop::new(self.rule, self.setting));
         let surface = self.surface(&mut workshop, node, candidates, open);
         if let Ok(mut idle) = self.workshops.lock() {
             idle.push(workshop);

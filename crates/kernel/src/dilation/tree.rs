@@ -7,8 +7,8 @@
 //! So blocks agree on shared lattice vertices, and results do not depend on the number of threads.
 
 use crate::attractor::Attractor;
-use crate::attractor::cell::{Cell, ControlPoint, Point, Purpose, Site, child_points, closest_on_segment, distance_squared};
-use crate::measure::triangle::closest_on_triangle;
+use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared};
+use crate::attractor::sites::{SiteError, SiteRule};
 
 /// A cell with its control points, as a candidate for holding the nearest site.
 #[derive(Clone, Debug, Default)]
@@ -39,16 +39,6 @@ impl Candidates {
     }
 }
 
-/// The point of a site closest to x.
-#[inline]
-pub(super) fn closest_on_site(x: &Point, site: &Site) -> Point {
-    match site {
-        Site::Point(point) => *point,
-        Site::Segment([a, b]) => closest_on_segment(x, a, b),
-        Site::Triangle([a, b, c]) => closest_on_triangle(x, a, b, c),
-    }
-}
-
 /// Index of a node.
 pub(super) type NodeId = u32;
 
@@ -58,9 +48,9 @@ enum Content {
     Closed(u32),
     /// Children `first .. first + count`.
     Open(u32, u32),
-    /// The site is the point at the ball's centre.
-    Point,
-    /// Sites `first .. first + count`.
+    /// Point sites `first .. first + count`.
+    Points(u32, u32),
+    /// Other sites `first .. first + count`.
     Sites(u32, u32),
 }
 
@@ -75,9 +65,9 @@ struct Node {
 /// A site of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SiteId {
-    /// The centre of a node.
-    Centre(NodeId),
-    /// An entry of the site list.
+    /// An entry of the list of points.
+    Point(u32),
+    /// An entry of the list of other sites.
     Listed(u32),
 }
 
@@ -91,35 +81,35 @@ pub(super) struct Hit {
 }
 
 pub(super) struct Tree<'a> {
-    attractor: &'a Attractor,
-    leaf_error: f64,
+    rule: &'a SiteRule<'a>,
     slack: f64,
     nodes: Vec<Node>,
     cells: Vec<Cell>,
     points: Vec<ControlPoint>,
     sites: Vec<Site>,
+    point_sites: Vec<Point>,
     stack: Vec<NodeId>,
     scratch: [Vec<ControlPoint>; 2],
     /// Leaf cells met.
     pub(super) leaves: u64,
-    /// Largest error of a leaf that was met.
-    pub(super) largest_error: f64,
+    /// Largest errors of leaves that were met.
+    pub(super) largest_error: SiteError,
 }
 
 impl<'a> Tree<'a> {
-    pub(super) fn new(attractor: &'a Attractor, leaf_error: f64, slack: f64) -> Self {
+    pub(super) fn new(rule: &'a SiteRule<'a>, slack: f64) -> Self {
         Self {
-            attractor,
-            leaf_error,
+            rule,
             slack,
             nodes: Vec::new(),
             cells: Vec::new(),
             points: Vec::new(),
             sites: Vec::new(),
+            point_sites: Vec::new(),
             stack: Vec::new(),
             scratch: [Vec::new(), Vec::new()],
             leaves: 0,
-            largest_error: 0.0,
+            largest_error: SiteError::default(),
         }
     }
 
@@ -130,27 +120,30 @@ impl<'a> Tree<'a> {
         self.points.clear();
         self.sites.clear();
         self.leaves = 0;
-        self.largest_error = 0.0;
+        self.largest_error = SiteError::default();
+        self.point_sites.clear();
         for candidate in &candidates.cells {
-            self.add(candidate.cell, candidates.points_of(self.attractor, candidate));
+            self.add(candidate.cell, candidates.points_of(self.rule.attractor(), candidate));
         }
         0..self.nodes.len() as NodeId
     }
 
     fn add(&mut self, cell: Cell, points: &[ControlPoint]) {
-        let error = self.attractor.leaf_error(&cell, points, Purpose::Sites);
-        let content = if error <= self.leaf_error {
+        let content = if let Some(error) = self.rule.leaf(&cell, points) {
             self.leaves += 1;
             self.largest_error = self.largest_error.max(error);
-            let first = self.sites.len();
-            let sites = &mut self.sites;
-            self.attractor.emit(&cell, points, Purpose::Sites, &mut |site| sites.push(site));
-            match self.sites[first..] {
-                [Site::Point(point)] if point == cell.ball.centre => {
-                    self.sites.truncate(first);
-                    Content::Point
-                }
-                _ => Content::Sites(first as u32, (self.sites.len() - first) as u32),
+            let (first, first_point) = (self.sites.len(), self.point_sites.len());
+            let (sites, point_sites) = (&mut self.sites, &mut self.point_sites);
+            self.rule.emit(&cell, points, &mut |site| match site {
+                Site::Point(point) => point_sites.push(point),
+                other => sites.push(other),
+            });
+            // Drawings of both kinds are rare: their points join the list of sites.
+            if self.sites.len() > first {
+                self.sites.extend(self.point_sites.drain(first_point..).map(Site::Point));
+                Content::Sites(first as u32, (self.sites.len() - first) as u32)
+            } else {
+                Content::Points(first_point as u32, (self.point_sites.len() - first_point) as u32)
             }
         } else {
             let first = self.points.len() as u32;
@@ -164,7 +157,7 @@ impl<'a> Tree<'a> {
     /// The children of a node, made when first asked for.
     fn expand(&mut self, id: NodeId, first_point: u32) -> (u32, u32) {
         let cell = self.cells[id as usize];
-        let state = self.attractor.state_of(&cell);
+        let state = self.rule.attractor().state_of(&cell);
         let first = self.nodes.len() as u32;
         // Taken out of the tree while `add` grows its lists.
         let [mut parent, mut child] = std::mem::take(&mut self.scratch);
@@ -173,7 +166,7 @@ impl<'a> Tree<'a> {
         for (index, transition) in state.transitions.iter().enumerate() {
             child.resize(transition.operator.columns(), [0.0; 4]);
             child_points(&parent, &transition.operator, &mut child);
-            self.add(self.attractor.child_cell(&cell, index, &child), &child);
+            self.add(self.rule.attractor().child_cell(&cell, index, &child), &child);
         }
         self.scratch = [parent, child];
         let count = self.nodes.len() as u32 - first;
@@ -184,7 +177,7 @@ impl<'a> Tree<'a> {
     /// A site by its id.
     pub(super) fn site(&self, id: SiteId) -> Site {
         match id {
-            SiteId::Centre(node) => Site::Point(self.nodes[node as usize].centre),
+            SiteId::Point(index) => Site::Point(self.point_sites[index as usize]),
             SiteId::Listed(index) => self.sites[index as usize],
         }
     }
@@ -194,15 +187,19 @@ impl<'a> Tree<'a> {
         self.cells[id as usize].root
     }
 
-    /// The nearest site among those below `starts`, if one is nearer than `reach`. `seed`, a node that was
-    /// the answer nearby, makes the search quicker and never changes its answer.
-    pub(super) fn nearest(&mut self, x: &Point, starts: &[NodeId], seed: Option<NodeId>, reach: f64) -> Option<Hit> {
-        let mut best = Best { distance: reach, hit: None, limit: reach * reach };
+    /// The nearest site among those below `starts`, if one is nearer than `reach`. The search ends as soon as
+    /// a site nearer than `enough` is met: that hit need not be the nearest. `seed`, a node that was the
+    /// answer nearby, makes the search quicker and never changes a nearest site.
+    pub(super) fn nearest(&mut self, x: &Point, starts: &[NodeId], seed: Option<NodeId>, reach: f64, enough: f64) -> Option<Hit> {
+        let mut best = Best { distance: reach, hit: None, limit: reach * reach, enough: enough.max(0.0).powi(2) };
         if let Some(seed) = seed {
             self.visit_sites(x, seed, &mut best);
         }
         let mut stack = std::mem::take(&mut self.stack);
         for &start in starts {
+            if best.limit < best.enough {
+                break;
+            }
             self.descend(x, start, &mut best, &mut stack);
         }
         self.stack = stack;
@@ -221,8 +218,12 @@ impl<'a> Tree<'a> {
                 continue;
             }
             match node.content {
-                Content::Point => best.offer(square, &node.centre, SiteId::Centre(id), id),
-                Content::Sites(..) => self.visit_sites(x, id, best),
+                Content::Points(..) | Content::Sites(..) => {
+                    self.visit_sites(x, id, best);
+                    if best.limit < best.enough {
+                        return;
+                    }
+                }
                 Content::Open(first, count) => self.push_near(x, first, count, best, stack),
                 Content::Closed(points) => {
                     let (first, count) = self.expand(id, points);
@@ -240,12 +241,6 @@ impl<'a> Tree<'a> {
         for id in first..first + count {
             let node = &self.nodes[id as usize];
             let square = distance_squared(x, &node.centre);
-            if let Content::Point = node.content {
-                if square <= best.limit {
-                    best.offer(square, &node.centre, SiteId::Centre(id), id);
-                }
-                continue;
-            }
             let threshold = best.distance + node.radius + self.slack;
             if square <= threshold * threshold {
                 stack.push(id);
@@ -265,13 +260,15 @@ impl<'a> Tree<'a> {
     #[inline]
     fn visit_sites(&self, x: &Point, id: NodeId, best: &mut Best) {
         match self.nodes[id as usize].content {
-            Content::Point => {
-                let centre = &self.nodes[id as usize].centre;
-                best.offer(distance_squared(x, centre), centre, SiteId::Centre(id), id);
+            Content::Points(first, count) => {
+                for index in first..first + count {
+                    let point = &self.point_sites[index as usize];
+                    best.offer(distance_squared(x, point), point, SiteId::Point(index), id);
+                }
             }
             Content::Sites(first, count) => {
                 for index in first..first + count {
-                    let closest = closest_on_site(x, &self.sites[index as usize]);
+                    let closest = self.sites[index as usize].closest(x);
                     best.offer(distance_squared(x, &closest), &closest, SiteId::Listed(index), id);
                 }
             }
@@ -279,36 +276,53 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Nodes that may hold a site within `reach` of x, none much larger than `size` unless it is a leaf.
-    pub(super) fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, size: f64, found: &mut Vec<NodeId>) {
+    /// Nodes that may hold a site within `reach` of x: as small as possible without becoming many.
+    pub(super) fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
+        let may = |tree: &Self, id: NodeId| {
+            let node = &tree.nodes[id as usize];
+            let threshold = reach + node.radius + tree.slack;
+            distance_squared(x, &node.centre) <= threshold * threshold
+        };
         found.clear();
-        let mut stack = std::mem::take(&mut self.stack);
-        stack.clear();
-        stack.extend(starts.iter().rev());
-        while let Some(id) = stack.pop() {
-            let node = &self.nodes[id as usize];
-            let threshold = reach + node.radius + self.slack;
-            if distance_squared(x, &node.centre) > threshold * threshold {
-                continue;
+        found.extend(starts.iter().copied().filter(|&id| may(self, id)));
+        let mut next = std::mem::take(&mut self.stack);
+        while found.len() < ENOUGH_NODES {
+            next.clear();
+            let mut opened = false;
+            for &id in found.iter() {
+                let children = match self.nodes[id as usize].content {
+                    Content::Open(first, count) => Some((first, count)),
+                    Content::Closed(points) => Some(self.expand(id, points)),
+                    Content::Points(..) | Content::Sites(..) => None,
+                };
+                let Some((first, count)) = children else {
+                    next.push(id);
+                    continue;
+                };
+                opened = true;
+                next.extend((first..first + count).filter(|&child| may(self, child)));
             }
-            match node.content {
-                Content::Open(first, count) if node.radius > size => stack.extend((first..first + count).rev()),
-                Content::Closed(points) if node.radius > size => {
-                    let (first, count) = self.expand(id, points);
-                    stack.extend((first..first + count).rev());
-                }
-                _ => found.push(id),
+            if !opened || next.len() > MOST_NODES {
+                break;
             }
+            std::mem::swap(found, &mut next);
         }
-        self.stack = stack;
+        self.stack = next;
     }
 }
+
+/// A list of starts is refined while it is shorter than this,
+const ENOUGH_NODES: usize = 24;
+/// and not if it would become longer than this: queries look at every start.
+const MOST_NODES: usize = 96;
 
 struct Best {
     /// Distance of the hit, or the reach.
     distance: f64,
     /// Its square, so that most offers are refused without a root.
     limit: f64,
+    /// Square of the distance below which nobody asks further.
+    enough: f64,
     hit: Option<Hit>,
 }
 

@@ -1,7 +1,7 @@
 //! The box of an attractor, to any precision, by best-first expansion of cells per direction: the support
 //! function of a graph-directed set is the maximum of its children's.
 
-use crate::attractor::cell::{Cell, ControlPoint, Purpose, Site, child_points};
+use crate::attractor::cell::{Cell, ControlPoint, Site, child_points};
 use crate::attractor::{Attractor, StateBound};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
@@ -154,7 +154,7 @@ fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axi
         floor = corners.iter().map(|x| sign * x[axis]).fold(floor, f64::max);
     };
     if matches!(state.leaf, LeafPrimitive::Simplex | LeafPrimitive::Chord(_)) {
-        attractor.emit(cell, points, Purpose::Drawing, &mut attain);
+        attractor.emit(cell, points, &mut attain);
     }
     match attractor.bound(cell.state) {
         StateBound::Hull { margin, .. } if *margin == 0.0 => {

@@ -140,7 +140,7 @@ impl Bcifs {
         if self.cells.is_empty() {
             return draft.error("/cells", "automaton.empty", "the model has no root cell".into());
         }
-        let reader = Reader { model: self, offset: draft.states.len(), reachable: self.reachable() };
+        let reader = Reader { model: self, offset: draft.states.len(), reachable: self.reachable(), index: self.index() };
         let errors_before = draft.findings.iter().filter(|finding| !finding.warning).count();
         let states: Vec<State> = (0..self.states.len()).map(|index| reader.state(index, draft)).collect();
         reader.roots(draft);
@@ -150,13 +150,13 @@ impl Bcifs {
         draft.states.extend(states);
     }
 
-    fn index_of(&self, name: &str) -> Option<usize> {
-        self.states.iter().position(|state| state.name == name)
+    fn index(&self) -> BTreeMap<&str, usize> {
+        self.states.iter().enumerate().map(|(index, state)| (state.name.as_str(), index)).collect()
     }
 
     /// States that a root cell reaches by transitions and boundaries.
     fn reachable(&self) -> Vec<bool> {
-        let index: BTreeMap<&str, usize> = self.states.iter().enumerate().map(|(index, state)| (state.name.as_str(), index)).collect();
+        let index = self.index();
         let mut reached = vec![false; self.states.len()];
         let mut stack: Vec<usize> = self.cells.iter().filter_map(|cell| index.get(cell.state.as_str()).copied()).collect();
         while let Some(current) = stack.pop() {
@@ -174,6 +174,7 @@ struct Reader<'a> {
     model: &'a Bcifs,
     offset: usize,
     reachable: Vec<bool>,
+    index: BTreeMap<&'a str, usize>,
 }
 
 impl Reader<'_> {
@@ -229,7 +230,7 @@ impl Reader<'_> {
         member: &str,
         draft: &mut Draft,
     ) -> Option<(StateId, SubdivisionOperator)> {
-        let Some(target) = self.model.index_of(to) else {
+        let Some(target) = self.index.get(to).copied() else {
             self.fault(draft, state, place, "automaton.unknown-state", format!("state '{to}' does not exist"));
             return None;
         };
@@ -291,7 +292,7 @@ impl Reader<'_> {
     fn roots(&self, draft: &mut Draft) {
         for (index, cell) in self.model.cells.iter().enumerate() {
             let place = format!("/cells/{index}");
-            let Some(state) = self.model.index_of(&cell.state) else {
+            let Some(state) = self.index.get(cell.state.as_str()).copied() else {
                 draft.error(&format!("{place}/state"), "automaton.unknown-state", format!("state '{}' does not exist", cell.state));
                 continue;
             };
@@ -362,7 +363,7 @@ impl Reader<'_> {
     }
 
     fn find<'s>(&self, states: &'s [State], name: &str) -> Result<&'s State, String> {
-        self.model.index_of(name).map(|index| &states[index]).ok_or_else(|| format!("state '{name}' does not exist"))
+        self.index.get(name).map(|&index| &states[index]).ok_or_else(|| format!("state '{name}' does not exist"))
     }
 
     /// b_k T^bd_j = T_i b_m for every j, (i, m) = children[j].

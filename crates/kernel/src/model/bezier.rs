@@ -52,7 +52,10 @@ impl BezierCurve {
                 [w * point.x, w * point.y, w * point.z, w]
             })
             .collect();
-        let state = draft.state(bezier_state(count, StateId::new(draft.states.len())));
+        // Curves of one degree share their state.
+        let fresh = bezier_state(count, StateId::new(draft.states.len()));
+        let known = draft.states.iter().position(|state| state.name == fresh.name && state.dimension == count);
+        let state = known.map_or_else(|| draft.state(fresh), StateId::new);
         draft.roots.push(Root { state, points, rational, solid: None });
     }
 }

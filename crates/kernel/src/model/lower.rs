@@ -82,11 +82,9 @@ impl Draft {
         let place = self.place.clone();
         for (index, part) in group.parts.iter().enumerate() {
             self.place = format!("{place}/parts/{index}");
-            if let Some(map) = &part.transform {
-                if !(map.linear.is_finite() && map.translation.is_finite()) {
-                    self.error("/transform", "model.not-finite", "the transform has an entry that is not finite".into());
-                    continue;
-                }
+            if part.transform.as_ref().is_some_and(|map| !(map.linear.is_finite() && map.translation.is_finite())) {
+                self.error("/transform", "model.not-finite", "the transform has an entry that is not finite".into());
+                continue;
             }
             self.place = format!("{place}/parts/{index}/shape");
             let (first_root, first_solid) = (self.roots.len(), self.solids.len());
