@@ -25,9 +25,8 @@ pub(super) fn inspect(path: &Path) -> Result<(), Problem> {
     let bytes = read_input(path, limits.file_bytes)?;
     let file = production::guarded(|| format::read(&bytes, None, &limits))?.map_err(|error| format_problem(&error))?;
     let topology = production::guarded(|| Topology::of(&file.mesh, &Budget::default()))?;
-    let topology = topology.map_err(|error| {
-        Problem::new(ProblemKind::InvalidFile, format!("{}: {error}", path.display())).code("inspect.topology")
-    })?;
+    let topology = topology
+        .map_err(|error| Problem::new(ProblemKind::InvalidFile, format!("{}: {error}", path.display())).code("inspect.topology"))?;
     print_json(&report(&file, bytes.len(), &topology))
 }
 

@@ -134,10 +134,11 @@ impl Report {
 }
 
 fn aligned<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
+    let line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.6e}"));
     let heading = ["field", "expected", "got", "diff", "allowed"].map(str::to_owned);
     let lines: Vec<[String; 5]> = std::iter::once(heading)
-        .chain(rows.map(|row| [row.field.clone(), row.expected.clone(), row.got.clone(), number(row.difference), number(row.allowed)]))
+        .chain(rows.map(|row| [line(&row.field), line(&row.expected), line(&row.got), number(row.difference), number(row.allowed)]))
         .collect();
     let widths: Vec<usize> = (0..5).map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)).collect();
     let mut text = String::new();
