@@ -1,9 +1,10 @@
 //! Files that are there in full or not at all: written beside their place, synced, then renamed.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use lacuna_kernel::budget::CancelToken;
 use uuid::Uuid;
 
 /// Ending of files that are being written; whoever owns a folder may remove leftovers of it.
@@ -68,6 +69,46 @@ impl Write for PendingFile {
 impl Seek for PendingFile {
     fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
         self.file.seek(position)
+    }
+}
+
+/// A stream that fails once a token is fired, so that writing and reading large files stop as soon as
+/// computing does.
+pub struct Stoppable<'a, S> {
+    /// The stream.
+    pub stream: S,
+    /// The flag.
+    pub token: &'a CancelToken,
+}
+
+impl<S> Stoppable<'_, S> {
+    fn check(&self) -> io::Result<()> {
+        // Not `ErrorKind::Interrupted`: callers would try again.
+        self.token.check().map_err(io::Error::other)
+    }
+}
+
+impl<S: Write> Write for Stoppable<'_, S> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        self.check()?;
+        self.stream.write(buffer)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+impl<S: Read> Read for Stoppable<'_, S> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.check()?;
+        self.stream.read(buffer)
+    }
+}
+
+impl<S: Seek> Seek for Stoppable<'_, S> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.stream.seek(position)
     }
 }
 

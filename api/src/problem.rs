@@ -266,10 +266,13 @@ impl Problem {
     /// With the facts of a limit.
     #[must_use]
     pub fn limit(mut self, facts: &LimitFacts) -> Self {
+        // JSON has no infinity: a value that is none says nothing that a caller could use.
+        let finite = |value: &f64| value.is_finite();
         self.limit = Some(facts.limit.to_owned());
-        self.asked = Some(facts.asked);
-        self.allowed = Some(facts.allowed);
-        self.remedy = facts.remedy.map(|(name, value)| BTreeMap::from([(name.to_owned(), value)]));
+        self.asked = Some(facts.asked).filter(finite);
+        self.allowed = Some(facts.allowed).filter(finite);
+        let remedy = facts.remedy.filter(|(_, value)| value.is_finite());
+        self.remedy = remedy.map(|(name, value)| BTreeMap::from([(name.to_owned(), value)]));
         self
     }
 

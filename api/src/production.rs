@@ -5,12 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::{self, Format, FormatError, Metadata};
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, Validation};
-use lacuna_kernel::budget::{Budget, StopReason};
+use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::model::Model;
 
 use crate::digest::Digest;
-use crate::files::PendingFile;
+use crate::files::{PendingFile, Stoppable};
 use crate::problem::{Problem, ProblemKind};
 
 /// What is written into a file besides the geometry.
@@ -40,7 +40,19 @@ impl Engine {
 /// # Errors
 /// The kernel's refusal, with pointers into the model document, or the defect.
 pub fn compute(job: &Job, budget: &Budget) -> Result<Outcome, Problem> {
-    guarded(|| lacuna_fabrication::run(job, budget))?.map_err(Problem::from)
+    let outcome = guarded(|| lacuna_fabrication::run(job, budget))?.map_err(Problem::from)?;
+    check_certificate(&outcome.certificate)?;
+    Ok(outcome)
+}
+
+/// A statement with an infinity or a NaN in it proves nothing, and JSON cannot carry it.
+fn check_certificate(certificate: &Certificate) -> Result<(), Problem> {
+    let written = serde_json::to_vec(certificate).and_then(|bytes| serde_json::from_slice::<Certificate>(&bytes));
+    match written {
+        Ok(read) if read == *certificate => Ok(()),
+        Ok(_) => Err(Problem::internal("the certificate changes on its way through JSON")),
+        Err(error) => Err(Problem::internal(format!("the certificate is not fit for JSON: {error}"))),
+    }
 }
 
 /// Predicts what a job costs.
@@ -91,17 +103,24 @@ pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Problem> {
 ///
 /// # Errors
 /// When the format has no room for the geometry, the device fails, or the file differs from the mesh.
-pub fn write_file(format: Format, outcome: &Outcome, label: &Label<'_>, pending: &mut PendingFile) -> Result<(Digest, u64), Problem> {
+pub fn write_file(
+    format: Format,
+    outcome: &Outcome,
+    label: &Label<'_>,
+    pending: &mut PendingFile,
+    token: &CancelToken,
+) -> Result<(Digest, u64), Problem> {
     let metadata =
         Metadata { title: label.title, certificate: Some(&outcome.certificate), thumbnail_png: label.thumbnail_png, ..Metadata::default() };
     let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
     let failed = |error| Problem::io("the file could not be written", &error);
-    let mut sink = BufWriter::with_capacity(1 << 16, &mut *pending);
+    let mut sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: &mut *pending, token });
     guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
     sink.flush().map_err(failed)?;
     drop(sink);
     if let (Geometry::Solid(solid), true) = (&outcome.geometry, format != Format::Png) {
-        let mut source = BufReader::with_capacity(1 << 16, pending.reread().map_err(failed)?);
+        let stream = pending.reread().map_err(failed)?;
+        let mut source = BufReader::with_capacity(1 << 16, Stoppable { stream, token });
         guarded(|| format::verify_written(format, &mut source, solid))?.map_err(|error| format_problem(&error))?;
     }
     Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)

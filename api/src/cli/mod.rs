@@ -105,10 +105,10 @@ fn tell(problem: &Problem, format: ErrorFormat) -> io::Result<()> {
         }
     }
     if let (Some(limit), Some(asked), Some(allowed)) = (&problem.limit, problem.asked, problem.allowed) {
-        writeln!(stderr, "  limit {limit}: asked {asked}, allowed {allowed}")?;
+        writeln!(stderr, "  limit {limit}: asked {asked:?}, allowed {allowed:?}")?;
     }
     for (name, value) in problem.remedy.iter().flatten() {
-        writeln!(stderr, "  this would pass: {name} = {value}")?;
+        writeln!(stderr, "  this would pass: {name} = {value:?}")?;
     }
     Ok(())
 }

@@ -41,6 +41,7 @@ fn environment(name: &str) -> Option<String> {
 pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
     let (config, _) = Config::read(&Flags::from(&args), &environment)?;
     start_log(config.log_json);
+    log_panics();
     work::use_threads(Some(config.threads))?;
     let failed = |error| Problem::io("the service cannot start", &error);
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("http").build().map_err(failed)?;
@@ -59,6 +60,15 @@ fn start_log(json: bool) {
     let builder = tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(level).with_ansi(false);
     // A second subscriber can only come from an embedding program, which then has its own.
     let _ = if json { builder.json().flatten_event(true).try_init() } else { builder.try_init() };
+}
+
+/// A panic ends its job or request; where it happened belongs into the log, in the log's own form.
+fn log_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(ToString::to_string).unwrap_or_default();
+        let message = panic.payload_as_str().unwrap_or("no message");
+        tracing::error!(%place, message, "panic");
+    }));
 }
 
 /// `lacuna doctor`.

@@ -65,7 +65,7 @@ pub(super) fn deliver(
         budget.report("write", 0.0, outcome.certificate.triangles);
         let mut file = start(&target.path)?;
         let label = Label { title, thumbnail_png: thumbnail.as_deref() };
-        let (digest, bytes) = production::write_file(target.format, outcome, &label, &mut file)?;
+        let (digest, bytes) = production::write_file(target.format, outcome, &label, &mut file, &budget.cancel)?;
         pending.push((file, target.path.clone()));
         written.push(Written { file: target.path.clone(), bytes, digest });
     }

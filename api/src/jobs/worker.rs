@@ -113,7 +113,7 @@ fn keep_files(desk: &Desk, order: &Job, mut outcome: Outcome, budget: &Budget) -
         let facts = format.facts();
         let mut pending = desk.store.new_result().map_err(failed)?;
         let label = Label { title, thumbnail_png: thumbnail.as_deref() };
-        let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending)?;
+        let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending, &budget.cancel)?;
         desk.store.keep_result(pending, digest).map_err(failed)?;
         let file_name = format!("{stem}.{}", facts.ending);
         outputs.push(Output { name: facts.ending.to_owned(), file_name, media_type: facts.media_type.to_owned(), bytes, digest });
