@@ -8,6 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::http::state::Shared;
+use crate::problem::Problem;
 
 /// What the service can do.
 #[derive(Debug, Serialize, ToSchema)]
@@ -61,7 +62,9 @@ pub struct LimitCapability {
 }
 
 /// Kinds of jobs, formats and limits of this service.
-#[utoipa::path(get, path = "/v1/capabilities", tag = "operation", responses((status = 200, body = Capabilities)))]
+#[utoipa::path(get, path = "/v1/capabilities", tag = "operation",
+    responses((status = 200, body = Capabilities), (status = "4XX", body = Problem, content_type = "application/problem+json"))
+)]
 pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
     let config = &state.config;
     let formats = FORMATS.iter().map(|row| {
