@@ -31,7 +31,8 @@ use crate::measure::triangle::{Feature, closest_feature};
 pub(super) const SIDE: usize = 16;
 /// Cubes along the side of a sub-block, the unit that is skipped as a whole.
 const SUB: usize = 4;
-const LAYER: usize = SIDE + 1;
+/// Vertices along a side of the working arrays: one more than the tetrahedra use, and their neighbours.
+const LAYER: usize = SIDE + 3;
 const VERTICES: usize = LAYER * LAYER * LAYER;
 /// Value of a vertex not evaluated yet.
 const UNKNOWN: f64 = f64::NAN;
@@ -40,6 +41,23 @@ const DEEP: f64 = f64::NEG_INFINITY;
 /// Value of a vertex beyond the band.
 const FAR: f64 = f64::INFINITY;
 const NONE: u32 = u32::MAX;
+/// A vertex's neighbours are this much beyond it, in units of a.
+const NEIGHBOUR: f64 = 1.0;
+/// Walls make a crease when the directions from their sites are at least 60 degrees apart: on a smooth
+/// surface neighbouring vertices differ by less, the pitch being at most 0.7 r.
+const CREASE_COSINE: f64 = 0.5;
+/// Where the surface passes a filled vertex, as a share of the edge.
+const FILLED_CUT: f64 = 0.125;
+
+/// On which side of the surface a lattice vertex is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Label {
+    Unknown,
+    Outside,
+    Inside,
+    /// Outside D_r, in a gap that is too narrow for the lattice: see [`Workshop::label`].
+    Filled,
+}
 
 /// The surface in one block, ready to be joined with its neighbours.
 #[derive(Debug, Default)]
@@ -84,6 +102,8 @@ pub(super) struct Workshop<'a> {
     values: [Vec<f64>; 2],
     closest: [Vec<Point>; 2],
     sites: [Vec<SiteId>; 2],
+    /// Labels of corner and centre vertices.
+    labels: [Vec<Label>; 2],
     edges: Vec<u32>,
     touched: Vec<u32>,
     near: Vec<NodeId>,
@@ -102,6 +122,7 @@ impl<'a> Workshop<'a> {
             values: [vec![UNKNOWN; VERTICES], vec![UNKNOWN; VERTICES]],
             closest: [vec![[0.0; 3]; VERTICES], vec![[0.0; 3]; VERTICES]],
             sites: [vec![SiteId::Listed(0); VERTICES], vec![SiteId::Listed(0); VERTICES]],
+            labels: [vec![Label::Unknown; VERTICES], vec![Label::Unknown; VERTICES]],
             edges: vec![NONE; VERTICES * EDGES],
             touched: Vec::new(),
             near: Vec::new(),
@@ -114,6 +135,7 @@ impl<'a> Workshop<'a> {
     /// The surface in the block whose first cube is given; `open` lists the solids whose surface meets it.
     pub(super) fn surface(&mut self, setting: &Setting, first_cube: [i64; 3], candidates: &Candidates, open: &[u32]) -> BlockSurface {
         self.values.iter_mut().for_each(|values| values.fill(UNKNOWN));
+        self.labels.iter_mut().for_each(|labels| labels.fill(Label::Unknown));
         self.touched.drain(..).for_each(|edge| self.edges[edge as usize] = NONE);
         self.cut_points.clear();
         self.seed = None;
@@ -138,17 +160,18 @@ impl<'a> Workshop<'a> {
         let half = 0.5 * (SUB as f64 + 0.5);
         let corner = setting.lattice.corner(std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64));
         let middle: Point = corner.map(|x| x + half * setting.lattice.pitch);
-        let reach = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+        let reach = (half + NEIGHBOUR) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
         let solid = !open.is_empty();
         let band = setting.band;
         // Sites farther than this from the middle are nearest to no vertex that matters.
         let horizon = setting.radius + band + reach;
-        let enough = setting.radius - reach;
+        let enough = setting.radius - half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
         let hit =
             self.tree.nearest(&middle, starts, self.seed, if solid { f64::INFINITY } else { horizon }, if solid { 0.0 } else { enough });
         let Some(hit) = hit else { return };
         let distance = hit.distance_squared.sqrt();
-        if (distance - setting.radius).abs() > reach {
+        let own = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+        if distance - setting.radius > own + setting.gap || setting.radius - distance > own {
             return;
         }
         self.seed = Some(hit.node);
@@ -160,7 +183,7 @@ impl<'a> Workshop<'a> {
         for k in first[2]..first[2] + SUB {
             for j in first[1]..first[1] + SUB {
                 for i in first[0]..first[0] + SUB {
-                    self.cube(setting, [i, j, k], surface);
+                    self.cube(setting, [i as i32, j as i32, k as i32], surface);
                 }
             }
         }
@@ -183,25 +206,26 @@ impl<'a> Workshop<'a> {
         }
     }
 
+    /// Position of a cube in the working arrays; coordinates begin at -1.
     #[inline]
-    fn index(cube: [usize; 3]) -> usize {
-        (cube[2] * LAYER + cube[1]) * LAYER + cube[0]
+    fn index(cube: [i32; 3]) -> usize {
+        (((cube[2] + 1) as usize * LAYER) + (cube[1] + 1) as usize) * LAYER + (cube[0] + 1) as usize
     }
 
-    fn position(setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> Point {
-        let index = std::array::from_fn(|axis| surface.first_cube[axis] + cube[axis] as i64);
+    fn position(setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> Point {
+        let index = std::array::from_fn(|axis| surface.first_cube[axis] + i64::from(cube[axis]));
         if centre { setting.lattice.centre(index) } else { setting.lattice.corner(index) }
     }
 
     /// The value of a vertex: d^2 within the band, else DEEP or FAR.
-    fn value(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> f64 {
+    fn value(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> f64 {
         let (kind, index) = (usize::from(centre), Self::index(cube));
         let known = self.values[kind][index];
         if !known.is_nan() {
             return known;
         }
         let x = Self::position(setting, surface, centre, cube);
-        let hit = self.tree.nearest(&x, &self.near, self.seed, setting.radius + setting.band, setting.radius - setting.band);
+        let hit = self.tree.nearest(&x, &self.near, self.seed, setting.radius + setting.band, setting.deep);
         let value = match hit {
             None => {
                 if self.inside_solid(&x) {
@@ -237,31 +261,77 @@ impl<'a> Workshop<'a> {
         inside
     }
 
+    /// The side of a vertex.
+    ///
+    /// A vertex outside D_r is filled where two walls of a crease leave a gap no wider than a lattice edge: there
+    /// edges from wall to wall have no vertex between them and close the gap, and an open vertex deeper in the
+    /// gap would be the inside of a false tunnel. With d1, d2 the distances from the vertex's nearest site and
+    /// from the one of an inside neighbour, and psi the angle between them, the gap is
+    /// (d1 + d2 - 2 r) / sin(psi / 2) wide. Filling is certified like everything else.
+    fn label(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> Label {
+        let (kind, index) = (usize::from(centre), Self::index(cube));
+        if self.labels[kind][index] != Label::Unknown {
+            return self.labels[kind][index];
+        }
+        let value = self.value(setting, surface, centre, cube);
+        let label = if value <= setting.square {
+            Label::Inside
+        } else if value <= setting.gap_square && self.in_gap(setting, surface, centre, cube) {
+            Label::Filled
+        } else {
+            Label::Outside
+        };
+        self.labels[kind][index] = label;
+        label
+    }
+
+    fn in_gap(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> bool {
+        let (kind, index) = (usize::from(centre), Self::index(cube));
+        let x = Self::position(setting, surface, centre, cube);
+        let own = subtract(&x, &self.closest[kind][index]);
+        let own_distance = self.values[kind][index].sqrt();
+        for number in 0..14 {
+            let (other_centre, other) = neighbour(centre, cube, number);
+            let value = self.value(setting, surface, other_centre, other);
+            if !(value <= setting.square && value.is_finite()) {
+                continue;
+            }
+            let across = subtract(&x, &self.closest[usize::from(other_centre)][Self::index(other)]);
+            let across_distance = dot(&across, &across).sqrt();
+            let cosine = dot(&own, &across) / (own_distance * across_distance);
+            if cosine > CREASE_COSINE {
+                continue;
+            }
+            let sine = (0.5 * (1.0 - cosine)).max(0.0).sqrt();
+            if own_distance + across_distance - 2.0 * setting.radius <= setting.lattice.pitch * sine {
+                return true;
+            }
+        }
+        false
+    }
+
     /// The twelve tetrahedra of a cube, unless its centre is so far from the surface that none is cut.
-    fn cube(&mut self, setting: &Setting, cube: [usize; 3], surface: &mut BlockSurface) {
+    fn cube(&mut self, setting: &Setting, cube: [i32; 3], surface: &mut BlockSurface) {
         if !self.value(setting, surface, true, cube).is_finite() {
             return;
         }
         for number in 0..self.tetrahedra.len() {
             let tetrahedron = self.tetrahedra[number];
-            let at = |offset: [u8; 3]| -> [usize; 3] { std::array::from_fn(|axis| cube[axis] + offset[axis] as usize) };
             let mut inside = 0;
-            let mut values = [0.0; 4];
             for (position, vertex) in tetrahedron.vertices.iter().enumerate() {
-                let value = self.value(setting, surface, vertex.centre, at(vertex.offset));
-                values[position] = value;
-                inside |= usize::from(value <= setting.square) << position;
+                let label = self.label(setting, surface, vertex.centre, shifted(cube, vertex.offset));
+                inside |= usize::from(label != Label::Outside) << position;
             }
             match inside {
                 0 => {}
-                15 => self.certify_full(setting, surface, &tetrahedron, cube, &values),
+                15 => self.certify_full(setting, surface, &tetrahedron, cube),
                 _ => self.cut(setting, surface, &tetrahedron, cube, inside),
             }
         }
     }
 
     /// Emits the triangles of a tetrahedron that the surface cuts, and certifies its part of the solid.
-    fn cut(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3], inside: usize) {
+    fn cut(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3], inside: usize) {
         let cuts = CUTS[inside];
         let mut corners = [0_u32; 4];
         let mut part = [[0.0; 3]; 7];
@@ -283,7 +353,7 @@ impl<'a> Workshop<'a> {
         }
         for (position, vertex) in tetrahedron.vertices.iter().enumerate() {
             if inside >> position & 1 == 1 {
-                let at = std::array::from_fn(|axis| cube[axis] + vertex.offset[axis] as usize);
+                let at = shifted(cube, vertex.offset);
                 part[count] = Self::position(setting, surface, vertex.centre, at);
                 count += 1;
             }
@@ -292,44 +362,59 @@ impl<'a> Workshop<'a> {
     }
 
     /// A tetrahedron inside the solid may still reach beyond D(r): where creases meet over its middle.
-    fn certify_full(
-        &mut self,
-        setting: &Setting,
-        surface: &mut BlockSurface,
-        tetrahedron: &Tetrahedron,
-        cube: [usize; 3],
-        values: &[f64; 4],
-    ) {
-        let largest = values.iter().copied().fold(DEEP, f64::max);
+    fn certify_full(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3]) {
+        let mut largest = DEEP;
+        for vertex in &tetrahedron.vertices {
+            let value = self.values[usize::from(vertex.centre)][Self::index(shifted(cube, vertex.offset))];
+            if value == DEEP {
+                return;
+            }
+            largest = largest.max(value);
+        }
         let enough = setting.radius + surface.outer - setting.enclosing;
-        if values.contains(&DEEP) || (enough > 0.0 && largest <= enough * enough) {
+        if enough > 0.0 && largest <= enough * enough {
             return;
         }
-        let part = tetrahedron.vertices.map(|vertex| {
-            let at = std::array::from_fn(|axis| cube[axis] + vertex.offset[axis] as usize);
-            Self::position(setting, surface, vertex.centre, at)
-        });
+        let part = tetrahedron.vertices.map(|vertex| Self::position(setting, surface, vertex.centre, shifted(cube, vertex.offset)));
         self.certify(setting, surface, tetrahedron, cube, &part);
     }
 
-    /// Raises the block's outer bound to that of a convex part of a tetrahedron, given by its corners.
-    fn certify(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3], part: &[Point]) {
-        let allowed = (setting.radius + surface.outer).powi(2);
+    /// Raises the block's outer bound to that of a convex part of a tetrahedron, given by its corners p_k.
+    ///
+    /// For sites c_i: d(x) - r <= sum w_k (|p_k - c_i| - r) for x = sum w_k p_k. The largest value of the lesser of
+    /// two such sums is attained at a corner or on a segment between two.
+    fn certify(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3], part: &[Point]) {
+        let mut excess = [[0.0_f64; 7]; 4];
+        let mut sites = 0;
         let mut best = f64::INFINITY;
+        let mut filled = false;
         for vertex in &tetrahedron.vertices {
-            let at: [usize; 3] = std::array::from_fn(|axis| cube[axis] + vertex.offset[axis] as usize);
-            let (kind, index) = (usize::from(vertex.centre), Self::index(at));
+            let (kind, index) = (usize::from(vertex.centre), Self::index(shifted(cube, vertex.offset)));
+            filled |= self.labels[kind][index] == Label::Filled;
             if !self.values[kind][index].is_finite() {
                 continue;
             }
             let site = self.tree.site(self.sites[kind][index]);
-            let largest = part.iter().map(|corner| site.distance_squared(corner)).fold(0.0, f64::max);
-            best = best.min(largest);
-            if best <= allowed {
+            let row = &mut excess[sites];
+            for (entry, corner) in row.iter_mut().zip(part) {
+                *entry = site.distance_squared(corner).sqrt() - setting.radius;
+            }
+            best = best.min(row[..part.len()].iter().copied().fold(f64::NEG_INFINITY, f64::max));
+            if best <= surface.outer {
                 return;
             }
+            sites += 1;
         }
-        surface.outer = (best.sqrt() - setting.radius).min(setting.enclosing);
+        for first in 0..sites {
+            for second in 0..first {
+                best = best.min(pair_bound(&excess[first][..part.len()], &excess[second][..part.len()]));
+                if best <= surface.outer {
+                    return;
+                }
+            }
+        }
+        // Without filled vertices the bound a priori holds too.
+        surface.outer = surface.outer.max(if filled { best } else { best.min(setting.enclosing) });
     }
 
     /// The vertex where the surface cuts an edge: made once.
@@ -338,12 +423,12 @@ impl<'a> Workshop<'a> {
         setting: &Setting,
         surface: &mut BlockSurface,
         tetrahedron: &Tetrahedron,
-        cube: [usize; 3],
+        cube: [i32; 3],
         inside: usize,
         edge: usize,
     ) -> u32 {
         let lattice_edge = tetrahedron.edges[edge];
-        let owner: [usize; 3] = std::array::from_fn(|axis| cube[axis] + lattice_edge.offset[axis] as usize);
+        let owner = shifted(cube, lattice_edge.offset);
         let key = Self::index(owner) * EDGES + lattice_edge.number as usize;
         if self.edges[key] != NONE {
             return self.edges[key];
@@ -352,7 +437,7 @@ impl<'a> Workshop<'a> {
         let (from, to) = if inside >> p & 1 == 1 { (p, q) } else { (q, p) };
         let end = |position: usize| {
             let vertex = tetrahedron.vertices[position];
-            let at: [usize; 3] = std::array::from_fn(|axis| cube[axis] + vertex.offset[axis] as usize);
+            let at = shifted(cube, vertex.offset);
             let (kind, index) = (usize::from(vertex.centre), Self::index(at));
             End {
                 at: Self::position(setting, surface, vertex.centre, at),
@@ -360,7 +445,13 @@ impl<'a> Workshop<'a> {
                 closest: self.closest[kind][index],
             }
         };
-        let (point, slack) = crossing(setting, &end(from), &end(to));
+        let (start, stop) = (end(from), end(to));
+        // A filled vertex is beyond r already: the surface passes close to it.
+        let (point, slack) = if start.square > setting.square {
+            (std::array::from_fn(|axis| start.at[axis] + FILLED_CUT * (stop.at[axis] - start.at[axis])), 0.0)
+        } else {
+            crossing(setting, &start, &stop)
+        };
         surface.inner_square = surface.inner_square.max(slack);
         let local = self.cut_points.len() as u32;
         self.cut_points.push(point);
@@ -376,9 +467,9 @@ impl<'a> Workshop<'a> {
         for &key in &self.touched {
             let local = self.edges[key as usize] as usize;
             let (cube, number) = (key as usize / EDGES, key as usize % EDGES);
-            let at = [cube % LAYER, cube / LAYER % LAYER, cube / (LAYER * LAYER)];
-            let block = (0..3).fold(0_u8, |bits, axis| bits | u8::from(at[axis] == SIDE) << axis);
-            let own = at.map(|x| x % SIDE);
+            let at = [cube % LAYER, cube / LAYER % LAYER, cube / (LAYER * LAYER)].map(|x| x as i32 - 1);
+            let block = (0..3).fold(0_u8, |bits, axis| bits | u8::from(at[axis] == SIDE as i32) << axis);
+            let own = at.map(|x| x % SIDE as i32);
             let own_key = (Self::index(own) * EDGES + number) as u32;
             if block != 0 {
                 foreign.push((local, block, own_key));
@@ -399,6 +490,40 @@ impl<'a> Workshop<'a> {
         }
         surface.shared.sort_unstable();
     }
+}
+
+fn shifted(cube: [i32; 3], offset: [u8; 3]) -> [i32; 3] {
+    std::array::from_fn(|axis| cube[axis] + i32::from(offset[axis]))
+}
+
+/// One of the fourteen vertices that a lattice vertex is joined to: six of its own kind along the axes, eight
+/// of the other kind around it.
+fn neighbour(centre: bool, cube: [i32; 3], number: usize) -> (bool, [i32; 3]) {
+    if number < 6 {
+        let mut at = cube;
+        at[number / 2] += if number % 2 == 0 { -1 } else { 1 };
+        return (centre, at);
+    }
+    let bits = number - 6;
+    let step = |axis: usize| (bits >> axis & 1) as i32 - i32::from(!centre);
+    (!centre, std::array::from_fn(|axis| cube[axis] + step(axis)))
+}
+
+/// max over convex combinations w of min(sum w_k a_k, sum w_k b_k): at a corner, or where a segment between
+/// two corners makes both equal.
+fn pair_bound(a: &[f64], b: &[f64]) -> f64 {
+    let mut bound = f64::NEG_INFINITY;
+    for k in 0..a.len() {
+        bound = bound.max(a[k].min(b[k]));
+        for l in 0..k {
+            let (dk, dl) = (a[k] - b[k], a[l] - b[l]);
+            if dk * dl < 0.0 {
+                let weight = dl / (dl - dk);
+                bound = bound.max(weight * a[k] + (1.0 - weight) * a[l]);
+            }
+        }
+    }
+    bound
 }
 
 /// The offset of x from the nearest point of a solid's triangle, along the pseudo-normal: negative inside.

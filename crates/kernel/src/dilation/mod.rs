@@ -175,10 +175,14 @@ pub(crate) struct Setting {
     /// r, and r^2.
     radius: f64,
     square: f64,
-    /// Vertices whose distance differs from r by more are on no cut edge: a little over a.
+    /// Vertices farther from the surface than this outwards, or deeper than `deep`, are on no cut edge.
     band: f64,
-    /// Squared distance below which a vertex is deep.
+    /// r - a, and its square: nearer vertices are deep.
+    deep: f64,
     deep_square: f64,
+    /// Widest clearance of a vertex that may be filled: half an edge; and (r + gap)^2.
+    gap: f64,
+    gap_square: f64,
     /// sqrt(5)/4 a.
     enclosing: f64,
     /// t.
@@ -205,18 +209,22 @@ const PASSES: i32 = 4;
 const BYTES_PER_TRIANGLE: f64 = 80.0;
 
 impl Setting {
-    fn new(radius: f64, tolerance: f64, pitch: f64, bounds: &AxisBox) -> Self {
+    fn new(radius: f64, tolerance: f64, pitch: f64, fill: bool, bounds: &AxisBox) -> Self {
         let extent = extent(bounds, radius + 2.0 * pitch);
         let margin = radius + 1.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost clamping.
         let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let band = pitch * 1.000_1;
+        let gap = if fill { 0.5 * pitch } else { 0.0 };
+        let deep = (radius - pitch * 1.000_1).max(0.0);
         Self {
             lattice: Lattice { origin, pitch },
             radius,
             square: radius * radius,
-            band,
-            deep_square: (radius - band).max(0.0).powi(2),
+            band: pitch * 1.000_1 + gap,
+            deep,
+            deep_square: deep * deep,
+            gap,
+            gap_square: (radius + gap).powi(2),
             enclosing: ENCLOSING * pitch,
             clamp: (CLAMP_ROUNDINGS * rounding(extent) / pitch).clamp(LEAST_CLAMP, MOST_CLAMP),
             slack: 1e-13 * extent,
@@ -253,14 +261,14 @@ fn rounding(extent: f64) -> f64 {
 /// [`DilationError`]: a limit, with a value that would pass, or a stop.
 pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
     let plan = Planned::new(attractor, radius, tolerance, budget)?;
-    let first = plan.pass(attractor, plan.coarsest, false, budget)?;
+    let first = plan.pass(attractor, plan.coarsest, false, true, budget)?;
     let mut made = first.made;
     if let Some(result) = first.accepted {
         return Ok(result);
     }
     for step in 1..PASSES {
         plan.admit(&made, plan.pitch(step), budget)?;
-        let pass = plan.pass(attractor, plan.pitch(step), step < PASSES - 1, budget)?;
+        let pass = plan.pass(attractor, plan.pitch(step), true, true, budget)?;
         if let Some(result) = pass.accepted {
             return Ok(result);
         }
@@ -268,7 +276,10 @@ pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budge
             made = pass.made;
         }
     }
-    // The finest pass is accepted a priori, so this is not reached.
+    if let Some(result) = plan.pass(attractor, plan.finest, false, false, budget)?.accepted {
+        return Ok(result);
+    }
+    // Without filling, the finest pass is within its bounds a priori: this is not reached.
     Err(DilationError::Defect(SolidError::Empty))
 }
 
@@ -300,7 +311,7 @@ pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budg
     let prediction = |triangles: f64, pitch_mm: f64| Prediction { triangles, memory_bytes: triangles * BYTES_PER_TRIANGLE, pitch_mm };
     let mut step = 0;
     loop {
-        let pass = plan.pass(attractor, plan.pitch(step), false, &unlimited)?;
+        let pass = plan.pass(attractor, plan.pitch(step), false, true, &unlimited)?;
         if let Some(result) = pass.accepted {
             return Ok(prediction(result.solid.topology().triangles as f64, result.pitch_mm));
         }
@@ -394,8 +405,8 @@ impl<'a> Planned<'a> {
     }
 
     /// One pass at a pitch. With `hasty` it is given up at the first block that is not good enough.
-    fn pass(&self, attractor: &Attractor, pitch: f64, hasty: bool, budget: &Budget) -> Result<Attempt, DilationError> {
-        let setting = Setting::new(self.radius, self.tolerance, pitch, &self.bounds);
+    fn pass(&self, attractor: &Attractor, pitch: f64, hasty: bool, fill: bool, budget: &Budget) -> Result<Attempt, DilationError> {
+        let setting = Setting::new(self.radius, self.tolerance, pitch, fill, &self.bounds);
         let allowed = self.tolerance - self.rule.outer_reserve() - setting.extra();
         let (blocks, candidates) = self.space(attractor, &setting);
         let pass = Pass {
@@ -439,13 +450,13 @@ impl<'a> Planned<'a> {
 
     fn certify(&self, setting: &Setting, surfaces: Vec<block::BlockSurface>, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let largest = |value: fn(&block::BlockSurface) -> f64| surfaces.iter().map(value).fold(0.0, f64::max);
-        let outer_lattice = largest(|surface| surface.outer).min(setting.enclosing);
+        let outer_lattice = largest(|surface| surface.outer);
         let inner_square = largest(|surface| surface.inner_square) + setting.enclosing.powi(2);
         let site = surfaces.iter().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
         // x is in the solid if d(x, S)^2 <= r^2 - R^2, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
         let inner_lattice = self.radius - (setting.square - inner_square - site.inner_square).max(0.0).sqrt();
         let (inner, outer) = (inner_lattice + site.inner + setting.extra(), outer_lattice + site.outer + setting.extra());
-        if inner.max(outer) > self.tolerance && setting.lattice.pitch > self.finest {
+        if inner.max(outer) > self.tolerance {
             return Ok(None);
         }
         let leaf_cells = surfaces.iter().map(|surface| surface.leaves).sum();
