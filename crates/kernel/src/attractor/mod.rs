@@ -65,13 +65,16 @@ pub enum AttractorError {
     Automaton(#[from] AutomatonError),
     /// A cycle does not contract.
     #[error(
-        "the maps do not contract: along the cycle {cycle} from state '{state}' lengths are multiplied by {rate:.6} at each step, and must shrink"
+        "the maps do not contract: along the cycle {} from state '{state}' lengths are multiplied by {rate:.6} at each step, and must shrink",
+        joined(.labels)
     )]
     NotContractive {
         /// First state of the cycle.
         state: String,
-        /// Indices of the transitions, joined by blanks.
-        cycle: String,
+        /// Its index in the automaton.
+        first: usize,
+        /// Labels of the cycle's transitions: their indices in the model's lists.
+        labels: Vec<usize>,
         /// Spectral radius of the cycle's product to the power 1 / length.
         rate: f64,
     },
@@ -116,7 +119,7 @@ impl AttractorError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Automaton(AutomatonError::Dimension { .. }) => "automaton.dimension-mismatch",
-            Self::Automaton(AutomatonError::NoTransition { .. }) => "automaton.no-transition",
+            Self::Automaton(AutomatonError::NoTransition { .. }) => "automaton.empty",
             Self::NotContractive { .. } => "automaton.not-contractive",
             Self::Undecided { .. } => "automaton.convergence-undecided",
             Self::SignedRational { .. } => "automaton.signed-rational",
@@ -127,15 +130,19 @@ impl AttractorError {
 }
 
 /// The transitions of the contraction's cycle, by their labels in the model.
-fn labels(automaton: &Automaton, contraction: &Contraction) -> String {
+fn labels(automaton: &Automaton, contraction: &Contraction) -> Vec<usize> {
     let mut state = contraction.cycle.0;
     let mut words = Vec::new();
     for &index in &contraction.cycle.1 {
         let transition = &automaton.state(state).transitions[index];
-        words.push(transition.label.to_string());
+        words.push(transition.label);
         state = transition.to;
     }
-    words.join(" ")
+    words
+}
+
+fn joined(labels: &[usize]) -> String {
+    labels.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
 /// A cycle whose rate is this close to 1 does not contract beyond rounding.
@@ -157,8 +164,13 @@ impl Attractor {
         }
         let contraction = convergence::contraction(&automaton);
         if contraction.lower >= RATE_ONE {
-            let (state, cycle) = (automaton.state(contraction.cycle.0).name.clone(), labels(&automaton, &contraction));
-            return Err(AttractorError::NotContractive { state, cycle, rate: contraction.lower });
+            let first = contraction.cycle.0;
+            return Err(AttractorError::NotContractive {
+                state: automaton.state(first).name.clone(),
+                first: first.index(),
+                labels: labels(&automaton, &contraction),
+                rate: contraction.lower,
+            });
         }
         if contraction.upper >= 1.0 {
             return Err(AttractorError::Undecided { lower: contraction.lower, upper: contraction.upper, depth: contraction.depth });

@@ -43,9 +43,6 @@ const FAR: f64 = f64::INFINITY;
 const NONE: u32 = u32::MAX;
 /// A vertex's neighbours are this much beyond it, in units of a.
 const NEIGHBOUR: f64 = 1.0;
-/// Walls make a crease when the directions from their sites are at least 60 degrees apart: on a smooth
-/// surface neighbouring vertices differ by less, the pitch being at most 0.7 r.
-const CREASE_COSINE: f64 = 0.5;
 /// Where the surface passes a filled vertex, as a share of the edge.
 const FILLED_CUT: f64 = 0.125;
 
@@ -299,11 +296,11 @@ impl<'a> Workshop<'a> {
             let across = subtract(&x, &self.closest[usize::from(other_centre)][Self::index(other)]);
             let across_distance = dot(&across, &across).sqrt();
             let cosine = dot(&own, &across) / (own_distance * across_distance);
-            if cosine > CREASE_COSINE {
+            if cosine > setting.crease_cosine {
                 continue;
             }
             let sine = (0.5 * (1.0 - cosine)).max(0.0).sqrt();
-            if own_distance + across_distance - 2.0 * setting.radius <= setting.lattice.pitch * sine {
+            if own_distance + across_distance - 2.0 * setting.radius <= 1.25 * setting.lattice.pitch * sine {
                 return true;
             }
         }
@@ -381,8 +378,9 @@ impl<'a> Workshop<'a> {
 
     /// Raises the block's outer bound to that of a convex part of a tetrahedron, given by its corners p_k.
     ///
-    /// For sites c_i: d(x) - r <= sum w_k (|p_k - c_i| - r) for x = sum w_k p_k. The largest value of the lesser of
-    /// two such sums is attained at a corner or on a segment between two.
+    /// For sites c_i: d(x) - r <= e_i(x) = sum w_k (|p_k - c_i| - r) for x = sum w_k p_k, by convexity, so
+    /// d(x) - r <= sum m_i e_i(x) for all weights m_i that sum to 1, and the largest entry of the combined row
+    /// sum m_i (|p_k - c_i| - r) bounds the part. [`game_value`] looks for good weights.
     fn certify(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3], part: &[Point]) {
         let mut excess = [[0.0_f64; 7]; 4];
         let mut sites = 0;
@@ -405,13 +403,9 @@ impl<'a> Workshop<'a> {
             }
             sites += 1;
         }
-        for first in 0..sites {
-            for second in 0..first {
-                best = best.min(pair_bound(&excess[first][..part.len()], &excess[second][..part.len()]));
-                if best <= surface.outer {
-                    return;
-                }
-            }
+        best = best.min(game_value(&mut excess[..sites], part.len(), surface.outer));
+        if best <= surface.outer {
+            return;
         }
         // Without filled vertices the bound a priori holds too.
         surface.outer = surface.outer.max(if filled { best } else { best.min(setting.enclosing) });
@@ -501,7 +495,7 @@ fn shifted(cube: [i32; 3], offset: [u8; 3]) -> [i32; 3] {
 fn neighbour(centre: bool, cube: [i32; 3], number: usize) -> (bool, [i32; 3]) {
     if number < 6 {
         let mut at = cube;
-        at[number / 2] += if number % 2 == 0 { -1 } else { 1 };
+        at[number / 2] += if number.is_multiple_of(2) { -1 } else { 1 };
         return (centre, at);
     }
     let bits = number - 6;
@@ -509,21 +503,62 @@ fn neighbour(centre: bool, cube: [i32; 3], number: usize) -> (bool, [i32; 3]) {
     (!centre, std::array::from_fn(|axis| cube[axis] + step(axis)))
 }
 
-/// max over convex combinations w of min(sum w_k a_k, sum w_k b_k): at a corner, or where a segment between
-/// two corners makes both equal.
-fn pair_bound(a: &[f64], b: &[f64]) -> f64 {
-    let mut bound = f64::NEG_INFINITY;
-    for k in 0..a.len() {
-        bound = bound.max(a[k].min(b[k]));
-        for l in 0..k {
-            let (dk, dl) = (a[k] - b[k], a[l] - b[l]);
-            if dk * dl < 0.0 {
-                let weight = dl / (dl - dk);
-                bound = bound.max(weight * a[k] + (1.0 - weight) * a[l]);
+/// A small value of max_k sum_i m_i rows[i][k] over weights m: the best pair of rows, then the best
+/// combination of that with each other row. Stops at `enough`. Every value that it meets is a bound.
+fn game_value(rows: &mut [[f64; 7]], corners: usize, enough: f64) -> f64 {
+    let mut best = f64::INFINITY;
+    let mut combined = [0.0; 7];
+    for first in 0..rows.len() {
+        for second in 0..first {
+            let (value, row) = best_combination(&rows[first], &rows[second], corners);
+            if value < best {
+                (best, combined) = (value, row);
+                if best <= enough {
+                    return best;
+                }
             }
         }
     }
-    bound
+    for _ in 0..2 {
+        for row in rows.iter() {
+            let (value, next) = best_combination(&combined, row, corners);
+            if value < best {
+                (best, combined) = (value, next);
+                if best <= enough {
+                    return best;
+                }
+            }
+        }
+    }
+    best
+}
+
+/// min over m in [0, 1] of the largest entry of m a + (1 - m) b, with the combination: at an end, or where two
+/// entries, one falling and one rising, meet.
+fn best_combination(a: &[f64; 7], b: &[f64; 7], corners: usize) -> (f64, [f64; 7]) {
+    let combine = |m: f64| -> [f64; 7] { std::array::from_fn(|k| m * a[k] + (1.0 - m) * b[k]) };
+    let largest = |row: &[f64; 7]| row[..corners].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // By duality the value is the largest, over pairs of corners, of where their two lines meet; its m is
+    // the minimiser.
+    let (mut value, mut at) = (f64::NEG_INFINITY, 0.0);
+    for k in 0..corners {
+        let lesser = a[k].min(b[k]);
+        if lesser > value {
+            (value, at) = (lesser, if a[k] < b[k] { 1.0 } else { 0.0 });
+        }
+        for l in 0..k {
+            let (dk, dl) = (a[k] - b[k], a[l] - b[l]);
+            if dk * dl < 0.0 {
+                let m = (b[l] - b[k]) / (dk - dl);
+                let meet = m * a[k] + (1.0 - m) * b[k];
+                if (0.0..=1.0).contains(&m) && meet > value {
+                    (value, at) = (meet, m);
+                }
+            }
+        }
+    }
+    let row = combine(at);
+    (largest(&row), row)
 }
 
 /// The offset of x from the nearest point of a solid's triangle, along the pseudo-normal: negative inside.

@@ -183,6 +183,8 @@ pub(crate) struct Setting {
     /// Widest clearance of a vertex that may be filled: half an edge; and (r + gap)^2.
     gap: f64,
     gap_square: f64,
+    /// Walls make a crease when the directions from their sites differ by more than this cosine's angle.
+    crease_cosine: f64,
     /// sqrt(5)/4 a.
     enclosing: f64,
     /// t.
@@ -214,7 +216,7 @@ impl Setting {
         let margin = radius + 1.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost clamping.
         let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let gap = if fill { 0.5 * pitch } else { 0.0 };
+        let gap = if fill { 0.5 * 1.25 * pitch } else { 0.0 };
         let deep = (radius - pitch * 1.000_1).max(0.0);
         Self {
             lattice: Lattice { origin, pitch },
@@ -225,6 +227,9 @@ impl Setting {
             deep_square: deep * deep,
             gap,
             gap_square: (radius + gap).powi(2),
+            // Closest points on one convex site are no farther apart than the vertices, a: on a smooth surface
+            // directions differ by a / r.
+            crease_cosine: (1.25 * pitch / radius).cos(),
             enclosing: ENCLOSING * pitch,
             clamp: (CLAMP_ROUNDINGS * rounding(extent) / pitch).clamp(LEAST_CLAMP, MOST_CLAMP),
             slack: 1e-13 * extent,
@@ -268,13 +273,28 @@ pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budge
     }
     for step in 1..PASSES {
         plan.admit(&made, plan.pitch(step), budget)?;
-        let pass = plan.pass(attractor, plan.pitch(step), true, true, budget)?;
+        let pass = plan.pass(attractor, plan.pitch(step), step < PASSES - 1, true, budget)?;
         if let Some(result) = pass.accepted {
             return Ok(result);
         }
         if pass.made.complete {
             made = pass.made;
         }
+    }
+    // Filled gaps may reach a little beyond the bound a priori: how far, in units of a, differs little from
+    // pitch to pitch.
+    let mut pitch = plan.finest;
+    let mut ratio = made.outer / made.pitch;
+    for _ in 0..2 {
+        pitch = (0.97 * plan.allowed() / ratio).min(0.97 * pitch);
+        if pitch < plan.least {
+            break;
+        }
+        let pass = plan.pass(attractor, pitch, false, true, budget)?;
+        if let Some(result) = pass.accepted {
+            return Ok(result);
+        }
+        ratio = ratio.max(pass.made.outer / pitch);
     }
     if let Some(result) = plan.pass(attractor, plan.finest, false, false, budget)?.accepted {
         return Ok(result);
@@ -325,6 +345,8 @@ pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budg
 /// What a pass made, whether or not it was good enough.
 struct Made {
     triangles: f64,
+    /// The lattice's outer bound.
+    outer: f64,
     pitch: f64,
     complete: bool,
 }
@@ -349,6 +371,8 @@ struct Planned<'a> {
     tolerance: f64,
     coarsest: f64,
     finest: f64,
+    /// Single precision carries no finer pitch.
+    least: f64,
     bounds: AxisBox,
     rule: SiteRule<'a>,
 }
@@ -374,7 +398,12 @@ impl<'a> Planned<'a> {
         // with something left for clamping.
         let square = (radius - rule.inner_reserve()).powi(2) - (radius - 0.95 * aimed + rounding).powi(2);
         let coarsest = (square.max(0.0).sqrt() / ENCLOSING).min(COARSEST * radius).max(finest);
-        Ok(Self { radius, tolerance: aimed, coarsest, finest, bounds, rule })
+        Ok(Self { radius, tolerance: aimed, coarsest, finest, least, bounds, rule })
+    }
+
+    /// What the lattice's outer bound may be, rounding apart.
+    fn allowed(&self) -> f64 {
+        self.tolerance - self.rule.outer_reserve() - rounding(extent(&self.bounds, 2.0 * self.radius)) - LEAST_CLAMP * self.finest
     }
 
     /// The pitch of a pass: a geometric sequence from the coarsest to the finest.
@@ -414,7 +443,7 @@ impl<'a> Planned<'a> {
             rule: &self.rule,
             setting: &setting,
             budget,
-            outer_allowed: if hasty { allowed } else { f64::INFINITY },
+            outer_allowed: if hasty && std::env::var_os("DBG").is_none() { allowed } else { f64::INFINITY },
             too_coarse: AtomicBool::new(false),
             triangles: AtomicU64::new(0),
             done: AtomicU64::new(0),
@@ -422,8 +451,12 @@ impl<'a> Planned<'a> {
             workshops: Mutex::new(Vec::new()),
         };
         let surfaces = pass.run([0; 3], blocks, &candidates)?;
-        let made =
-            Made { triangles: pass.triangles.load(Ordering::Relaxed) as f64, pitch, complete: !pass.too_coarse.load(Ordering::Relaxed) };
+        let made = Made {
+            triangles: pass.triangles.load(Ordering::Relaxed) as f64,
+            outer: surfaces.iter().map(|surface| surface.outer).fold(0.0, f64::max),
+            pitch,
+            complete: !pass.too_coarse.load(Ordering::Relaxed),
+        };
         drop(pass);
         if !made.complete {
             return Ok(Attempt { accepted: None, made });
@@ -451,6 +484,7 @@ impl<'a> Planned<'a> {
     fn certify(&self, setting: &Setting, surfaces: Vec<block::BlockSurface>, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let largest = |value: fn(&block::BlockSurface) -> f64| surfaces.iter().map(value).fold(0.0, f64::max);
         let outer_lattice = largest(|surface| surface.outer);
+        if std::env::var_os("DBG").is_some() { eprintln!("pass a {} gap {} outer/a {} tris {}", setting.lattice.pitch, setting.gap, outer_lattice / setting.lattice.pitch, surfaces.iter().map(|s| s.triangles.len()).sum::<usize>()); }
         let inner_square = largest(|surface| surface.inner_square) + setting.enclosing.powi(2);
         let site = surfaces.iter().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
         // x is in the solid if d(x, S)^2 <= r^2 - R^2, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.

@@ -164,11 +164,14 @@ fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axi
         }
         StateBound::Hull { .. } => {}
         StateBound::Frame { low, high, .. } => {
-            let mut most = sign * points[0][axis];
+            let (mut least, mut most) = (sign * points[0][axis], sign * points[0][axis]);
             for j in 0..3 {
                 let entry = sign * (points[j + 1][axis] - points[0][axis]);
+                least += (entry * low[j]).min(entry * high[j]);
                 most += (entry * low[j]).max(entry * high[j]);
             }
+            // Every point of the cell is at least at `least`: flat shapes are exact at once.
+            floor = floor.max(least);
             ceiling = ceiling.min(most);
         }
     }

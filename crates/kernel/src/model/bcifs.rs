@@ -147,7 +147,9 @@ impl Bcifs {
         if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
             reader.constraints(&states, draft);
         }
-        draft.states.extend(states);
+        for (index, state) in states.into_iter().enumerate() {
+            draft.state_from(state, &format!("/states/{index}/transitions"));
+        }
     }
 
     fn index(&self) -> BTreeMap<&str, usize> {
@@ -189,10 +191,12 @@ impl Reader<'_> {
         if !self.reachable[index] {
             draft.warn(&place, "automaton.unreachable-state", format!("no root cell reaches state '{}'; it is ignored", spec.name));
         }
-        let terminal = spec.transitions.is_empty() && (1..=3).contains(&spec.dimension);
+        // One control point is its own attractor; anything else needs to subdivide.
+        let terminal = spec.transitions.is_empty() && spec.dimension == 1;
         if spec.transitions.is_empty() && !terminal {
-            let message = format!("state '{}' has {} control points and no transition, so it has no attractor", spec.name, spec.dimension);
-            self.fault(draft, index, &place, "automaton.no-transition", message);
+            let message =
+                format!("state '{}' has {} control points and no transition, so its attractor is empty", spec.name, spec.dimension);
+            self.fault(draft, index, &place, "automaton.empty", message);
         }
         let mut transitions = Vec::new();
         for (label, transition) in spec.transitions.iter().enumerate() {

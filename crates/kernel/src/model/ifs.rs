@@ -103,7 +103,7 @@ impl Ifs {
                     label: map,
                 })
                 .collect();
-            draft.state(State {
+            let state = State {
                 name: if sets.len() == 1 { "attractor".into() } else { format!("after set {index}") },
                 kind: None,
                 dimension: 4,
@@ -111,7 +111,8 @@ impl Ifs {
                 boundaries: Vec::new(),
                 leaf: leaf(&drawing),
                 frame: true,
-            });
+            };
+            draft.state_from(state, "/maps");
         }
         let points = vec![[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
         draft.roots.push(Root { state: StateId::new(offset), points, rational: false, solid: None });

@@ -37,6 +37,8 @@ pub(super) struct Draft {
     pub(super) solids: Vec<SolidSurface>,
     pub(super) findings: Vec<Finding>,
     pub(super) constraint_residual: f64,
+    /// Where every state's transitions are listed in the model.
+    origins: Vec<String>,
     /// Where the family that is being lowered stands in the model.
     pub(super) place: String,
 }
@@ -54,9 +56,17 @@ impl Draft {
         self.findings.push(Finding { pointer, code, message, warning: true });
     }
 
-    /// Adds a state and returns its id.
+    /// Adds a state whose transitions the model does not list, and returns its id.
     pub(super) fn state(&mut self, state: State) -> StateId {
         self.states.push(state);
+        self.origins.push(String::new());
+        StateId::new(self.states.len() - 1)
+    }
+
+    /// Adds a state whose transitions are listed at `pointer` below the current place.
+    pub(super) fn state_from(&mut self, state: State, pointer: &str) -> StateId {
+        self.states.push(state);
+        self.origins.push(format!("{}{pointer}", self.place));
         StateId::new(self.states.len() - 1)
     }
 
@@ -132,8 +142,16 @@ impl Model {
         if draft.has_errors() {
             return Err(draft.findings);
         }
+        let origins = std::mem::take(&mut draft.origins);
         let fail = |mut findings: Vec<Finding>, error: &AttractorError| {
-            findings.push(Finding { pointer: String::new(), code: error.code(), message: error.to_string(), warning: false });
+            // One map that does not contract is named; a longer cycle is everybody's fault.
+            let pointer = match error {
+                AttractorError::NotContractive { first, labels, .. } if labels.len() == 1 && !origins[*first].is_empty() => {
+                    format!("{}/{}", origins[*first], labels[0])
+                }
+                _ => String::new(),
+            };
+            findings.push(Finding { pointer, code: error.code(), message: error.to_string(), warning: false });
             findings
         };
         let mut automaton = match Automaton::new(std::mem::take(&mut draft.states)) {
