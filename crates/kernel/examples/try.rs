@@ -55,9 +55,19 @@ fn main() {
             Shape::Ifs(Ifs { maps: v.iter().map(|p| similar(0.5, p.map(|x| x / 2.0))).collect(), primitive: None, graph: None })
         }
         "koch" => {
-            let rot = |a: f64, t: [f64; 3]| AffineMap { linear: DMat3::from_rotation_z(a) * (1.0 / 3.0), translation: DVec3::from_array(t) };
+            let rot =
+                |a: f64, t: [f64; 3]| AffineMap { linear: DMat3::from_rotation_z(a) * (1.0 / 3.0), translation: DVec3::from_array(t) };
             let h = std::f64::consts::FRAC_PI_3;
-            Shape::Ifs(Ifs { maps: vec![rot(0.0, [0.0; 3]), rot(h, [100.0 / 3.0, 0.0, 0.0]), rot(-h, [50.0, 100.0 * 3f64.sqrt() / 6.0, 0.0]), rot(0.0, [200.0 / 3.0, 0.0, 0.0])], primitive: None, graph: None })
+            Shape::Ifs(Ifs {
+                maps: vec![
+                    rot(0.0, [0.0; 3]),
+                    rot(h, [100.0 / 3.0, 0.0, 0.0]),
+                    rot(-h, [50.0, 100.0 * 3f64.sqrt() / 6.0, 0.0]),
+                    rot(0.0, [200.0 / 3.0, 0.0, 0.0]),
+                ],
+                primitive: None,
+                graph: None,
+            })
         }
         "tetraf" => {
             let v = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [25.0, 43.30127018922193, 0.0], [25.0, 14.433756729740644, 40.8248290463863]];

@@ -50,7 +50,7 @@ pub(crate) struct SiteRule<'a> {
 
 /// Shares of a dilation's tolerance that sites may use, inner and outer: the outer share is taken from the
 /// lattice, whose error is outer and of first order, so it is spent only on sites that need it.
-const INNER_SHARE: f64 = 0.05;
+const INNER_SHARE: f64 = 0.4;
 const OUTER_SHARE: f64 = 0.15;
 
 impl<'a> SiteRule<'a> {

@@ -31,8 +31,7 @@ use crate::measure::triangle::{Feature, closest_feature};
 pub(super) const SIDE: usize = 16;
 /// Cubes along the side of a sub-block, the unit that is skipped as a whole.
 const SUB: usize = 4;
-/// Vertices along a side of the working arrays: one more than the tetrahedra use, and their neighbours.
-const LAYER: usize = SIDE + 3;
+const LAYER: usize = SIDE + 1;
 const VERTICES: usize = LAYER * LAYER * LAYER;
 /// Value of a vertex not evaluated yet.
 const UNKNOWN: f64 = f64::NAN;
@@ -41,8 +40,8 @@ const DEEP: f64 = f64::NEG_INFINITY;
 /// Value of a vertex beyond the band.
 const FAR: f64 = f64::INFINITY;
 const NONE: u32 = u32::MAX;
-/// A vertex's neighbours are this much beyond it, in units of a.
-const NEIGHBOUR: f64 = 1.0;
+/// Steps of a walk away from nearest sites.
+const WALK: usize = 12;
 /// Where the surface passes a filled vertex, as a share of the edge.
 const FILLED_CUT: f64 = 0.125;
 
@@ -52,7 +51,7 @@ enum Label {
     Unknown,
     Outside,
     Inside,
-    /// Outside D_r, in a gap that is too narrow for the lattice: see [`Workshop::label`].
+    /// Outside D_r, where no ball outside fits: see [`Workshop::label`].
     Filled,
 }
 
@@ -157,7 +156,7 @@ impl<'a> Workshop<'a> {
         let half = 0.5 * (SUB as f64 + 0.5);
         let corner = setting.lattice.corner(std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64));
         let middle: Point = corner.map(|x| x + half * setting.lattice.pitch);
-        let reach = (half + NEIGHBOUR) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+        let reach = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001 + setting.gap;
         let solid = !open.is_empty();
         let band = setting.band;
         // Sites farther than this from the middle are nearest to no vertex that matters.
@@ -180,7 +179,7 @@ impl<'a> Workshop<'a> {
         for k in first[2]..first[2] + SUB {
             for j in first[1]..first[1] + SUB {
                 for i in first[0]..first[0] + SUB {
-                    self.cube(setting, [i as i32, j as i32, k as i32], surface);
+                    self.cube(setting, [i, j, k], surface);
                 }
             }
         }
@@ -203,19 +202,19 @@ impl<'a> Workshop<'a> {
         }
     }
 
-    /// Position of a cube in the working arrays; coordinates begin at -1.
+    /// Position of a cube in the working arrays.
     #[inline]
-    fn index(cube: [i32; 3]) -> usize {
-        (((cube[2] + 1) as usize * LAYER) + (cube[1] + 1) as usize) * LAYER + (cube[0] + 1) as usize
+    fn index(cube: [usize; 3]) -> usize {
+        (cube[2] * LAYER + cube[1]) * LAYER + cube[0]
     }
 
-    fn position(setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> Point {
-        let index = std::array::from_fn(|axis| surface.first_cube[axis] + i64::from(cube[axis]));
+    fn position(setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> Point {
+        let index = std::array::from_fn(|axis| surface.first_cube[axis] + cube[axis] as i64);
         if centre { setting.lattice.centre(index) } else { setting.lattice.corner(index) }
     }
 
     /// The value of a vertex: d^2 within the band, else DEEP or FAR.
-    fn value(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> f64 {
+    fn value(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> f64 {
         let (kind, index) = (usize::from(centre), Self::index(cube));
         let known = self.values[kind][index];
         if !known.is_nan() {
@@ -258,14 +257,13 @@ impl<'a> Workshop<'a> {
         inside
     }
 
-    /// The side of a vertex.
+    /// The side of a vertex: inside D_r closed by a ball of radius `gap`.
     ///
-    /// A vertex outside D_r is filled where two walls of a crease leave a gap no wider than a lattice edge: there
-    /// edges from wall to wall have no vertex between them and close the gap, and an open vertex deeper in the
-    /// gap would be the inside of a false tunnel. With d1, d2 the distances from the vertex's nearest site and
-    /// from the one of an inside neighbour, and psi the angle between them, the gap is
-    /// (d1 + d2 - 2 r) / sin(psi / 2) wide. Filling is certified like everything else.
-    fn label(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> Label {
+    /// Where two walls of a crease come closer than a lattice edge, edges from wall to wall close the gap with no
+    /// vertex in it, and a vertex left open deeper in the gap would be the inside of a false tunnel. Closing
+    /// fills such gaps as a whole and leaves an outside as smooth as the lattice can follow. It adds points within
+    /// `gap` of D_r; they are certified like everything else.
+    fn label(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> Label {
         let (kind, index) = (usize::from(centre), Self::index(cube));
         if self.labels[kind][index] != Label::Unknown {
             return self.labels[kind][index];
@@ -282,33 +280,39 @@ impl<'a> Workshop<'a> {
         label
     }
 
-    fn in_gap(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [i32; 3]) -> bool {
+    /// Whether no ball of radius `gap` outside D_r was found that contains the vertex. Its centre is sought by
+    /// walking away from the nearest site, as far as the vertex allows. In a crease the walk leads out of the
+    /// gap and is held by the vertex; where it comes to rest before, it is in a neck between two parts of the
+    /// outside, which stays open if it is wide enough for the lattice.
+    fn in_gap(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> bool {
         let (kind, index) = (usize::from(centre), Self::index(cube));
         let x = Self::position(setting, surface, centre, cube);
-        let own = subtract(&x, &self.closest[kind][index]);
-        let own_distance = self.values[kind][index].sqrt();
-        for number in 0..14 {
-            let (other_centre, other) = neighbour(centre, cube, number);
-            let value = self.value(setting, surface, other_centre, other);
-            if !(value <= setting.square && value.is_finite()) {
-                continue;
+        let free = setting.radius + setting.gap;
+        let mut nearest = self.closest[kind][index];
+        let mut y = x;
+        let (mut clearance, mut held) = (0.0, false);
+        for _ in 0..WALK {
+            let away = subtract(&y, &nearest);
+            let scale = free / dot(&away, &away).sqrt();
+            let target: Point = std::array::from_fn(|axis| nearest[axis] + scale * away[axis]);
+            let offset = subtract(&target, &x);
+            let length = dot(&offset, &offset).sqrt();
+            let share = if length > setting.gap { setting.gap / length } else { 1.0 };
+            y = std::array::from_fn(|axis| x[axis] + share * offset[axis]);
+            match self.tree.nearest(&y, &self.near, self.seed, free * (1.0 - 1e-3), 0.0) {
+                None => return false,
+                Some(hit) => {
+                    nearest = hit.closest;
+                    clearance = hit.distance_squared.sqrt() - setting.radius;
+                }
             }
-            let across = subtract(&x, &self.closest[usize::from(other_centre)][Self::index(other)]);
-            let across_distance = dot(&across, &across).sqrt();
-            let cosine = dot(&own, &across) / (own_distance * across_distance);
-            if cosine > setting.crease_cosine {
-                continue;
-            }
-            let sine = (0.5 * (1.0 - cosine)).max(0.0).sqrt();
-            if own_distance + across_distance - 2.0 * setting.radius <= 1.25 * setting.lattice.pitch * sine {
-                return true;
-            }
+            held = share < 1.0;
         }
-        false
+        held || clearance < setting.neck
     }
 
     /// The twelve tetrahedra of a cube, unless its centre is so far from the surface that none is cut.
-    fn cube(&mut self, setting: &Setting, cube: [i32; 3], surface: &mut BlockSurface) {
+    fn cube(&mut self, setting: &Setting, cube: [usize; 3], surface: &mut BlockSurface) {
         if !self.value(setting, surface, true, cube).is_finite() {
             return;
         }
@@ -328,7 +332,7 @@ impl<'a> Workshop<'a> {
     }
 
     /// Emits the triangles of a tetrahedron that the surface cuts, and certifies its part of the solid.
-    fn cut(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3], inside: usize) {
+    fn cut(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3], inside: usize) {
         let cuts = CUTS[inside];
         let mut corners = [0_u32; 4];
         let mut part = [[0.0; 3]; 7];
@@ -359,7 +363,7 @@ impl<'a> Workshop<'a> {
     }
 
     /// A tetrahedron inside the solid may still reach beyond D(r): where creases meet over its middle.
-    fn certify_full(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3]) {
+    fn certify_full(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3]) {
         let mut largest = DEEP;
         for vertex in &tetrahedron.vertices {
             let value = self.values[usize::from(vertex.centre)][Self::index(shifted(cube, vertex.offset))];
@@ -381,7 +385,7 @@ impl<'a> Workshop<'a> {
     /// For sites c_i: d(x) - r <= e_i(x) = sum w_k (|p_k - c_i| - r) for x = sum w_k p_k, by convexity, so
     /// d(x) - r <= sum m_i e_i(x) for all weights m_i that sum to 1, and the largest entry of the combined row
     /// sum m_i (|p_k - c_i| - r) bounds the part. [`game_value`] looks for good weights.
-    fn certify(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [i32; 3], part: &[Point]) {
+    fn certify(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3], part: &[Point]) {
         let mut excess = [[0.0_f64; 7]; 4];
         let mut sites = 0;
         let mut best = f64::INFINITY;
@@ -417,7 +421,7 @@ impl<'a> Workshop<'a> {
         setting: &Setting,
         surface: &mut BlockSurface,
         tetrahedron: &Tetrahedron,
-        cube: [i32; 3],
+        cube: [usize; 3],
         inside: usize,
         edge: usize,
     ) -> u32 {
@@ -461,9 +465,9 @@ impl<'a> Workshop<'a> {
         for &key in &self.touched {
             let local = self.edges[key as usize] as usize;
             let (cube, number) = (key as usize / EDGES, key as usize % EDGES);
-            let at = [cube % LAYER, cube / LAYER % LAYER, cube / (LAYER * LAYER)].map(|x| x as i32 - 1);
-            let block = (0..3).fold(0_u8, |bits, axis| bits | u8::from(at[axis] == SIDE as i32) << axis);
-            let own = at.map(|x| x % SIDE as i32);
+            let at = [cube % LAYER, cube / LAYER % LAYER, cube / (LAYER * LAYER)];
+            let block = (0..3).fold(0_u8, |bits, axis| bits | u8::from(at[axis] == SIDE) << axis);
+            let own = at.map(|x| x % SIDE);
             let own_key = (Self::index(own) * EDGES + number) as u32;
             if block != 0 {
                 foreign.push((local, block, own_key));
@@ -486,21 +490,8 @@ impl<'a> Workshop<'a> {
     }
 }
 
-fn shifted(cube: [i32; 3], offset: [u8; 3]) -> [i32; 3] {
-    std::array::from_fn(|axis| cube[axis] + i32::from(offset[axis]))
-}
-
-/// One of the fourteen vertices that a lattice vertex is joined to: six of its own kind along the axes, eight
-/// of the other kind around it.
-fn neighbour(centre: bool, cube: [i32; 3], number: usize) -> (bool, [i32; 3]) {
-    if number < 6 {
-        let mut at = cube;
-        at[number / 2] += if number.is_multiple_of(2) { -1 } else { 1 };
-        return (centre, at);
-    }
-    let bits = number - 6;
-    let step = |axis: usize| (bits >> axis & 1) as i32 - i32::from(!centre);
-    (!centre, std::array::from_fn(|axis| cube[axis] + step(axis)))
+fn shifted(cube: [usize; 3], offset: [u8; 3]) -> [usize; 3] {
+    std::array::from_fn(|axis| cube[axis] + offset[axis] as usize)
 }
 
 /// A small value of max_k sum_i m_i rows[i][k] over weights m: the best pair of rows, then the best

@@ -85,13 +85,14 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Middle and half diagonal of all lattice vertices that the cube's tetrahedra use, and their neighbours.
+    /// Middle and half diagonal of all lattice vertices that the cube's tetrahedra use, and of closing balls around
+    /// them.
     fn extent(&self, node: Node) -> (Point, f64) {
         let lattice = &self.setting.lattice;
         let cubes = node.blocks as f64 * SIDE as f64 + 0.5;
         let corner = lattice.corner(node.first_block.map(|block| block * SIDE as i64));
         let half = 0.5 * cubes * lattice.pitch;
-        (corner.map(|x| x + half), (half + lattice.pitch) * 3.0_f64.sqrt() * 1.000_001)
+        (corner.map(|x| x + half), half * 3.0_f64.sqrt() * 1.000_001 + self.setting.gap)
     }
 
     /// The cells that may hold the nearest site of a vertex of the cube that matters, and the solids whose
