@@ -1,2 +1,66 @@
-//! Being written.
-fn main() {}
+//! Speed of the kernel: dilation of the Sierpinski tetrahedron, and evaluation of millions of leaves.
+//!
+//! `cargo bench --package lacuna-tests --bench kernel`
+
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::{DMat3, DVec3};
+use lacuna_fabrication::{Input, Job, JobKind, Outcome, Params, run};
+use lacuna_kernel::budget::{Budget, Limits};
+use lacuna_kernel::model::{AffineMap, Ifs, Model, Shape};
+
+/// Homotheties of a ratio towards points.
+fn towards(ratio: f64, points: &[DVec3]) -> Shape {
+    let linear = DMat3::from_diagonal(DVec3::splat(ratio));
+    let maps = points.iter().map(|p| AffineMap { linear, translation: *p * (1.0 - ratio) }).collect();
+    Shape::Ifs(Ifs { maps, primitive: None, graph: None })
+}
+
+fn tetrahedron() -> Shape {
+    let depth = 50.0 * 3f64.sqrt();
+    let apex = DVec3::new(50.0, depth / 3.0, 100.0 * (2.0 / 3.0f64).sqrt());
+    towards(0.5, &[DVec3::ZERO, DVec3::X * 100.0, DVec3::new(50.0, depth, 0.0), apex])
+}
+
+fn job(shape: Shape, kind: JobKind, tolerance_mm: f64, radius_mm: Option<f64>) -> Job {
+    Job {
+        kind,
+        inputs: vec![Input { name: "shape".into(), model: Model { name: None, shape } }],
+        params: Params { tolerance_mm, radius_mm },
+        outputs: Vec::new(),
+        limits: Limits { memory_bytes: 16 << 30, ..Limits::default() },
+    }
+}
+
+fn done(job: &Job) -> Outcome {
+    run(job, &Budget { limits: job.limits, ..Budget::default() }).unwrap()
+}
+
+fn dilation(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("solidify the Sierpinski tetrahedron of 100 mm");
+    group.sample_size(10).measurement_time(Duration::from_secs(20));
+    for (radius, tolerance) in [(8.0, 1.0), (2.0, 0.33)] {
+        let job = job(tetrahedron(), JobKind::Solidify, tolerance, Some(radius));
+        group.throughput(Throughput::Elements(done(&job).certificate.triangles));
+        group.bench_with_input(BenchmarkId::from_parameter(radius), &job, |bencher, job| bencher.iter(|| black_box(done(job))));
+    }
+    group.finish();
+}
+
+fn evaluation(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("evaluate ten maps to ten million leaves");
+    group.sample_size(10).measurement_time(Duration::from_secs(20));
+    // Ratio 0.09: at a bound of 1e-4 mm an address has about six letters.
+    let points: Vec<DVec3> = (0..10).map(|k| DVec3::new(f64::from(k), f64::from(k * k % 7), f64::from(k * 3 % 5)) * 10.0).collect();
+    let job = job(towards(0.09, &points), JobKind::Evaluate, 5e-5, None);
+    group.throughput(Throughput::Elements(done(&job).certificate.leaf_cells));
+    group.bench_function("points", |bencher| bencher.iter(|| black_box(done(&job))));
+    group.finish();
+}
+
+criterion_group!(benches, dilation, evaluation);
+criterion_main!(benches);
