@@ -24,12 +24,13 @@ pub struct PointCover {
 }
 
 /// More points than this cost more than larger cells save.
-const MOST_POINTS: usize = 24;
+const MOST_POINTS: usize = 16;
+/// Extreme points looked at.
+const MOST_EXTREMES: usize = 96;
 /// Descents end when cells are this small relative to the first: deeper than double precision resolves.
 const DESCENT: usize = 200;
 
-/// Covers of all states; `None` where maps do not contract at each step in the Euclidean norm, or where the
-/// hull has too many corners.
+/// Covers of all states; `None` where maps do not contract at each step in the Euclidean norm.
 pub(super) fn covers(automaton: &Automaton, bounds: &[StateBound], contraction: &Contraction) -> Vec<Option<PointCover>> {
     let states = automaton.states();
     let frame = |index: usize| states[index].frame;
@@ -61,7 +62,7 @@ pub(super) fn covers(automaton: &Automaton, bounds: &[StateBound], contraction: 
         .into_iter()
         .zip(excess)
         .map(|(points, excess)| {
-            let points = points.filter(|points| !points.is_empty() && points.len() <= MOST_POINTS)?;
+            let points = points.filter(|points| !points.is_empty())?;
             let radius = enclosing_radius(&points);
             let rounding = 1e-12 * points.iter().flatten().fold(radius, |a, x| a.max(x.abs()));
             Some(PointCover { points, radius, excess: excess * (1.0 + 1e-9) + rounding })
@@ -109,7 +110,7 @@ fn extremes(automaton: &Automaton, bounds: &[StateBound], id: StateId) -> Vec<Po
         if points.iter().all(|known| distance_squared(known, &point).sqrt() > 1e-7 * size.max(f64::MIN_POSITIVE)) {
             points.push(point);
         }
-        if points.len() > 4 * MOST_POINTS {
+        if points.len() > MOST_EXTREMES {
             break;
         }
     }
@@ -161,17 +162,19 @@ fn reach(automaton: &Automaton, bounds: &[StateBound], state: StateId, frame: &[
     sum
 }
 
-/// Drops points that the hull of the others contains.
+/// Chooses points one by one, each time the farthest from the hull of those chosen, until the hull holds all or
+/// [`MOST_POINTS`] are chosen: what is left out shows in the excess.
 fn prune(mut points: Vec<Point>, size: f64) -> Vec<Point> {
-    let mut index = 0;
-    while points.len() > 1 && index < points.len() {
-        let point = points.remove(index);
-        if distance_to_hull(&point, &points) > 1e-9 * size {
-            points.insert(index, point);
-            index += 1;
+    let mut chosen: Vec<Point> = Vec::new();
+    while chosen.len() < MOST_POINTS {
+        let distances = points.iter().map(|point| if chosen.is_empty() { f64::MAX } else { distance_to_hull(point, &chosen) });
+        let Some((index, farthest)) = distances.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+        if farthest <= 1e-9 * size && !chosen.is_empty() {
+            break;
         }
+        chosen.push(points.swap_remove(index));
     }
-    points
+    chosen
 }
 
 fn overhang(automaton: &Automaton, covers: &[Option<Vec<Point>>], index: usize) -> f64 {

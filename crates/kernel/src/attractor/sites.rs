@@ -57,28 +57,8 @@ impl<'a> SiteRule<'a> {
     /// The rule for a dilation by `radius` to `tolerance`, both in mm.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
         let (inner, outer) = (INNER_SHARE * tolerance, OUTER_SHARE * tolerance);
-        let choices: Vec<Choice> = (0..attractor.automaton().states().len())
-            .map(|index| {
-                let id = StateId::new(index);
-                match (attractor.cover(id), &attractor.automaton().state(id).leaf) {
-                    (None, LeafPrimitive::Centre | LeafPrimitive::Polygon(_)) => Choice::Centre,
-                    (None, LeafPrimitive::Drawn(drawing)) => {
-                        if drawing.defect < attractor.ball_radius(id) {
-                            Choice::Drawn
-                        } else {
-                            Choice::Centre
-                        }
-                    }
-                    (None, LeafPrimitive::Chord(_) | LeafPrimitive::Simplex) => Choice::Drawn,
-                    (Some(cover), LeafPrimitive::Drawn(drawing)) => {
-                        let drawn = outer / drawing.defect;
-                        // Points are cheaper than triangles, and more of them stand for a cell.
-                        if drawn > largest_stretch(cover, radius, inner) { Choice::Drawn } else { Choice::Cover }
-                    }
-                    (Some(_), _) => Choice::Cover,
-                }
-            })
-            .collect();
+        let choices =
+            (0..attractor.automaton().states().len()).map(|index| choose(attractor, StateId::new(index), radius, inner, outer)).collect();
         Self { attractor, radius, inner, outer, choices }
     }
 
@@ -147,7 +127,38 @@ fn both(error: f64) -> SiteError {
     SiteError { inner_square: 0.0, inner: error, outer: error }
 }
 
-/// The largest stretch of a frame that a cover may have.
+/// The kind of site with the least expected work: cells of a surface cost the inverse square of their size,
+/// times the sites of each.
+fn choose(attractor: &Attractor, state: StateId, radius: f64, inner: f64, outer: f64) -> Choice {
+    let leaf = &attractor.automaton().state(state).leaf;
+    if matches!(leaf, LeafPrimitive::Chord(_) | LeafPrimitive::Simplex) {
+        return Choice::Drawn;
+    }
+    let work = |stretch: f64, sites: usize| sites as f64 / (stretch * stretch);
+    let mut best = (work(outer / attractor.ball_radius(state), 1), Choice::Centre);
+    if let LeafPrimitive::Drawn(drawing) = leaf {
+        // Points are cheaper than segments, and those than triangles.
+        let sites = drawing.points.len() + 2 * drawing.segments.len() + 4 * drawing.triangles.len();
+        let drawn = work(outer / drawing.defect, sites);
+        if drawn < best.0 {
+            best = (drawn, Choice::Drawn);
+        }
+    }
+    if let Some(cover) = attractor.cover(state)
+        && work(largest_stretch(cover, radius, inner), cover.points.len()) < best.0
+    {
+        return Choice::Cover;
+    }
+    best.1
+}
+
+/// The largest stretch n of a frame that a cover may have: r - sqrt(r^2 - n^2 R^2) + n excess <= inner.
 fn largest_stretch(cover: &PointCover, radius: f64, inner: f64) -> f64 {
-    (radius * radius - (radius - inner).powi(2)).max(0.0).sqrt() / cover.radius.max(f64::MIN_POSITIVE)
+    let error = |n: f64| radius - (radius * radius - (n * cover.radius).powi(2)).max(0.0).sqrt() + n * cover.excess;
+    let (mut low, mut high) = (0.0, radius / cover.radius.max(f64::MIN_POSITIVE));
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if error(middle) <= inner { low = middle } else { high = middle }
+    }
+    low
 }

@@ -111,7 +111,7 @@ fn support(attractor: &Attractor, axis: usize, sign: f64, budget: &Budget) -> Re
         }
     }
     let width = RELATIVE_WIDTH * (high - low).max(f64::MIN_POSITIVE);
-    let rounding = 1e-13 * low.abs().max(high.abs());
+    let rounding = 1e-12 * low.abs().max(high.abs());
     let mut expansions = 0;
     let mut bound = reached;
     while let Some(branch) = heap.pop() {
