@@ -2,9 +2,9 @@
 
     check.py < requests > reports
 
-One JSON document per line: a request is `{"file": PATH, "intersections": true}`, its report follows at once.
+One JSON document per line: a request is `{"file": PATH, "opinions": true}`, its report follows at once.
 STL is read by trimesh and 3MF by lib3mf in strict mode, the reader of the 3MF consortium. Counts come from our
-own page of numpy below, from trimesh and from Manifold; self-intersections, if asked, from CGAL through libigl
+own page of numpy below; if asked, also from trimesh and from Manifold, and self-intersections from CGAL through libigl
 with exact arithmetic. Whoever reads the reports compares them; nothing is judged here.
 """
 import json
@@ -49,8 +49,8 @@ def read_3mf(path):
     if len(items) != 1 or len(objects) != 1 or items[0].HasObjectTransform():
         raise ValueError(f"{len(items)} build items, {len(objects)} meshes")
     mesh = objects[0]
-    vertices = np.array([[*v.Coordinates] for v in mesh.GetVertices()], dtype=np.float64)
-    triangles = np.array([[*t.Indices] for t in mesh.GetTriangleIndices()], dtype=np.int64)
+    vertices = np.frombuffer(b"".join(map(bytes, mesh.GetVertices())), dtype=np.float32).reshape(-1, 3).astype(np.float64)
+    triangles = np.frombuffer(b"".join(map(bytes, mesh.GetTriangleIndices())), dtype=np.uint32).reshape(-1, 3).astype(np.int64)
     millimetres = model.GetUnit() == lib3mf.ModelUnit.MilliMeter
     remarks = {"warnings": warnings, "millimetres": millimetres, "valid": mesh.IsValid(), "oriented": mesh.IsManifoldAndOriented()}
     return vertices, triangles, {"reader": "lib3mf", "lib3mf": remarks}
@@ -96,30 +96,27 @@ def counts(vertices, triangles):
     }
 
 
-def second_opinions(vertices, triangles, intersections):
+def second_opinions(vertices, triangles):
     """What trimesh, Manifold and CGAL think."""
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, triangles.astype(np.uint64)))
     status = str(solid.status()).rsplit(".", 1)[-1]
-    opinions = {
+    # The pairs that cross are the third of the five arrays.
+    crossings = cgal.remesh_self_intersections(vertices, triangles.astype(np.int32), detect_only=True)[2]
+    return {
         "trimesh": {"watertight": bool(mesh.is_watertight), "winding": bool(mesh.is_winding_consistent),
                     "volume": float(mesh.volume), "euler": int(mesh.euler_number)},
         "manifold": {"status": status, "volume": float(solid.volume()), "shells": len(solid.decompose())},
+        "self_intersections": int(np.asarray(crossings).reshape(-1, 2).shape[0]),
     }
-    if intersections:
-        found = cgal.remesh_self_intersections(vertices, triangles.astype(np.int32), detect_only=True)
-        # The pairs are the third of the five arrays.
-        opinions["self_intersections"] = int(np.asarray(found[2]).reshape(-1, 2).shape[0])
-    return opinions
 
 
 def report(request):
     """The report on one file."""
     path = request["file"]
     vertices, triangles, remarks = (read_3mf if path.endswith(".3mf") else read_stl)(path)
-    finite = bool(np.isfinite(vertices).all())
-    return {**remarks, "finite": finite, **counts(vertices, triangles),
-            **second_opinions(vertices, triangles, request.get("intersections", False))}
+    opinions = second_opinions(vertices, triangles) if request.get("opinions") else {}
+    return {**remarks, "finite": bool(np.isfinite(vertices).all()), **counts(vertices, triangles), **opinions}
 
 
 def main():

@@ -56,12 +56,12 @@ impl Judge {
         Self { process, questions, reports }
     }
 
-    /// The report on a file.
+    /// The report on a file, with the opinions of trimesh, Manifold and CGAL if asked.
     ///
     /// # Panics
     /// When the judge has ended.
-    pub fn report(&mut self, file: &std::path::Path, intersections: bool) -> serde_json::Value {
-        let request = serde_json::json!({ "file": file, "intersections": intersections });
+    pub fn report(&mut self, file: &std::path::Path, opinions: bool) -> serde_json::Value {
+        let request = serde_json::json!({ "file": file, "opinions": opinions });
         writeln!(self.questions, "{request}").unwrap();
         let mut line = String::new();
         self.reports.read_line(&mut line).unwrap();
