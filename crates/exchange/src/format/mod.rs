@@ -1,6 +1,6 @@
 //! Mesh files out and in, and pictures of what they hold.
 //!
-//! One table, [`FORMATS`], says what each format can carry; [`write`], [`read`] and
+//! One table, [`FORMATS`], says what each format can carry; [`write()`], [`read()`] and
 //! [`verify_written`] are the only doors. Lengths are millimetres throughout; every coordinate
 //! that is written is a single-precision number, and a zero is never negative, so that programs
 //! which join vertices by their bits join the same ones as those which compare numbers.
@@ -90,7 +90,7 @@ pub struct FormatFacts {
     pub media_type: &'static str,
     /// What it can carry out.
     pub carries: Carries,
-    /// Whether [`read`] takes it.
+    /// Whether [`read()`] takes it.
     pub reads: bool,
 }
 
@@ -266,7 +266,7 @@ fn fit_pieces<'a>(format: Format, geometry: &Geometry<'a>) -> Result<Vec<Piece<'
 /// single-precision coordinates bit for bit and, where the format has indices, the same indices:
 /// what is proven of the mesh's topology then holds for the file.
 ///
-/// The file is parsed, not compared with a second writing; it must be in the form that [`write`]
+/// The file is parsed, not compared with a second writing; it must be in the form that [`write()`]
 /// gives it. Linear time, flat memory. Reads from the source's start.
 ///
 /// # Errors

@@ -241,7 +241,7 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// Compares facet by facet; normals are those that [`write`] computes.
+/// Compares facet by facet; normals are those that [`write()`] computes.
 pub(crate) fn verify<R: Read>(pieces: &[Piece<'_>], source: &mut R) -> Result<(), FormatError> {
     let mut scanner = Scanner::new(source, Format::Stl);
     let header = scanner.bytes::<HEADER_BYTES>()?;

@@ -107,8 +107,8 @@ pub fn contraction(automaton: &Automaton) -> Contraction {
     result
 }
 
-/// Restrictions L of a state's operators to V: in the coordinates of e_i - e_0 the entries are
-/// T[i][j] - T[i][0], i and j from 1.
+/// Restrictions L of a state's operators to V: in the coordinates of `e_i - e_0` the entries are
+/// `T[i][j] - T[i][0]`, i and j from 1.
 fn restrictions(state: &super::State) -> Vec<Step> {
     state
         .transitions

@@ -494,7 +494,7 @@ fn shifted(cube: [usize; 3], offset: [u8; 3]) -> [usize; 3] {
     std::array::from_fn(|axis| cube[axis] + offset[axis] as usize)
 }
 
-/// A small value of max_k sum_i m_i rows[i][k] over weights m: the best pair of rows, then the best
+/// A small value of `max_k sum_i m_i rows[i][k]` over weights m: the best pair of rows, then the best
 /// combination of that with each other row. Stops at `enough`. Every value that it meets is a bound.
 fn game_value(rows: &mut [[f64; 7]], corners: usize, enough: f64) -> f64 {
     let mut best = f64::INFINITY;

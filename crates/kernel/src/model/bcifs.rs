@@ -370,7 +370,7 @@ impl Reader<'_> {
         self.index.get(name).map(|&index| &states[index]).ok_or_else(|| format!("state '{name}' does not exist"))
     }
 
-    /// b_k T^bd_j = T_i b_m for every j, (i, m) = children[j].
+    /// b_k T^bd_j = T_i b_m for every j, `(i, m) = children[j]`.
     fn incidence(&self, incidence: &Incidence, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
         let state = self.find(states, &incidence.state)?;
         let missing = || format!("state '{}' has no boundary {}", state.name, incidence.boundary);
