@@ -346,6 +346,23 @@ pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budg
     }
 }
 
+/// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
+/// shrinks by the automaton's rate (its proven lower bound) at every step.
+fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: &Budget) -> Result<(), DilationError> {
+    let rate = attractor.contraction().lower;
+    let size = (0..attractor.roots().len())
+        .filter(|&index| !attractor.automaton().state(attractor.roots()[index].state).transitions.is_empty())
+        .map(|index| attractor.root_cell(index).ball.radius)
+        .fold(0.0, f64::max);
+    let needed_mm = 0.1 * aimed;
+    let allowed = budget.limits.depth;
+    let reached_mm = size * rate.powf(f64::from(allowed));
+    if reached_mm > needed_mm {
+        return Err(DilationError::Depth { allowed, tolerance_mm: tolerance.mm(), needed_mm, reached_mm });
+    }
+    Ok(())
+}
+
 /// What a pass made, whether or not it was good enough.
 struct Made {
     triangles: f64,
@@ -389,6 +406,7 @@ impl<'a> Planned<'a> {
         let aimed = tolerance.mm().min(0.5 * radius);
         let rounding = rounding(extent(&bounds, 2.0 * radius));
         let rule = SiteRule::new(attractor, radius, aimed);
+        check_depth(attractor, aimed, tolerance, budget)?;
         let allowed = aimed - rule.outer_reserve() - rounding;
         // a (sqrt(5)/4 + t) = allowed, with t = max(least clamp, roundings / a).
         let apart = 1.01 * CLAMP_ROUNDINGS * rounding;
