@@ -113,7 +113,7 @@ impl<'a> Workshop<'a> {
     pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
         Self {
             attractor: rule.attractor(),
-            tree: Tree::new(rule, setting.slack),
+            tree: Tree::new(rule, setting.slack, setting.cells),
             tetrahedra: super::lattice::tetrahedra(),
             values: [vec![UNKNOWN; VERTICES], vec![UNKNOWN; VERTICES]],
             closest: [vec![[0.0; 3]; VERTICES], vec![[0.0; 3]; VERTICES]],
@@ -148,6 +148,11 @@ impl<'a> Workshop<'a> {
         surface.site_error = self.tree.largest_error;
         surface.shared.sort_unstable();
         surface
+    }
+
+    /// Whether the last block needed more cells than allowed: its surface is then incomplete.
+    pub(super) fn is_exhausted(&self) -> bool {
+        self.tree.exhausted
     }
 
     /// A sub-block: skipped when its middle is too far from the surface for any of its tetrahedra.

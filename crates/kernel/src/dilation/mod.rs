@@ -108,6 +108,14 @@ pub enum DilationError {
         /// Error of a cell at the limit.
         reached_mm: f64,
     },
+    /// Cells overlap so much that too many matter at one place.
+    #[error(
+        "the cells overlap so much that more than {allowed} of them matter at one place; use fewer maps, maps that contract more, or a larger tolerance"
+    )]
+    Cells {
+        /// The limit, from the memory that is allowed.
+        allowed: usize,
+    },
     /// The mesh is no closed manifold: our bug.
     #[error("the extracted surface is not a closed manifold: {0}")]
     Defect(SolidError),
@@ -128,7 +136,7 @@ impl DilationError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
-            Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } => Kind::Limit,
+            Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } => Kind::Unreachable,
             Self::Defect(_) => Kind::Defect,
         }
@@ -143,6 +151,7 @@ impl DilationError {
             Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
             Self::Depth { .. } => "limit-depth",
+            Self::Cells { .. } => "limit-cells",
             Self::Defect(_) => "nonmanifold",
         }
     }
@@ -153,6 +162,9 @@ impl DilationError {
         let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
         match *self {
             Self::Stopped(_) | Self::Defect(_) => None,
+            Self::Cells { allowed } => {
+                Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
+            }
             Self::Triangles { asked, allowed, reachable_mm, .. } => Some(facts("triangles", asked, allowed as f64, reachable_mm)),
             Self::Memory { asked, allowed, reachable_mm, .. } => Some(facts("memory_bytes", asked, allowed as f64, reachable_mm)),
             Self::Precision { tolerance_mm, reachable_mm, .. } => Some(facts("tolerance_mm", tolerance_mm, reachable_mm, reachable_mm)),
@@ -195,6 +207,8 @@ pub(crate) struct Setting {
     tolerance: f64,
     /// Largest movement of a vertex by rounding to single precision.
     rounding: f64,
+    /// Cells that one cube of space, or one thread, may hold at once.
+    cells: usize,
 }
 
 /// Radius of the closing ball in units of a. Without closing, Koch curves and Sierpinski tetrahedra come out with
@@ -213,11 +227,13 @@ const CLAMP_ROUNDINGS: f64 = 14.0;
 const COARSEST: f64 = 0.7;
 /// Passes from the coarsest pitch that might do to the one that is proven to do.
 const PASSES: i32 = 4;
+/// Bytes of a cell with its control points, nodes and sites.
+const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
 const BYTES_PER_TRIANGLE: f64 = 80.0;
 
 impl Setting {
-    fn new(radius: f64, tolerance: f64, pitch: f64, fill: bool, bounds: &AxisBox) -> Self {
+    fn new(radius: f64, tolerance: f64, pitch: f64, fill: bool, cells: usize, bounds: &AxisBox) -> Self {
         let extent = extent(bounds, radius + 2.0 * pitch);
         let margin = radius + 1.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost clamping.
@@ -239,6 +255,7 @@ impl Setting {
             slack: 1e-13 * extent,
             tolerance,
             rounding: rounding(extent),
+            cells,
         }
     }
 
@@ -346,6 +363,23 @@ pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budg
     }
 }
 
+/// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
+/// shrinks by the automaton's rate (its proven lower bound) at every step.
+fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: &Budget) -> Result<(), DilationError> {
+    let rate = attractor.contraction().lower;
+    let size = (0..attractor.roots().len())
+        .filter(|&index| !attractor.automaton().state(attractor.roots()[index].state).transitions.is_empty())
+        .map(|index| attractor.root_cell(index).ball.radius)
+        .fold(0.0, f64::max);
+    let needed_mm = 0.1 * aimed;
+    let allowed = budget.limits.depth;
+    let reached_mm = size * rate.powf(f64::from(allowed));
+    if reached_mm > needed_mm {
+        return Err(DilationError::Depth { allowed, tolerance_mm: tolerance.mm(), needed_mm, reached_mm });
+    }
+    Ok(())
+}
+
 /// What a pass made, whether or not it was good enough.
 struct Made {
     triangles: f64,
@@ -389,6 +423,7 @@ impl<'a> Planned<'a> {
         let aimed = tolerance.mm().min(0.5 * radius);
         let rounding = rounding(extent(&bounds, 2.0 * radius));
         let rule = SiteRule::new(attractor, radius, aimed);
+        check_depth(attractor, aimed, tolerance, budget)?;
         let allowed = aimed - rule.outer_reserve() - rounding;
         // a (sqrt(5)/4 + t) = allowed, with t = max(least clamp, roundings / a).
         let apart = 1.01 * CLAMP_ROUNDINGS * rounding;
@@ -439,7 +474,9 @@ impl<'a> Planned<'a> {
 
     /// One pass at a pitch. With `hasty` it is given up at the first block that is not good enough.
     fn pass(&self, attractor: &Attractor, pitch: f64, hasty: bool, fill: bool, budget: &Budget) -> Result<Attempt, DilationError> {
-        let setting = Setting::new(self.radius, self.tolerance, pitch, fill, &self.bounds);
+        // The roots are there anyway; what grows beyond them may take a fair share of the memory.
+        let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * attractor.roots().len();
+        let setting = Setting::new(self.radius, self.tolerance, pitch, fill, cells, &self.bounds);
         let allowed = self.tolerance - self.rule.outer_reserve() - setting.extra();
         let (blocks, candidates) = self.space(attractor, &setting);
         let pass = Pass {

@@ -51,7 +51,7 @@ impl<'a> Pass<'a> {
         if self.too_coarse.load(Ordering::Relaxed) {
             return Ok(Vec::new());
         }
-        let Some((kept, open)) = self.reduce(node, candidates, open) else {
+        let Some((kept, open)) = self.reduce(node, candidates, open)? else {
             self.finish(node);
             return Ok(Vec::new());
         };
@@ -98,7 +98,7 @@ impl<'a> Pass<'a> {
     /// The cells that may hold the nearest site of a vertex of the cube that matters, and the solids whose
     /// surface meets the cube, of those that are still `open`; `None` when the result's surface cannot meet
     /// the cube.
-    fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Option<(Candidates, Vec<u32>)> {
+    fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<(Candidates, Vec<u32>)>, DilationError> {
         let (middle, half) = self.extent(node);
         let size = CELL_SHARE * half;
         let mut brackets = Vec::with_capacity(candidates.cells.len());
@@ -107,12 +107,12 @@ impl<'a> Pass<'a> {
         // Distances above this matter to no vertex of the cube, except to tell the inside of a solid.
         let horizon = self.setting.radius + self.setting.band + half;
         for candidate in &candidates.cells {
-            self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded);
+            self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded)?;
         }
         if upper + half < self.setting.radius {
-            return None;
+            return Ok(None);
         }
-        let reaches = self.solids(&middle, half, &brackets, &expanded, open)?;
+        let Some(reaches) = self.solids(&middle, half, &brackets, &expanded, open) else { return Ok(None) };
         let slack = self.setting.slack;
         let threshold = (upper + 2.0 * half).min(horizon) + slack;
         let mut kept = Candidates::default();
@@ -126,7 +126,7 @@ impl<'a> Pass<'a> {
             }
         }
         let still_open = open.iter().copied().filter(|&solid| reaches[solid as usize] > f64::NEG_INFINITY).collect();
-        (lowest <= self.setting.radius + self.setting.gap + half + slack).then_some((kept, still_open))
+        Ok((lowest <= self.setting.radius + self.setting.gap + half + slack).then_some((kept, still_open)))
     }
 
     /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances.
@@ -141,7 +141,10 @@ impl<'a> Pass<'a> {
         upper: &mut f64,
         brackets: &mut Vec<(f64, f64)>,
         to: &mut Candidates,
-    ) {
+    ) -> Result<(), DilationError> {
+        if to.cells.len() >= self.setting.cells {
+            return Err(DilationError::Cells { allowed: self.setting.cells });
+        }
         let points = from.points_of(self.attractor, candidate);
         let ball = candidate.cell.ball;
         let distance = distance_squared(middle, &ball.centre).sqrt();
@@ -150,14 +153,14 @@ impl<'a> Pass<'a> {
             *upper = upper.min(nearest + self.setting.slack);
             brackets.push((nearest - self.setting.slack, nearest));
             to.push(candidate.cell, points, true);
-            return;
+            return Ok(());
         }
         let in_solid = self.attractor.roots()[candidate.cell.root as usize].solid.is_some();
         if ball.radius <= size || (distance - ball.radius > horizon && !in_solid) {
             *upper = upper.min(distance + ball.radius + self.setting.slack);
             brackets.push((distance - ball.radius - self.setting.slack, distance + ball.radius));
             to.push(candidate.cell, points, false);
-            return;
+            return Ok(());
         }
         let state = self.attractor.state_of(&candidate.cell);
         for (index, transition) in state.transitions.iter().enumerate() {
@@ -168,8 +171,9 @@ impl<'a> Pass<'a> {
             let leaf = self.rule.leaf(&cell, &child_control).is_some();
             child.push(cell, &child_control, leaf);
             let only = child.cells[0];
-            self.expand(middle, size, &only, &child, horizon, upper, brackets, to);
+            self.expand(middle, size, &only, &child, horizon, upper, brackets, to)?;
         }
+        Ok(())
     }
 
     /// Per solid, the distance up to which its triangles must be kept: where its surface meets the cube, all
@@ -221,6 +225,9 @@ impl<'a> Pass<'a> {
     ) -> Result<Option<BlockSurface>, DilationError> {
         let first_cube = node.first_block.map(|block| block * SIDE as i64);
         let mut surface = workshop.surface(self.setting, first_cube, candidates, open);
+        if workshop.is_exhausted() {
+            return Err(DilationError::Cells { allowed: self.setting.cells });
+        }
         if surface.triangles.is_empty() && surface.outer <= 0.0 {
             return Ok(None);
         }

@@ -83,6 +83,9 @@ pub(super) struct Hit {
 pub(super) struct Tree<'a> {
     rule: &'a SiteRule<'a>,
     slack: f64,
+    most_nodes: usize,
+    /// Whether a node was left closed because there were too many: answers are then worthless.
+    pub(super) exhausted: bool,
     nodes: Vec<Node>,
     cells: Vec<Cell>,
     points: Vec<ControlPoint>,
@@ -97,10 +100,12 @@ pub(super) struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
-    pub(super) fn new(rule: &'a SiteRule<'a>, slack: f64) -> Self {
+    pub(super) fn new(rule: &'a SiteRule<'a>, slack: f64, most_nodes: usize) -> Self {
         Self {
             rule,
             slack,
+            most_nodes,
+            exhausted: false,
             nodes: Vec::new(),
             cells: Vec::new(),
             points: Vec::new(),
@@ -120,6 +125,7 @@ impl<'a> Tree<'a> {
         self.points.clear();
         self.sites.clear();
         self.leaves = 0;
+        self.exhausted = false;
         self.largest_error = SiteError::default();
         self.point_sites.clear();
         for candidate in &candidates.cells {
@@ -159,6 +165,10 @@ impl<'a> Tree<'a> {
         let cell = self.cells[id as usize];
         let state = self.rule.attractor().state_of(&cell);
         let first = self.nodes.len() as u32;
+        if self.nodes.len() >= self.most_nodes {
+            self.exhausted = true;
+            return (first, 0);
+        }
         // Taken out of the tree while `add` grows its lists.
         let [mut parent, mut child] = std::mem::take(&mut self.scratch);
         parent.clear();
