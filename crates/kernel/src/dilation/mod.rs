@@ -97,7 +97,9 @@ pub enum DilationError {
         reachable_mm: f64,
     },
     /// The tolerance cannot be reached with cells of the allowed depth.
-    #[error("cells of depth {allowed} are still {reached_mm} mm large, and the tolerance of {tolerance_mm} mm needs {needed_mm} mm")]
+    #[error(
+        "cells of depth {allowed} are still {reached_mm:.3e} mm large, and the tolerance of {tolerance_mm} mm needs {needed_mm:.3e} mm: the maps contract too slowly"
+    )]
     Depth {
         /// The limit.
         allowed: u32,
@@ -168,8 +170,8 @@ impl DilationError {
             Self::Triangles { asked, allowed, reachable_mm, .. } => Some(facts("triangles", asked, allowed as f64, reachable_mm)),
             Self::Memory { asked, allowed, reachable_mm, .. } => Some(facts("memory_bytes", asked, allowed as f64, reachable_mm)),
             Self::Precision { tolerance_mm, reachable_mm, .. } => Some(facts("tolerance_mm", tolerance_mm, reachable_mm, reachable_mm)),
-            Self::Depth { allowed, tolerance_mm, needed_mm, reached_mm } => {
-                Some(facts("depth", f64::from(allowed) + 1.0, f64::from(allowed), tolerance_mm * reached_mm / needed_mm))
+            Self::Depth { allowed, .. } => {
+                Some(LimitFacts { limit: "depth", asked: f64::from(allowed) + 1.0, allowed: f64::from(allowed), remedy: None })
             }
         }
     }
