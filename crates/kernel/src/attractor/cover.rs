@@ -27,8 +27,11 @@ pub struct PointCover {
 const MOST_POINTS: usize = 16;
 /// Extreme points looked at.
 const MOST_EXTREMES: usize = 96;
-/// Descents end when cells are this small relative to the first: deeper than double precision resolves.
+/// Steps of a descent that look for the farthest child; then the first child is taken, until cells are smaller than
+/// double precision resolves: whatever the maps' ratios, a descent ends at a point of the attractor.
 const DESCENT: usize = 200;
+/// Steps of a descent at most: maps that contract by 0.99 need 4200.
+const LONGEST_DESCENT: usize = 5000;
 
 /// Covers of all states; `None` where maps do not contract at each step in the Euclidean norm.
 pub(super) fn covers(automaton: &Automaton, bounds: &[StateBound], contraction: &Contraction) -> Vec<Option<PointCover>> {
@@ -44,8 +47,10 @@ pub(super) fn covers(automaton: &Automaton, bounds: &[StateBound], contraction: 
     // delta_v = max distance of T_e s from conv(S_v); the excess solves excess_v >= delta_v + s_e excess_w.
     let deltas: Vec<f64> = (0..states.len()).map(|index| overhang(automaton, &covers, index)).collect();
     let mut excess = vec![0.0_f64; states.len()];
-    let worst = deltas.iter().fold(0.0_f64, |a, &b| a.max(b));
-    let largest = norms.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
+    // Frames lead to frames: other states have neither covers nor norms that matter.
+    let frames = || (0..states.len()).filter(|&index| frame(index));
+    let worst = frames().map(|index| deltas[index]).fold(0.0, f64::max);
+    let largest = frames().flat_map(|index| &norms[index]).fold(0.0_f64, |a, &b| a.max(b));
     if contracts {
         excess.fill(worst / (1.0 - largest));
         for _ in 0..100 {
@@ -122,12 +127,18 @@ fn extremes(automaton: &Automaton, bounds: &[StateBound], id: StateId) -> Vec<Po
 fn extreme(automaton: &Automaton, bounds: &[StateBound], id: StateId, direction: &Point) -> Option<Point> {
     let mut frame = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut state = id;
-    for _ in 0..DESCENT {
+    for step in 0..LONGEST_DESCENT {
         let size: f64 = (1..4).map(|j| distance_squared(&frame[j], &frame[0])).sum();
         if size < 1e-36 {
             break;
         }
-        let best = automaton.state(state).transitions.iter().map(|transition| {
+        let transitions = &automaton.state(state).transitions;
+        if step >= DESCENT {
+            let first = transitions.first()?;
+            (state, frame) = (first.to, image(&frame, &first.operator));
+            continue;
+        }
+        let best = transitions.iter().map(|transition| {
             let child = image(&frame, &transition.operator);
             (reach(automaton, bounds, transition.to, &child, direction, 2), transition.to, child)
         });

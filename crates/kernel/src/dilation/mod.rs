@@ -17,6 +17,8 @@
 //! marching tetrahedra; the bounds are proven in `block`.
 
 mod block;
+#[cfg(test)]
+mod embedding;
 mod lattice;
 mod octree;
 mod stitch;
