@@ -92,7 +92,7 @@ pub(super) fn bound_states(automaton: &Automaton, contraction: &Contraction) -> 
 fn shrink_boxes(automaton: &Automaton, bounds: &mut [StateBound]) {
     for _ in 0..120 {
         let mut change = 0.0_f64;
-        for index in 0..bounds.len() {
+        for index in (0..bounds.len()).filter(|&index| automaton.states()[index].frame) {
             let mut hull = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
             for transition in &automaton.states()[index].transitions {
                 let StateBound::Frame { low, high, .. } = &bounds[transition.to.index()] else { return };

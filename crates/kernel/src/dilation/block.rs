@@ -113,7 +113,7 @@ impl<'a> Workshop<'a> {
     pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
         Self {
             attractor: rule.attractor(),
-            tree: Tree::new(rule, setting.slack, setting.cells),
+            tree: Tree::new(rule, setting.slack, 4 * setting.cells),
             tetrahedra: super::lattice::tetrahedra(),
             values: [vec![UNKNOWN; VERTICES], vec![UNKNOWN; VERTICES]],
             closest: [vec![[0.0; 3]; VERTICES], vec![[0.0; 3]; VERTICES]],

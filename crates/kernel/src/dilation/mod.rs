@@ -7,11 +7,11 @@
 //! embedded 2-manifold: one triangle set per tetrahedron of a conforming complex, one vertex per cut edge
 //! strictly inside it.
 //!
-//! Embedded also after rounding: cut every tetrahedron of the lattice along the surface into tetrahedra.
-//! Their heights are at least 0.2 t times the shortest edge (t the clamp; a test samples all cases), and
-//! moving every vertex by less than half of the least height keeps them all positively oriented, so the
-//! rounded complex is still a triangulation of space and its triangles still meet only along shared edges
-//! and corners. The pitch is refused when single precision cannot carry that.
+//! Embedded also after rounding: cut every tetrahedron of the lattice along the surface into tetrahedra. Their
+//! widths are at least 0.68 t^2 a (t the clamp; `embedding` measures it over all cases), and moving every vertex by
+//! less than half of the least width keeps them all positively oriented, so the rounded complex is still a
+//! triangulation of space and its triangles still meet only along shared edges and corners. t follows from that,
+//! and a pitch is refused that would need too large a t.
 //!
 //! Papers: Labelle and Shewchuk, "Isosurface stuffing" (2007), for the lattice; Doi and Koide (1991) for
 //! marching tetrahedra; the bounds are proven in `block`.
@@ -211,7 +211,7 @@ pub(crate) struct Setting {
     tolerance: f64,
     /// Largest movement of a vertex by rounding to single precision.
     rounding: f64,
-    /// Cells that one cube of space, or one thread, may hold at once.
+    /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
     cells: usize,
 }
 
@@ -225,8 +225,8 @@ const NECK: f64 = 0.36;
 const LEAST_CLAMP: f64 = 1.0 / 512.0;
 /// t is at most this: beyond it the pitch is too fine for single precision.
 const MOST_CLAMP: f64 = 1.0 / 16.0;
-/// t a must be this many times the movement of a vertex by rounding: see the module's comment.
-const CLAMP_ROUNDINGS: f64 = 14.0;
+/// t^2 a must be this many times the movement of a vertex by rounding: 2 / 0.68, see the module's comment.
+const CLAMP_ROUNDINGS: f64 = 2.95;
 /// A pitch above this share of r would not see the shape.
 const COARSEST: f64 = 0.7;
 /// Passes from the coarsest pitch that might do to the one that is proven to do.
@@ -255,7 +255,7 @@ impl Setting {
             gap_square: (radius + gap).powi(2),
             neck: NECK * pitch,
             enclosing: ENCLOSING * pitch,
-            clamp: (CLAMP_ROUNDINGS * rounding(extent) / pitch).clamp(LEAST_CLAMP, MOST_CLAMP),
+            clamp: (CLAMP_ROUNDINGS * rounding(extent) / pitch).sqrt().clamp(LEAST_CLAMP, MOST_CLAMP),
             slack: 1e-13 * extent,
             tolerance,
             rounding: rounding(extent),
@@ -429,10 +429,11 @@ impl<'a> Planned<'a> {
         let rule = SiteRule::new(attractor, radius, aimed);
         check_depth(attractor, aimed, tolerance, budget)?;
         let allowed = aimed - rule.outer_reserve() - rounding;
-        // a (sqrt(5)/4 + t) = allowed, with t = max(least clamp, roundings / a).
-        let apart = 1.01 * CLAMP_ROUNDINGS * rounding;
-        let finest = (allowed / (ENCLOSING + 1.01 * LEAST_CLAMP)).min((allowed - apart) / ENCLOSING).min(COARSEST * radius);
-        let least = apart / MOST_CLAMP;
+        // a (sqrt(5)/4 + t) = allowed, with t = max(least clamp, sqrt(apart / a)).
+        let apart = 1.02 * CLAMP_ROUNDINGS * rounding;
+        let root = ((apart + 4.0 * ENCLOSING * allowed.max(0.0)).sqrt() - apart.sqrt()) / (2.0 * ENCLOSING);
+        let finest = (allowed / (ENCLOSING + 1.01 * LEAST_CLAMP)).min(root * root).min(COARSEST * radius);
+        let least = apart / (MOST_CLAMP * MOST_CLAMP);
         if finest < least {
             let reachable_mm = 1.01 * (least * (ENCLOSING + MOST_CLAMP) + rounding) / (1.0 - rule.outer_reserve() / aimed);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });

@@ -75,6 +75,13 @@ pub fn mesh_measures(attractor: &Attractor) -> Option<(Interval, Interval)> {
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     let around = |value: f64| Interval::new(value * (1.0 - ROUNDING), value * (1.0 + ROUNDING));
-    let enclosed = if solid.is_some() { around(volume(&mesh)) } else { Interval { low: 0.0, high: 0.0 } };
+    // Terms may cancel: the rounding is that of their sizes.
+    let origin = mesh.vertices.first().copied().unwrap_or_default();
+    let size = sum(&mesh, |a, b, c| (a - origin).length() * (b - origin).length() * (c - origin).length());
+    let rounding = 16.0 * f64::EPSILON * size;
+    let enclosed = match solid {
+        Some(_) => Interval { low: volume(&mesh) - rounding, high: volume(&mesh) + rounding },
+        None => Interval { low: 0.0, high: 0.0 },
+    };
     Some((enclosed, around(area(&mesh))))
 }

@@ -306,7 +306,9 @@ impl Reader<'_> {
                 draft.error(&format!("{place}/control_points"), "automaton.dimension-mismatch", message);
                 continue;
             }
-            for (k, point) in cell.control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || point.w <= 0.0) {
+            for (k, point) in
+                cell.control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || !super::WEIGHTS.contains(&point.w))
+            {
                 let message = format!("control point {k} is {point}: coordinates must be finite and the weight positive");
                 draft.error(&format!("{place}/control_points/{k}"), "model.not-finite", message);
             }

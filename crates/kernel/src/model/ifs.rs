@@ -62,16 +62,39 @@ impl AffineMap {
         self.linear.is_finite() && self.translation.is_finite()
     }
 
-    /// The operator on the frame (0, e1, e2, e3): column j holds the frame coordinates of the image of
-    /// frame point j.
-    fn operator(&self) -> SubdivisionOperator {
+    /// The operator on a frame: column j holds the frame coordinates of the image of frame point j.
+    fn operator(&self, frame: &Frame) -> SubdivisionOperator {
         let barycentric = |x: DVec3| [1.0 - (x.x + x.y + x.z), x.x, x.y, x.z];
+        let translation = (self.linear * frame.origin - frame.origin + self.translation) / frame.unit;
         let mut columns = Vec::with_capacity(16);
-        columns.extend(barycentric(self.translation));
+        columns.extend(barycentric(translation));
         for axis in 0..3 {
-            columns.extend(barycentric(self.translation + self.linear.col(axis)));
+            columns.extend(barycentric(translation + self.linear.col(axis)));
         }
         SubdivisionOperator::exact(4, columns)
+    }
+}
+
+/// The affine frame (origin, origin + unit e1, ...) in which a system is iterated: near the attractor and of its
+/// size, so that coordinates in it are of order 1 and lose no digits, wherever the shape lies.
+struct Frame {
+    origin: DVec3,
+    unit: f64,
+}
+
+impl Frame {
+    fn of(maps: &[AffineMap]) -> Self {
+        let mut origin = DVec3::ZERO;
+        for _ in 0..200 {
+            origin = maps.iter().map(|map| map.linear * origin + map.translation).sum::<DVec3>() / maps.len() as f64;
+        }
+        if !origin.is_finite() {
+            // Maps that do not contract are refused later, in any frame.
+            origin = DVec3::ZERO;
+        }
+        let step = |map: &AffineMap| (map.linear * origin - origin + map.translation).length();
+        let unit = maps.iter().map(step).fold(0.0, f64::max);
+        Self { origin, unit: if unit > 0.0 && unit.is_finite() { unit } else { 1.0 } }
     }
 }
 
@@ -85,7 +108,8 @@ impl Ifs {
             finite = false;
             draft.error(&format!("/maps/{index}"), "model.not-finite", format!("map {index} has an entry that is not finite: {map:?}"));
         }
-        let Some(drawing) = self.drawing(draft) else { return };
+        let frame = Frame::of(&self.maps);
+        let Some(drawing) = self.drawing(&frame, draft) else { return };
         if !finite {
             return;
         }
@@ -99,7 +123,7 @@ impl Ifs {
                 .iter()
                 .map(|&map| Transition {
                     to: StateId::new(offset + follow.set_after[map]),
-                    operator: self.maps[map].operator(),
+                    operator: self.maps[map].operator(&frame),
                     label: map,
                 })
                 .collect();
@@ -114,12 +138,13 @@ impl Ifs {
             };
             draft.state_from(state, "/maps");
         }
-        let points = vec![[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|corner| frame.origin + frame.unit * corner);
+        let points = corners.iter().map(|p| [p.x, p.y, p.z, 1.0]).collect();
         draft.roots.push(Root { state: StateId::new(offset), points, rational: false, solid: None });
     }
 
     /// The primitive as a drawing: `None` after an error, `Some(None)` when the model has no primitive.
-    fn drawing(&self, draft: &mut Draft) -> Option<Option<Drawing>> {
+    fn drawing(&self, frame: &Frame, draft: &mut Draft) -> Option<Option<Drawing>> {
         let Some(primitive) = &self.primitive else { return Some(None) };
         let mut drawing = Drawing::default();
         let vertices = match primitive {
@@ -135,7 +160,7 @@ impl Ifs {
             );
             return None;
         };
-        drawing.vertices = vertices.iter().map(|vertex| vertex.to_array()).collect();
+        drawing.vertices = vertices.iter().map(|vertex| ((*vertex - frame.origin) / frame.unit).to_array()).collect();
         match primitive {
             Primitive::Points(_) => drawing.points = (0..count).collect(),
             Primitive::Polyline { points, closed } => {

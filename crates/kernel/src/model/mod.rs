@@ -17,6 +17,9 @@ pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
 
+/// Weights of control points that double precision can project without overflow.
+pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+
 /// A model: a name and a shape in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
