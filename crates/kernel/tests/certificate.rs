@@ -7,7 +7,8 @@ use glam::{DMat3, DQuat, DVec3};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{Dilation, dilate};
-use lacuna_kernel::measure::mass::{dilated_area, dilated_volume, volume};
+use lacuna_kernel::measure::bounding_box;
+use lacuna_kernel::measure::mass::{dilated_area, dilated_volume, mesh_measures, volume};
 use lacuna_kernel::model::{AffineMap, BezierCurve, CornerCutting, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use oracle::{Oracle, Random, distance, winding};
@@ -283,4 +284,50 @@ fn random_affine_systems() {
         attack_evaluation(&name, &shape, &oracle, 0.2);
         attack_dilation(&name, &shape, &oracle, random.between(0.8, 2.0), 0.15, &mut random);
     }
+}
+
+/// Maps halve towards the corners of a tetrahedron whose coordinates are exact: its box is exact, wherever it lies.
+#[test]
+fn boxes_hold_far_from_the_origin() {
+    for place in [0.0, 1e3, 1e5, 1e6] {
+        let corners = [[0.0, 0.0, 0.0], [64.0, 64.0, 0.0], [64.0, 0.0, 64.0], [0.0, 64.0, 64.0]];
+        let half = DMat3::from_diagonal(DVec3::splat(0.5));
+        let towards = |corner: [f64; 3]| AffineMap { linear: half, translation: 0.5 * (DVec3::splat(place) + DVec3::from_array(corner)) };
+        let shape = attractor(Shape::Ifs(Ifs { maps: corners.map(towards).to_vec(), primitive: None, graph: None }));
+        let bounds = bounding_box(&shape, &Budget::default()).unwrap();
+        for axis in 0..3 {
+            for (end, exact) in [(bounds.low[axis], place), (bounds.high[axis], place + 64.0)] {
+                assert!(end.low <= exact && exact <= end.high, "at {place}: {exact} is not in {end:?}");
+                assert!(end.width() <= 1e-8 + 1e-11 * place, "at {place}: {end:?}");
+            }
+        }
+    }
+}
+
+/// Two cubes of edge 2^-10, one of them 131072 mm away: terms of the sum are 2^50 times their result.
+#[test]
+fn volumes_hold_where_terms_cancel() {
+    let edge = 1.0 / 1024.0;
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for place in [0.0, 131_072.0] {
+        let first = vertices.len() as u32;
+        vertices
+            .extend((0..8).map(|k| DVec3::splat(place) + edge * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))));
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        faces.extend(sides.map(|side| side.map(|corner| corner + first).to_vec()));
+    }
+    let shape = attractor(Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Solid }));
+    let (volume, area) = mesh_measures(&shape).unwrap();
+    let (exact, sides) = (2.0 * edge.powi(3), 12.0 * edge * edge);
+    assert!(volume.low <= exact && exact <= volume.high, "{exact} is not in {volume:?}");
+    assert!(area.low <= sides && sides <= area.high, "{sides} is not in {area:?}");
+}
+
+/// 1 / 1e-310 overflows: such weights are refused, with their place.
+#[test]
+fn weights_that_overflow_are_refused() {
+    let control_points = vec![DVec3::new(10.0, 20.0, 0.0), DVec3::ZERO, DVec3::new(30.0, 0.0, 0.0)];
+    let shape = Shape::BezierCurve(BezierCurve { control_points, weights: Some(vec![1e-310, 1.0, 1.0]) });
+    let findings = Model { name: None, shape }.lower().unwrap_err();
+    assert!(findings.iter().any(|finding| finding.pointer == "/weights/0" && finding.code == "bezier.weights"), "{findings:?}");
 }

@@ -35,12 +35,10 @@ impl BezierCurve {
         if weights.len() != count {
             draft.error("/weights", "bezier.weights", format!("{} weights for {count} control points", weights.len()));
         }
-        for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| !(weight.is_finite() && **weight > 0.0)) {
-            draft.error(
-                &format!("/weights/{index}"),
-                "bezier.weights",
-                format!("weight {index} is {weight}, and must be positive and finite"),
-            );
+        for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| !super::WEIGHTS.contains(weight)) {
+            let (least, most) = (super::WEIGHTS.start(), super::WEIGHTS.end());
+            let message = format!("weight {index} is {weight:e}, and must be positive, from {least:e} to {most:e}");
+            draft.error(&format!("/weights/{index}"), "bezier.weights", message);
         }
         let rational = weights.iter().any(|&weight| weight != weights[0]);
         let points = self
