@@ -331,3 +331,20 @@ fn weights_that_overflow_are_refused() {
     let findings = Model { name: None, shape }.lower().unwrap_err();
     assert!(findings.iter().any(|finding| finding.pointer == "/weights/0" && finding.code == "bezier.weights"), "{findings:?}");
 }
+
+/// Two cubes that cross, in one mesh: it is closed, but inside and outside are not what its normals say.
+#[test]
+fn solids_that_cross_themselves_are_refused() {
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for place in [0.0, 5.0] {
+        let first = vertices.len() as u32;
+        vertices
+            .extend((0..8).map(|k| DVec3::splat(place) + 10.0 * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))));
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        faces.extend(sides.map(|side| side.map(|corner| corner + first).to_vec()));
+    }
+    let shape = attractor(Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Auto }));
+    let (radius, tolerance) = (Radius::new(0.5).unwrap(), Tolerance::new(0.1).unwrap());
+    let error = dilate(&shape, radius, tolerance, &Budget::default()).unwrap_err();
+    assert_eq!(error.code(), "mesh.inside-undefined", "{error}");
+}

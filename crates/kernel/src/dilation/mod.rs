@@ -120,6 +120,11 @@ pub enum DilationError {
         /// The limit, from the memory that is allowed.
         allowed: usize,
     },
+    /// A closed mesh given as a solid has no well-defined inside.
+    #[error(
+        "a closed mesh is taken as a solid, and crosses itself or has faces without area, so that its inside is not defined; mend it, or say \"interior\": \"surface\""
+    )]
+    Inside,
     /// The mesh is no closed manifold: our bug.
     #[error("the extracted surface is not a closed manifold: {0}")]
     Defect(SolidError),
@@ -142,6 +147,7 @@ impl DilationError {
             Self::Stopped(stopped) => stopped.kind(),
             Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } => Kind::Unreachable,
+            Self::Inside => Kind::Invalid,
             Self::Defect(_) => Kind::Defect,
         }
     }
@@ -154,6 +160,7 @@ impl DilationError {
             Self::Triangles { .. } => "limit-triangles",
             Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
+            Self::Inside => "mesh.inside-undefined",
             Self::Depth { .. } => "limit-depth",
             Self::Cells { .. } => "limit-cells",
             Self::Defect(_) => "nonmanifold",
@@ -165,7 +172,7 @@ impl DilationError {
     pub fn limit(&self) -> Option<LimitFacts> {
         let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
         match *self {
-            Self::Stopped(_) | Self::Defect(_) => None,
+            Self::Stopped(_) | Self::Defect(_) | Self::Inside => None,
             Self::Cells { allowed } => {
                 Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
             }
@@ -540,7 +547,12 @@ impl<'a> Planned<'a> {
         }
         let leaf_cells = surfaces.iter().map(|surface| surface.leaves).sum();
         let mesh = stitch::join(surfaces, budget)?;
-        let solid = Solid::new(mesh, budget)?;
+        // Signs from pseudo-normals are right for embedded surfaces only; elsewhere they tear the result.
+        let has_solids = !self.rule.attractor().solids().is_empty();
+        let solid = Solid::new(mesh, budget).map_err(|error| match error {
+            SolidError::NotManifold(_) if has_solids => DilationError::Inside,
+            other => other.into(),
+        })?;
         Ok(Some(Dilation { solid, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds }))
     }
 }
