@@ -1,7 +1,7 @@
 //! Cells: instances of states. Their control points, their bounding ball, and what stands for them
 //! when they are small enough.
 
-use super::{Attractor, Root, StateBound};
+use super::{Attractor, StateBound};
 use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator};
 use crate::measure::triangle::closest_on_triangle;
 
@@ -68,17 +68,6 @@ pub struct Cell {
     pub ball: Ball,
     /// See above.
     pub stretch: f64,
-}
-
-/// The bounded cell of a root.
-pub(super) struct RootCell {
-    pub(super) ball: Ball,
-}
-
-impl RootCell {
-    pub(super) fn new(attractor: &Attractor, root: &Root) -> Self {
-        Self { ball: attractor.root_cell_of(root, 0).ball }
-    }
 }
 
 #[inline]
@@ -183,10 +172,7 @@ impl Attractor {
     /// The bounded cell of root `index`.
     #[must_use]
     pub fn root_cell(&self, index: usize) -> Cell {
-        self.root_cell_of(&self.roots()[index], u32::try_from(index).expect("fewer than 2^32 roots"))
-    }
-
-    fn root_cell_of(&self, root: &Root, index: u32) -> Cell {
+        let root = &self.roots()[index];
         let stretch = match self.bound(root.state) {
             StateBound::Frame { reach, radius, .. } => {
                 let columns = frame_columns(&root.points);
@@ -196,7 +182,7 @@ impl Attractor {
             StateBound::Hull { .. } => 0.0,
         };
         let ball = self.ball(root.state, &root.points, root.rational, stretch);
-        Cell { state: root.state, root: index, ball, stretch }
+        Cell { state: root.state, root: u32::try_from(index).expect("fewer than 2^32 roots"), ball, stretch }
     }
 
     /// The child of `cell` through transition `index`, whose control points are `points`.

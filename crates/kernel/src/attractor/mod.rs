@@ -187,11 +187,11 @@ impl Attractor {
     }
 
     fn check_roots(&self) -> Result<(), AttractorError> {
-        for root in &self.roots {
+        for (index, root) in self.roots.iter().enumerate() {
             if root.rational && self.bounds[root.state.index()].margin() > 0.0 {
                 return Err(AttractorError::SignedRational { state: self.automaton.state(root.state).name.clone() });
             }
-            let ball = cell::RootCell::new(self, root).ball;
+            let ball = self.root_cell(index).ball;
             if !ball.is_finite() || ball.radius > 1e150 || ball.centre.iter().any(|x| x.abs() > 1e150) {
                 return Err(AttractorError::Overflow);
             }

@@ -95,7 +95,12 @@ struct Walker<'a> {
     deviation: f64,
 }
 
-impl Walker<'_> {
+impl<'a> Walker<'a> {
+    /// A walker that begins at cells of the given depth.
+    fn new(attractor: &'a Attractor, budget: &'a Budget, tolerance_mm: f64, total: &'a AtomicU64, depth: u32) -> Self {
+        Self { attractor, budget, tolerance_mm, total, buffers: vec![Vec::new(); depth as usize], leaves: 0, deviation: 0.0 }
+    }
+
     fn descend(&mut self, cell: &Cell, points: &[ControlPoint], depth: u32, sink: &mut impl FnMut(Site)) -> Result<(), RefineError> {
         let error = self.attractor.leaf_error(cell, points);
         if error <= self.tolerance_mm {
@@ -187,15 +192,7 @@ pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> R
         .par_iter()
         .with_max_len(1)
         .map(|(cell, points, depth)| {
-            let mut walker = Walker {
-                attractor,
-                budget,
-                tolerance_mm,
-                total: &total,
-                buffers: vec![Vec::new(); *depth as usize],
-                leaves: 0,
-                deviation: 0.0,
-            };
+            let mut walker = Walker::new(attractor, budget, tolerance.mm(), &total, *depth);
             let mut part = Part::default();
             walker.descend(cell, points, *depth, &mut |site| part.push(site))?;
             part.tessellation.leaf_cells = walker.leaves;
@@ -231,15 +228,7 @@ pub fn count_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget)
         .par_iter()
         .with_max_len(1)
         .map(|(cell, points, depth)| {
-            let mut walker = Walker {
-                attractor,
-                budget,
-                tolerance_mm: tolerance.mm(),
-                total: &total,
-                buffers: vec![Vec::new(); *depth as usize],
-                leaves: 0,
-                deviation: 0.0,
-            };
+            let mut walker = Walker::new(attractor, budget, tolerance.mm(), &total, *depth);
             let mut sum = 0.0;
             walker.descend(cell, points, *depth, &mut |site| {
                 if let Site::Point(point) = site {

@@ -146,7 +146,6 @@ impl<'a> Workshop<'a> {
         }
         surface.leaves = self.tree.leaves;
         surface.site_error = self.tree.largest_error;
-        surface.shared.sort_unstable();
         surface
     }
 
