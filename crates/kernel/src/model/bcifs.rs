@@ -1,7 +1,8 @@
 //! Boundary controlled iterated function systems, stated in full.
 
 use super::lower::Draft;
-use crate::attractor::Root;
+use crate::attractor::{Gluing, Root};
+use crate::automaton::topology::{Declared, Shared};
 use crate::automaton::{Boundary, LeafPrimitive, OperatorError, State, StateId, SubdivisionOperator, Transition};
 use glam::DVec4;
 use std::collections::BTreeMap;
@@ -147,6 +148,9 @@ impl Bcifs {
         if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
             reader.constraints(&states, draft);
         }
+        draft.declared.resize(draft.states.len(), Declared::default());
+        draft.declared.extend(reader.declared());
+        reader.glue(&states, draft);
         for (index, state) in states.into_iter().enumerate() {
             draft.state_from(state, &format!("/states/{index}/transitions"));
         }
@@ -322,6 +326,59 @@ impl Reader<'_> {
         }
     }
 
+    /// What the model says of every state's subdivision.
+    fn declared(&self) -> Vec<Declared> {
+        let mut declared = vec![Declared::default(); self.model.states.len()];
+        for incidence in &self.model.incidences {
+            if let Some(&state) = self.index.get(incidence.state.as_str()) {
+                declared[state].incidences.push((incidence.boundary, incidence.children.clone()));
+            }
+        }
+        for adjacency in &self.model.adjacencies {
+            if let Some(&state) = self.index.get(adjacency.state.as_str()) {
+                let permutation = adjacency.reversed.then(|| self.reversal(state, adjacency.between[0])).flatten();
+                declared[state].adjacencies.push(Shared { between: adjacency.between, permutation });
+            }
+        }
+        declared
+    }
+
+    /// The reversing permutation of boundary m of child i.
+    fn reversal(&self, state: usize, (child, boundary): (usize, usize)) -> Option<Vec<usize>> {
+        let target = self.index.get(self.model.states[state].transitions.get(child)?.to.as_str())?;
+        self.reversal_of(*target, boundary)
+    }
+
+    fn reversal_of(&self, state: usize, boundary: usize) -> Option<Vec<usize>> {
+        let edge = self.index.get(self.model.states[state].boundaries.get(boundary)?.state.as_str())?;
+        Some((0..self.model.states[*edge].dimension).rev().collect())
+    }
+
+    /// Which boundaries of root cells are one.
+    fn glue(&self, states: &[State], draft: &mut Draft) {
+        let first = draft.roots.len() - self.model.cells.len().min(draft.roots.len());
+        for glue in &self.model.glue {
+            let root = |(cell, _): (usize, usize)| self.model.cells.get(cell).and_then(|cell| self.index.get(cell.state.as_str()));
+            let permutation = root(glue.between[0]).filter(|_| glue.reversed).and_then(|&state| self.reversal_of(state, glue.between[0].1));
+            let between = glue.between.map(|(cell, boundary)| (first + cell, boundary));
+            let side = |(cell, boundary): (usize, usize)| {
+                let root: &Root = draft.roots.get(cell)?;
+                let state = states.get(root.state.index() - self.offset)?;
+                let incidence = &state.boundaries.get(boundary)?.incidence;
+                Some((0..incidence.columns()).map(|column| placed(root, incidence.column(column))).collect::<Vec<_>>())
+            };
+            if let (Some(left), Some(right)) = (side(between[0]), side(between[1])) {
+                let matched = |(j, point): (usize, &glam::DVec3)| {
+                    let other = permutation.as_ref().map_or(j, |order| order[j]);
+                    right.get(other).map_or(f64::INFINITY, |other| point.distance(*other))
+                };
+                let apart = left.iter().enumerate().map(matched).fold(0.0, f64::max);
+                draft.seam_mm = draft.seam_mm.max(apart);
+            }
+            draft.gluings.push(Gluing { between, permutation });
+        }
+    }
+
     /// Checks the stated incidences and adjacencies; the residual is the largest difference of entries.
     fn constraints(&self, states: &[State], draft: &mut Draft) {
         for (index, incidence) in self.model.incidences.iter().enumerate() {
@@ -418,6 +475,12 @@ impl Reader<'_> {
             format!("boundary {} of child {} and boundary {} of child {} of state '{}'", first.1, first.0, second.1, second.0, state.name);
         Ok(vec![(paths, left, right)])
     }
+}
+
+/// The point of space with these barycentric coordinates in a root.
+fn placed(root: &Root, weights: &[f64]) -> glam::DVec3 {
+    let sum = root.points.iter().zip(weights).map(|(point, &weight)| weight * DVec4::from_array(*point)).sum::<DVec4>();
+    sum.truncate() / sum.w
 }
 
 /// The columns of a product of operators.
