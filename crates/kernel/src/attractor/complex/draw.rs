@@ -60,12 +60,10 @@ impl Builder<'_> {
         let mut complex = tally.complex(loops.len());
         let mut tessellation = Tessellation { leaf_cells: self.leaves, deviation_mm: self.deviation, ..Tessellation::default() };
         let mut place = vec![NONE; self.vertices.len()];
-        for vertex in 0..self.vertices.len() {
-            if tally.used[vertex] {
-                place[vertex] = tessellation.vertices.len() as u32;
-                tessellation.vertices.push(DVec3::from_array(self.vertices[vertex]));
-                complex.vertex_origins.push(self.vertex_origins[vertex]);
-            }
+        for (vertex, index) in place.iter_mut().enumerate().filter(|(vertex, _)| tally.used[*vertex]) {
+            *index = tessellation.vertices.len() as u32;
+            tessellation.vertices.push(DVec3::from_array(self.vertices[vertex]));
+            complex.vertex_origins.push(self.vertex_origins[vertex]);
         }
         let mut outline = Vec::new();
         for (index, edges) in loops.iter().enumerate() {
