@@ -77,13 +77,16 @@ pub(super) struct Upper {
     pub(super) largest: Vec<f64>,
 }
 
-/// Longest path examined.
-const MAXIMUM_DEPTH: usize = 64;
+/// Longest path examined. Paths are extended while their rate is above 0.02 (see [`GAP`]), so that products stay above
+/// 1e-272, far from underflow.
+const MAXIMUM_DEPTH: usize = 160;
 /// The search stops when the upper bound exceeds the lower by this share of what is left to 1: bounds far
 /// from 1 decide, whatever their digits.
 const GAP: f64 = 0.02;
 /// Numbers held by the paths that wait: 64 MB.
 const MAXIMUM_NUMBERS: usize = 8_000_000;
+/// Transitions that paths are made of: with more, single steps decide.
+const MAXIMUM_STEPS: usize = 50_000;
 /// Radii of cycles closer than this are not told apart.
 const SAME_RATE: f64 = 1e-9;
 
@@ -133,8 +136,9 @@ struct Search<'a> {
 pub(super) fn search(steps: &[Vec<Step>], norm: Norm, lower: &mut Lower, allowed: f64) -> Upper {
     let mut search =
         Search { steps, norm, lower, work: 0.0, allowed, numbers: 0, heap: BinaryHeap::new(), serial: 0, largest: Vec::new() };
+    let many = steps.iter().map(Vec::len).sum::<usize>() > MAXIMUM_STEPS;
     for (state, outgoing) in steps.iter().enumerate() {
-        for step in outgoing {
+        for step in outgoing.iter().filter(|step| !many || step.to == state) {
             let path = Path {
                 start: state,
                 end: step.to,
@@ -146,6 +150,10 @@ pub(super) fn search(steps: &[Vec<Step>], norm: Norm, lower: &mut Lower, allowed
             };
             search.visit(path, step.norm);
         }
+    }
+    if many {
+        let largest = steps.iter().flatten().map(|step| step.norm).fold(0.0, f64::max);
+        return Upper { rate: largest, depth: 1, largest: vec![largest] };
     }
     let rate = search.run();
     Upper { rate, depth: search.largest.len(), largest: search.largest }
