@@ -115,6 +115,7 @@ impl Draft {
             Shape::Bcifs(bcifs) => bcifs.lower(self),
             Shape::BezierCurve(curve) => curve.lower(self),
             Shape::CornerCutting(curve) => curve.lower(self),
+            Shape::Subdivision(surface) => surface.lower(self),
             Shape::Mesh(mesh) => mesh.lower(self),
             Shape::Group(group) => self.group(group),
         }

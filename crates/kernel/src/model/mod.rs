@@ -8,6 +8,7 @@ mod group;
 mod ifs;
 mod lower;
 mod mesh;
+mod subdivision;
 
 pub use bcifs::{Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec};
 pub use bezier::BezierCurve;
@@ -16,6 +17,7 @@ pub use group::{Group, Part};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
+pub use subdivision::{BoundaryRule, Corner, Crease, INFINITE_SHARPNESS, Scheme, Subdivision};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
@@ -40,6 +42,8 @@ pub enum Shape {
     BezierCurve(BezierCurve),
     /// The curve of a corner-cutting scheme.
     CornerCutting(CornerCutting),
+    /// The limit surface of a subdivision scheme.
+    Subdivision(Subdivision),
     /// A polygon mesh.
     Mesh(PolygonMesh),
     /// Several shapes.

@@ -1,0 +1,70 @@
+//! Cages for tests of subdivision surfaces.
+#![allow(dead_code)]
+
+use glam::DVec3;
+use lacuna_kernel::attractor::{Attractor, refine};
+use lacuna_kernel::budget::Budget;
+use lacuna_kernel::model::{BoundaryRule, Model, Scheme, Shape, Subdivision};
+use lacuna_kernel::tessellation::Tessellation;
+use lacuna_kernel::tolerance::Tolerance;
+
+pub fn cage(scheme: Scheme, vertices: Vec<DVec3>, faces: Vec<Vec<u32>>) -> Subdivision {
+    Subdivision { scheme, vertices, faces, creases: Vec::new(), corners: Vec::new(), boundary: BoundaryRule::Smooth }
+}
+
+pub fn model(surface: Subdivision) -> Model {
+    Model { name: None, shape: Shape::Subdivision(surface) }
+}
+
+pub fn attractor(surface: Subdivision) -> Attractor {
+    model(surface).lower().unwrap_or_else(|findings| panic!("{findings:?}")).attractor
+}
+
+pub fn evaluated(attractor: &Attractor, tolerance: f64) -> Tessellation {
+    refine(attractor, Tolerance::new(tolerance).expect("positive"), &Budget::default()).expect("refines")
+}
+
+/// [-1, 1]^3.
+pub fn cube(scheme: Scheme) -> Subdivision {
+    let vertices = (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0).collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces: Vec<Vec<u32>> = faces.iter().map(|face| face.to_vec()).collect();
+    cage(scheme, vertices, if scheme == Scheme::Loop { triangulated(&faces) } else { faces })
+}
+
+/// Case 54's.
+pub fn tetrahedron(scheme: Scheme) -> Subdivision {
+    let vertices = vec![DVec3::new(-1.0, -1.0, 1.0), DVec3::new(1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1.0), DVec3::new(-1.0, 1.0, -1.0)];
+    cage(scheme, vertices, vec![vec![0, 1, 2], vec![0, 2, 3], vec![0, 3, 1], vec![1, 3, 2]])
+}
+
+pub fn triangulated(faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    faces.iter().flat_map(|face| (1..face.len() - 1).map(|k| vec![face[0], face[k], face[k + 1]]).collect::<Vec<_>>()).collect()
+}
+
+/// n x m quads round a torus; triangles for Loop.
+pub fn torus(scheme: Scheme, n: u32, m: u32) -> Subdivision {
+    let mut vertices = Vec::new();
+    let mut faces = Vec::new();
+    for i in 0..n {
+        for k in 0..m {
+            let (a, b) = (f64::from(i) * std::f64::consts::TAU / f64::from(n), f64::from(k) * std::f64::consts::TAU / f64::from(m));
+            vertices.push(DVec3::new((30.0 + 10.0 * b.cos()) * a.cos(), (30.0 + 10.0 * b.cos()) * a.sin(), 10.0 * b.sin()));
+            let at = |i: u32, k: u32| (i % n) * m + k % m;
+            faces.push(vec![at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]);
+        }
+    }
+    cage(scheme, vertices, if scheme == Scheme::Loop { triangulated(&faces) } else { faces })
+}
+
+/// An n x m grid of quads, with heights.
+pub fn grid(scheme: Scheme, n: u32, m: u32, height: impl Fn(f64, f64) -> f64) -> Subdivision {
+    let vertices = (0..(n + 1) * (m + 1)).map(|v| {
+        let (x, y) = (f64::from(v / (m + 1)), f64::from(v % (m + 1)));
+        DVec3::new(x, y, height(x, y))
+    });
+    let at = |i: u32, k: u32| i * (m + 1) + k;
+    let quads = (0..n).flat_map(|i| (0..m).map(move |k| (i, k)));
+    let faces: Vec<Vec<u32>> = quads.map(|(i, k)| vec![at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]).collect();
+    cage(scheme, vertices.collect(), if scheme == Scheme::Loop { triangulated(&faces) } else { faces })
+}
