@@ -47,14 +47,19 @@ impl Topology {
         path: Vec<usize>,
     ) -> Result<(usize, View), TopologyError> {
         let StateTopology { dimension, limit, .. } = self.state(state);
-        let point = if *dimension == 0 { embedding.apply(limit) } else { Vec::new() };
+        let dimension = *dimension;
+        let point = if dimension == 0 { embedding.apply(limit) } else { Vec::new() };
         for (index, known) in closure.cells.iter().enumerate().filter(|(_, known)| known.state == state) {
-            if *dimension == 0 {
+            if dimension == 0 {
                 if same(&known.point, &point) {
                     return Ok((index, View::SAME));
                 }
             } else if let Some(order) = matching(embedding, &known.embedding, None) {
-                return Ok((index, self.intern(automaton, state, order)?));
+                // Cells of the same control points may still be different cells: the four sides of a face that
+                // depend on all points of a small closed mesh.
+                if let Ok(view) = self.intern(automaton, state, order) {
+                    return Ok((index, view));
+                }
             }
         }
         let index = closure.cells.len();

@@ -310,8 +310,13 @@ impl Topology {
             }
             sides.push((cell, edge.cells[start].0, edge.cells[end].0));
         }
-        let (first, begin, mut current) = sides.remove(0);
-        let mut outline = vec![(first, false)];
+        let (first, mut begin, mut current) = sides.remove(0);
+        // The order in which the boundaries are listed says which way round the face is seen from outside.
+        let backwards = sides.first().is_some_and(|&(_, a, b)| (a == begin || b == begin) && a != current && b != current);
+        if backwards {
+            std::mem::swap(&mut begin, &mut current);
+        }
+        let mut outline = vec![(first, backwards)];
         while !sides.is_empty() {
             let next = sides.iter().position(|&(_, a, b)| a == current || b == current)?;
             let (cell, start, end) = sides.remove(next);

@@ -91,8 +91,10 @@ impl Topology {
                     continue;
                 }
                 if point.is_empty() {
-                    if let Some(order) = matching(embedding, other_embedding, Some(rows)) {
-                        found = Some((index, self.intern(automaton, *state, order)?));
+                    if let Some(order) = matching(embedding, other_embedding, Some(rows))
+                        && let Ok(view) = self.intern(automaton, *state, order)
+                    {
+                        found = Some((index, view));
                         break;
                     }
                 } else if same(other_point, &seen_point) {
