@@ -3,37 +3,13 @@
 
 mod cages;
 
-use cages::{attractor, cube, evaluated, grid, model, tetrahedron, torus};
+use cages::{attractor, cube, evaluated, grid, model, patches, tetrahedron, torus};
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
-use lacuna_kernel::automaton::{LeafPrimitive, StateId};
 use lacuna_kernel::model::{BoundaryRule, CellKind, Corner, Crease, Scheme, Subdivision};
 use lacuna_kernel::solid::{Topology, TriMesh};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::tessellation::Tessellation;
-
-/// The corners of all patches at a depth: points of the limit surface.
-fn patches(attractor: &Attractor, depth: usize) -> Vec<Vec<DVec3>> {
-    fn descend(attractor: &Attractor, id: StateId, points: &[DVec3], depth: usize, out: &mut Vec<Vec<DVec3>>) {
-        let state = attractor.automaton().state(id);
-        let combine = |weights: &[f64]| points.iter().zip(weights).map(|(p, w)| *p * *w).sum::<DVec3>();
-        if depth == 0 {
-            let LeafPrimitive::Polygon(corners) = &state.leaf else { panic!("a patch is a polygon: {state:?}") };
-            out.push(corners.iter().map(|corner| combine(corner)).collect());
-            return;
-        }
-        for transition in &state.transitions {
-            let child: Vec<DVec3> = (0..transition.operator.columns()).map(|j| combine(transition.operator.column(j))).collect();
-            descend(attractor, transition.to, &child, depth - 1, out);
-        }
-    }
-    let mut out = Vec::new();
-    for root in attractor.roots() {
-        let points: Vec<DVec3> = root.points.iter().map(|p| DVec3::new(p[0], p[1], p[2])).collect();
-        descend(attractor, root.state, &points, depth, &mut out);
-    }
-    out
-}
 
 /// Volume by the divergence theorem on the bilinear patches, extrapolated from three depths: the error of smooth
 /// surfaces is a power series in 4^-depth.
@@ -124,4 +100,18 @@ fn doo_sabin_cube() {
     }
     let v = volume(&attractor, 7);
     assert!((v - 8.0 * 6241.0 / 9920.0).abs() < 1e-6, "{v}");
+}
+
+#[test]
+fn a_cage_of_a_hundred_thousand_faces_converts_in_seconds() {
+    let surface = cages::inset_torus(300, 330, 790);
+    let faces = surface.faces.len();
+    let clock = std::time::Instant::now();
+    let attractor = attractor(surface);
+    let states = attractor.automaton().states().len();
+    eprintln!("{faces} faces: {states} states in {:.2} s", clock.elapsed().as_secs_f64());
+    // Regular faces, and those with one vertex of valence 3 or 5: 2 k + 8.
+    let faces = dimensions(&attractor, CellKind::Face);
+    assert!([14, 16, 18].iter().all(|n| faces.contains(n)), "{faces:?}");
+    assert!(states <= 20, "{states}");
 }

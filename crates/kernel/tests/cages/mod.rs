@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, refine};
+use lacuna_kernel::automaton::{LeafPrimitive, StateId};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, Model, Scheme, Shape, Subdivision};
 use lacuna_kernel::tessellation::Tessellation;
@@ -67,4 +68,47 @@ pub fn grid(scheme: Scheme, n: u32, m: u32, height: impl Fn(f64, f64) -> f64) ->
     let quads = (0..n).flat_map(|i| (0..m).map(move |k| (i, k)));
     let faces: Vec<Vec<u32>> = quads.map(|(i, k)| vec![at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]).collect();
     cage(scheme, vertices.collect(), if scheme == Scheme::Loop { triangulated(&faces) } else { faces })
+}
+
+/// A torus of n x m quads, in which every `period`-th face has a smaller one inset: eight extraordinary vertices each.
+pub fn inset_torus(n: u32, m: u32, period: usize) -> Subdivision {
+    let mut surface = torus(Scheme::CatmullClark, n, m);
+    let faces = std::mem::take(&mut surface.faces);
+    for (index, face) in faces.into_iter().enumerate() {
+        if index % period != 0 {
+            surface.faces.push(face);
+            continue;
+        }
+        let first = surface.vertices.len() as u32;
+        let at = |k: usize| surface.vertices[face[k % 4] as usize];
+        let centre = (0..4).map(at).sum::<DVec3>() * 0.25;
+        let inner: Vec<DVec3> = (0..4).map(|k| centre + (at(k) - centre) * 0.5).collect();
+        surface.vertices.extend(inner);
+        surface.faces.push((first..first + 4).collect());
+        surface.faces.extend((0..4).map(|k| vec![face[k], face[(k + 1) % 4], first + (k as u32 + 1) % 4, first + k as u32]));
+    }
+    surface
+}
+
+/// The corners of all patches at a depth: points of the limit surface.
+pub fn patches(attractor: &Attractor, depth: usize) -> Vec<Vec<DVec3>> {
+    fn descend(attractor: &Attractor, id: StateId, points: &[DVec3], depth: usize, out: &mut Vec<Vec<DVec3>>) {
+        let state = attractor.automaton().state(id);
+        let combine = |weights: &[f64]| points.iter().zip(weights).map(|(p, w)| *p * *w).sum::<DVec3>();
+        if depth == 0 {
+            let LeafPrimitive::Polygon(corners) = &state.leaf else { panic!("a patch is a polygon: {state:?}") };
+            out.push(corners.iter().map(|corner| combine(corner)).collect());
+            return;
+        }
+        for transition in &state.transitions {
+            let child: Vec<DVec3> = (0..transition.operator.columns()).map(|j| combine(transition.operator.column(j))).collect();
+            descend(attractor, transition.to, &child, depth - 1, out);
+        }
+    }
+    let mut out = Vec::new();
+    for root in attractor.roots() {
+        let points: Vec<DVec3> = root.points.iter().map(|p| DVec3::new(p[0], p[1], p[2])).collect();
+        descend(attractor, root.state, &points, depth, &mut out);
+    }
+    out
 }

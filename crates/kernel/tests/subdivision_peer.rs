@@ -1,0 +1,149 @@
+//! Subdivision surfaces against OpenSubdiv (Debian's libosd-dev): limit points on random cages with creases, corners
+//! and boundaries. Skipped with a message where it is not installed.
+
+mod cages;
+
+use cages::{attractor, cube, grid, inset_torus, patches, tetrahedron, torus};
+use glam::DVec3;
+use lacuna_kernel::model::{BoundaryRule, Corner, Crease, Scheme, Subdivision};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+/// The compiled peer, or why there is none.
+fn peer() -> Result<PathBuf, String> {
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/opensubdiv/limits.cpp");
+    let binary = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("opensubdiv-limits");
+    let made = Command::new("g++").args(["-O1", "-o"]).arg(&binary).arg(source).arg("-losdCPU").output();
+    match made {
+        Err(error) => Err(format!("no compiler: {error}")),
+        Ok(output) if !output.status.success() => Err("OpenSubdiv is not installed (apt-get install libosd-dev)".into()),
+        Ok(_) => Ok(binary),
+    }
+}
+
+/// The peer's limit points at a level.
+fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<DVec3> {
+    let mut text = String::new();
+    let scheme = if surface.scheme == Scheme::Loop { "loop" } else { "catmark" };
+    let _ = writeln!(text, "{scheme} {} {level}", i32::from(surface.boundary == BoundaryRule::SharpCorners));
+    let _ = writeln!(text, "{}", surface.vertices.len());
+    surface.vertices.iter().for_each(|p| writeln!(text, "{:e} {:e} {:e}", p.x, p.y, p.z).expect("text"));
+    let _ = writeln!(text, "{}", surface.faces.len());
+    for face in &surface.faces {
+        let _ = write!(text, "{}", face.len());
+        face.iter().for_each(|v| write!(text, " {v}").expect("text"));
+        text.push('\n');
+    }
+    let _ = writeln!(text, "{}", surface.creases.len());
+    surface.creases.iter().for_each(|c| writeln!(text, "{} {} {}", c.edge[0], c.edge[1], c.sharpness.min(10.0)).expect("text"));
+    let _ = writeln!(text, "{}", surface.corners.len());
+    surface.corners.iter().for_each(|c| writeln!(text, "{} {}", c.vertex, c.sharpness.min(10.0)).expect("text"));
+    let mut child = Command::new(peer).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("runs");
+    let mut stdin = child.stdin.take().expect("piped");
+    let writer = std::thread::spawn(move || stdin.write_all(text.as_bytes()));
+    let output = child.wait_with_output().expect("ends");
+    writer.join().expect("no panic").expect("written");
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).expect("text");
+    let line = |line: &str| -> DVec3 {
+        let numbers: Vec<f64> = line.split_whitespace().map(|word| word.parse().expect("a number")).collect();
+        DVec3::new(numbers[0], numbers[1], numbers[2])
+    };
+    text.lines().map(line).collect()
+}
+
+/// A small generator (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, bound: usize) -> usize {
+        (self.next() % bound as u64) as usize
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Points of one set that are farther than `allowed` from the other.
+fn unmatched(a: &[DVec3], b: &[DVec3], allowed: f64) -> usize {
+    a.iter().filter(|p| b.iter().all(|q| p.distance(*q) > allowed)).count()
+}
+
+/// Vertices at which one edge ends that is sharp for ever. There OpenSubdiv takes the limit mask of smooth vertices,
+/// which is not the scheme's: its limit points move from level to level, towards ours.
+fn darts(surface: &Subdivision) -> usize {
+    let ends = |vertex: u32| surface.creases.iter().filter(|c| c.sharpness >= 10.0 && c.edge.contains(&vertex)).count();
+    (0..surface.vertices.len() as u32).filter(|&vertex| ends(vertex) == 1).count()
+}
+
+/// The surface with sharpness on some of its edges and vertices; vertices are moved a little.
+fn sharpened(mut surface: Subdivision, random: &mut Random, share: usize) -> Subdivision {
+    // Fractions that single precision holds exactly, since the peer's sharpness has it.
+    const SHARPNESS: [f64; 6] = [0.5, 0.25, 1.0, 2.0, 2.75, f64::INFINITY];
+    surface.vertices.iter_mut().for_each(|v| *v += 0.2 * DVec3::new(random.unit(), random.unit(), random.unit()));
+    let mut edges = std::collections::BTreeSet::new();
+    for face in &surface.faces {
+        for k in 0..face.len() {
+            let (a, b) = (face[k], face[(k + 1) % face.len()]);
+            edges.insert((a.min(b), a.max(b)));
+        }
+    }
+    for (a, b) in edges {
+        if random.below(100) < share {
+            surface.creases.push(Crease { edge: [a, b], sharpness: SHARPNESS[random.below(6)] });
+        }
+    }
+    for vertex in 0..surface.vertices.len() as u32 {
+        if random.below(100) < share / 3 {
+            surface.corners.push(Corner { vertex, sharpness: SHARPNESS[random.below(6)] });
+        }
+    }
+    if random.below(2) == 0 {
+        surface.boundary = BoundaryRule::SharpCorners;
+    }
+    surface
+}
+
+#[test]
+fn limit_points_are_opensubdivs() {
+    let peer = match peer() {
+        Ok(peer) => peer,
+        Err(reason) => return eprintln!("skipped: {reason}"),
+    };
+    let mut random = Random(7);
+    let mut compared = 0;
+    for round in 0..60 {
+        let scheme = if round % 2 == 0 { Scheme::CatmullClark } else { Scheme::Loop };
+        let surface = match round / 2 % 5 {
+            0 => cube(scheme),
+            1 => grid(scheme, 2, 3, |x, y| x * y),
+            2 => tetrahedron(scheme),
+            3 => torus(scheme, 4, 3),
+            _ if scheme == Scheme::Loop => grid(scheme, 1, 1, |x, _| x),
+            _ => inset_torus(3, 4, 5),
+        };
+        let surface = sharpened(surface, &mut random, [0, 10, 30, 60][round / 10 % 4]);
+        let scale = surface.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
+        let level = 4;
+        let theirs = limits(&peer, &surface, level);
+        let ours: Vec<DVec3> = patches(&attractor(surface.clone()), level).into_iter().flatten().collect();
+        let (allowed, darts) = (1e-6 * scale, darts(&surface));
+        let missing = [unmatched(&ours, &theirs, allowed), unmatched(&theirs, &ours, allowed)];
+        assert!(missing[1] <= darts, "round {round}: {missing:?} points, {darts} darts: {surface:?}");
+        // Ours are listed with every patch around them.
+        assert!(darts > 0 || missing[0] == 0, "round {round}: {missing:?} points: {surface:?}");
+        compared += theirs.len();
+    }
+    eprintln!("{compared} limit points compared");
+}
