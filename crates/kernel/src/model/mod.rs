@@ -17,7 +17,7 @@ pub use group::{Group, Part};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
-pub use subdivision::{BoundaryRule, Corner, Crease, INFINITE_SHARPNESS, Scheme, Subdivision};
+pub use subdivision::{BoundaryRule, Coefficients, Corner, Crease, INFINITE_SHARPNESS, Scheme, Subdivision};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;

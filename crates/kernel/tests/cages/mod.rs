@@ -10,7 +10,15 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::Tolerance;
 
 pub fn cage(scheme: Scheme, vertices: Vec<DVec3>, faces: Vec<Vec<u32>>) -> Subdivision {
-    Subdivision { scheme, vertices, faces, creases: Vec::new(), corners: Vec::new(), boundary: BoundaryRule::Smooth }
+    Subdivision {
+        scheme,
+        vertices,
+        faces,
+        creases: Vec::new(),
+        corners: Vec::new(),
+        boundary: BoundaryRule::Smooth,
+        coefficients: Vec::new(),
+    }
 }
 
 pub fn model(surface: Subdivision) -> Model {

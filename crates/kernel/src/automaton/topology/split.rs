@@ -105,7 +105,12 @@ impl Builder<'_> {
         for (cell, sub) in own.cells.iter().enumerate() {
             self.parent.push(self.met.len());
             if self.topology().state(sub.state).dimension == 0 {
-                let piece = Piece { state: sub.state, embedding: sub.embedding.clone(), point: sub.point.clone() };
+                // The children see the vertex one subdivision later, when it may be of another state.
+                let (state, embedding) = match self.union.automaton.state(sub.state).transitions.first() {
+                    Some(later) => (later.to, sub.embedding.times(&later.operator)),
+                    None => (sub.state, sub.embedding.clone()),
+                };
+                let piece = Piece { state, embedding, point: sub.point.clone() };
                 self.push(piece, Met::Vertex { cell }, Vec::new());
                 continue;
             }

@@ -42,13 +42,14 @@ impl Cage {
         if report.count > 0 {
             return None;
         }
-        let mut host = Host::new(model.vertices.len(), &model.faces, vec![0; model.faces.len()]);
+        let regions = regions(model, &mut report);
+        let mut host = Host::new(model.vertices.len(), &model.faces, regions);
         edges(&host, &mut report);
         if report.count > 0 {
             return None;
         }
         host = host.complete();
-        vertices(&host, &mut report);
+        vertices(&host, model.scheme, &mut report);
         labels(model, &mut host, &mut report);
         if report.count > 0 {
             return None;
@@ -110,7 +111,8 @@ impl Cage {
             let (a, b) = (host.origin[h as usize], host.destination(h));
             faces.push(vec![b, a, doubles[a as usize][1], doubles[b as usize][0]]);
         }
-        let region = vec![0; faces.len()];
+        let mut region = host.region.clone();
+        region.resize(faces.len(), 0);
         let host = Host::new(points.len(), &faces, region).complete();
         Self { host, points, own_vertices: self.own_vertices }
     }
@@ -169,7 +171,7 @@ fn edges(host: &Host, report: &mut Report) {
 }
 
 /// Every vertex: it has faces, which form one fan.
-fn vertices(host: &Host, report: &mut Report) {
+fn vertices(host: &Host, scheme: Scheme, report: &mut Report) {
     let mut count = vec![0_usize; host.vertices];
     host.origin.iter().for_each(|&vertex| count[vertex as usize] += 1);
     let (mut ahead, mut behind) = (Vec::new(), Vec::new());
@@ -179,11 +181,15 @@ fn vertices(host: &Host, report: &mut Report) {
             fault("mesh.isolated-vertex", "belongs to no face; remove it".into());
             continue;
         }
-        host.fan(host.out[vertex], false, &mut ahead, &mut behind);
+        let closed = host.fan(host.out[vertex], false, &mut ahead, &mut behind);
         let fan = ahead.len() + behind.len();
         if fan < count {
             let message = format!("is a bow-tie: {fan} of its {count} faces hang together, the others meet them only there; double it");
             fault("mesh.bow-tie", message);
+        } else if closed && count == 2 && scheme != Scheme::CatmullClark {
+            // Doo-Sabin would make a face of two sides, Loop two edges between the same vertices.
+            let message = format!("belongs to two faces alone, and {} needs three; remove it, or use catmull_clark", scheme.name());
+            fault("subdivision.valence", message);
         } else if count > MOST_SIDES {
             fault("subdivision.valence", format!("belongs to {count} faces, and at most {MOST_SIDES} are allowed"));
         }
@@ -231,4 +237,51 @@ fn labels(model: &Subdivision, host: &mut Host, report: &mut Report) {
             report.error(&format!("{place}/vertex"), "subdivision.vertex-twice", format!("vertex {} is listed before", corner.vertex));
         }
     }
+}
+
+/// Weights of one's own may not be larger.
+const MOST_WEIGHT: f64 = 1e3;
+/// Their sum may be off 1 by this much, as printed digits leave it; it is corrected by the operators.
+const SUM_ALLOWED: f64 = 1e-9;
+
+/// The region of every face, from the coefficients.
+fn regions(model: &Subdivision, report: &mut Report) -> Vec<u32> {
+    let mut regions = vec![0; model.faces.len()];
+    if model.scheme != Scheme::DooSabin && !model.coefficients.is_empty() {
+        let message = format!("coefficients are for the scheme doo_sabin; {} has its own masks", model.scheme.name());
+        report.error("/coefficients", "subdivision.coefficients", message);
+    }
+    for (index, own) in model.coefficients.iter().enumerate() {
+        let place = format!("/coefficients/{index}");
+        let all: Vec<u32> = (0..model.faces.len() as u32).collect();
+        for (position, &face) in own.faces.as_ref().unwrap_or(&all).iter().enumerate() {
+            match regions.get_mut(face as usize) {
+                Some(region) if *region == 0 => *region = index as u32 + 1,
+                Some(_) => {
+                    let message = format!("face {face} is in a region before; a face belongs to one");
+                    report.error(&format!("{place}/faces/{position}"), "subdivision.region-twice", message);
+                }
+                None => {
+                    let message = format!("face {face} does not exist: there are {}", model.faces.len());
+                    report.error(&format!("{place}/faces/{position}"), "mesh.index", message);
+                }
+            }
+        }
+        for (position, weights) in own.weights.iter().enumerate() {
+            let sum: f64 = weights.iter().sum();
+            let large = weights.iter().any(|weight| !weight.is_finite() || weight.abs() > MOST_WEIGHT);
+            let twice = own.weights[..position].iter().any(|other| other.len() == weights.len());
+            let fault = match weights.len() {
+                0..3 => Some("faces have three sides or more, and as many weights".into()),
+                _ if large => Some(format!("every weight must be finite, and at most {MOST_WEIGHT} in size")),
+                _ if (sum - 1.0).abs() > SUM_ALLOWED => Some(format!("the weights sum to {sum}, and must sum to 1")),
+                n if twice => Some(format!("faces of {n} sides have weights before")),
+                _ => None,
+            };
+            if let Some(message) = fault {
+                report.error(&format!("{place}/weights/{position}"), "subdivision.coefficients", message);
+            }
+        }
+    }
+    regions
 }

@@ -3,7 +3,7 @@
 use super::Scheme;
 use super::cage::Cage;
 use super::host::{Host, NONE};
-use super::refine::{Masks, edge_point, refine};
+use super::refine::{Masks, Rules, edge_point, refine};
 use super::stencil::{Cell, Seen, Stencil, Walker};
 use crate::attractor::{Gluing, Root};
 use crate::automaton::{Boundary, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
@@ -24,7 +24,7 @@ const MOST_PATCHES: usize = 1 << 22;
 
 /// States by stencil. Looked up only: its order never matters.
 struct Converter<'a> {
-    scheme: &'a Scheme,
+    rules: &'a Rules,
     draft: &'a mut Draft,
     known: HashMap<Stencil, StateId>,
     /// Stencils whose states are to be filled in.
@@ -34,7 +34,8 @@ struct Converter<'a> {
 /// Adds the states and roots of a cage's limit surface to the draft.
 ///
 /// Cost: linear in the patches, and for every different stencil one step of the scheme on it.
-pub(super) fn convert(scheme: &Scheme, mut cage: Cage, draft: &mut Draft) {
+pub(super) fn convert(rules: &Rules, mut cage: Cage, draft: &mut Draft) {
+    let scheme = &rules.scheme;
     for step in 0..=MOST_STEPS {
         if cage.host.origin.len() > MOST_PATCHES {
             let message = format!(
@@ -46,10 +47,10 @@ pub(super) fn convert(scheme: &Scheme, mut cage: Cage, draft: &mut Draft) {
         }
         let cells = patches(scheme, &cage);
         if let Some(seen) = roots(scheme, &cage.host, &cells, step < MOST_STEPS) {
-            let mut converter = Converter { scheme, draft, known: HashMap::new(), queue: Vec::new() };
+            let mut converter = Converter { rules, draft, known: HashMap::new(), queue: Vec::new() };
             return converter.run(&cage, &cells, seen);
         }
-        cage = cage.refined(refine(scheme, &cage.host), *scheme);
+        cage = cage.refined(refine(rules, &cage.host), *scheme);
     }
 }
 
@@ -108,7 +109,7 @@ impl Converter<'_> {
         let first_root = self.draft.roots.len();
         // The root and boundary that every half-edge is.
         let mut place = vec![(NONE, 0_u32); cage.host.origin.len()];
-        let mut walker = Walker::new(self.scheme, &cage.host);
+        let mut walker = Walker::new(&self.rules.scheme, &cage.host);
         for (root, (&h, &(_, _, start))) in cells.iter().zip(&roots.patches).enumerate() {
             let sides = walker.sides(h);
             let count = sides.len();
@@ -173,12 +174,13 @@ impl Converter<'_> {
 
     /// One step of the scheme on a stencil, in symbols.
     fn state(&mut self, stencil: &Stencil) -> State {
-        let (host, cell) = stencil.host(self.scheme);
-        let (refined, masks) = refine(self.scheme, &host);
+        let scheme = &self.rules.scheme;
+        let (host, cell) = stencil.host(scheme);
+        let (refined, masks) = refine(self.rules, &host);
         let dimension = host.vertices;
-        let (boundaries, children) = (boundaries(self.scheme, &host, cell), children(self.scheme, &host, &refined, cell));
+        let (boundaries, children) = (boundaries(scheme, &host, cell), children(scheme, &host, &refined, cell));
         let boundaries = {
-            let mut walker = Walker::new(self.scheme, &host);
+            let mut walker = Walker::new(scheme, &host);
             let seen: Vec<Seen> = boundaries.into_iter().map(|cell| walker.see(cell)).collect();
             let embed = |seen: Seen| {
                 let mut columns = vec![0.0; dimension * seen.vertices.len()];
@@ -187,7 +189,7 @@ impl Converter<'_> {
             };
             seen.into_iter().map(embed).collect()
         };
-        let mut walker = Walker::new(self.scheme, &refined);
+        let mut walker = Walker::new(scheme, &refined);
         let seen: Vec<Seen> = children.into_iter().map(|cell| walker.see(cell)).collect();
         let transition = |(label, seen): (usize, Seen)| {
             let operator = operator(dimension, &masks, &seen.vertices);
@@ -199,7 +201,7 @@ impl Converter<'_> {
             Cell::Curve(_) => (CellKind::Edge, "curve"),
             Cell::Point(_) => (CellKind::Vertex, "point"),
         };
-        let name = format!("{} {what} of {dimension}", self.scheme.name());
+        let name = format!("{} {what} of {dimension}", scheme.name());
         State { name, kind: Some(kind), dimension, transitions, boundaries, leaf: LeafPrimitive::Centre, frame: false }
     }
 }

@@ -218,7 +218,8 @@ impl Host {
         behind.clear();
         ahead.push(start);
         let mut h = start;
-        while !ends(self.previous(h)) {
+        // No fan is longer than the mesh.
+        while !ends(self.previous(h)) && ahead.len() <= self.origin.len() {
             h = self.counterclockwise(h);
             if h == start {
                 return true;
@@ -229,7 +230,7 @@ impl Host {
             ahead.push(h);
         }
         h = start;
-        while !ends(h) {
+        while !ends(h) && behind.len() <= self.origin.len() {
             h = self.clockwise(h);
             if h == NONE {
                 break;

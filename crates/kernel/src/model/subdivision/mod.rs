@@ -83,6 +83,19 @@ pub struct Subdivision {
     pub corners: Vec<Corner>,
     /// The boundary's corners.
     pub boundary: BoundaryRule,
+    /// Masks of one's own, by region; none but with [`Scheme::DooSabin`]. Faces in no region have the scheme's.
+    pub coefficients: Vec<Coefficients>,
+}
+
+/// Masks of faces: a geometric texture. The surface stays closed whatever they are, since every mask belongs to one
+/// face; a face that arises between faces of one region belongs to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coefficients {
+    /// The region; the whole mesh when absent.
+    pub faces: Option<Vec<u32>>,
+    /// For faces of n sides a list of n weights that sum to 1: of the corner itself, of the next vertex, and so on.
+    /// Faces with other numbers of sides have the scheme's.
+    pub weights: Vec<Vec<f64>>,
 }
 
 /// Sharpness of this size lasts for ever (OpenSubdiv's `SHARPNESS_INFINITE`); it bounds the chains of states.
@@ -91,7 +104,8 @@ pub const INFINITE_SHARPNESS: f64 = 10.0;
 impl Subdivision {
     pub(super) fn lower(&self, draft: &mut Draft) {
         if let Some(cage) = cage::Cage::new(self, draft) {
-            convert::convert(&self.scheme, cage, draft);
+            let rules = refine::Rules { scheme: self.scheme, coefficients: self.coefficients.clone() };
+            convert::convert(&rules, cage, draft);
         }
     }
 }

@@ -8,7 +8,7 @@
 //! character animation", SIGGRAPH 1998): sharpness falls by 1 each step, and where a vertex changes its rule in
 //! between, its two positions are mixed by the mean fraction that was left.
 
-use super::Scheme;
+use super::{Coefficients, Scheme};
 use super::host::{Host, NONE, Sharpness, Side, decayed};
 use std::f64::consts::TAU;
 
@@ -42,15 +42,35 @@ impl Masks {
     }
 }
 
+/// A scheme and what replaces its masks.
+#[derive(Clone, Debug)]
+pub(super) struct Rules {
+    pub(super) scheme: Scheme,
+    /// Doo-Sabin: by region of faces, from region 1 on.
+    pub(super) coefficients: Vec<Coefficients>,
+}
+
+impl Rules {
+    /// Doo-Sabin: the weight of the vertex i places after the corner, in a face of n sides.
+    fn corner_weight(&self, region: u32, n: usize, i: usize) -> f64 {
+        let own = (region as usize).checked_sub(1).and_then(|region| self.coefficients.get(region));
+        if let Some(weights) = own.and_then(|own| own.weights.iter().find(|weights| weights.len() == n)) {
+            return weights[i];
+        }
+        let sides = n as f64;
+        if i == 0 { 0.25 + 1.25 / sides } else { (3.0 + 2.0 * (TAU * i as f64 / sides).cos()) / (4.0 * sides) }
+    }
+}
+
 /// Refines a mesh once.
 ///
 /// Refined vertices are numbered: those of vertices, edges, faces (Catmull-Clark, Loop), or half-edges (Doo-Sabin).
 /// Face h of the refined mesh is the corner at half-edge h; with Loop, the middles of the faces follow; with
 /// Doo-Sabin, face f is the image of face f. Linear in the mesh.
-pub(super) fn refine(scheme: &Scheme, host: &Host) -> (Host, Masks) {
-    match scheme {
-        Scheme::CatmullClark | Scheme::Loop => primal(scheme, host),
-        Scheme::DooSabin => dual(host),
+pub(super) fn refine(rules: &Rules, host: &Host) -> (Host, Masks) {
+    match rules.scheme {
+        Scheme::CatmullClark | Scheme::Loop => primal(&rules.scheme, host),
+        Scheme::DooSabin => dual(rules, host),
     }
 }
 
@@ -263,33 +283,39 @@ fn smooth_vertex(scheme: &Scheme, host: &Host, vertex: u32, around: &[u32]) -> V
 }
 
 /// Doo-Sabin: a vertex for every corner of a face; faces of faces, edges and vertices.
-fn dual(host: &Host) -> (Host, Masks) {
+fn dual(rules: &Rules, host: &Host) -> (Host, Masks) {
     let mut masks = Masks::default();
     for h in 0..host.origin.len() as u32 {
         let face = host.face[h as usize];
-        let n = host.sides(face) as f64;
+        let n = host.sides(face);
         let mut corner = h;
-        let mut mask = Vec::with_capacity(host.sides(face));
-        for i in 0..host.sides(face) {
-            let weight = if i == 0 { 0.25 + 1.25 / n } else { (3.0 + 2.0 * (TAU * i as f64 / n).cos()) / (4.0 * n) };
-            mask.push((host.origin[corner as usize], weight));
+        let mut mask = Vec::with_capacity(n);
+        for i in 0..n {
+            mask.push((host.origin[corner as usize], rules.corner_weight(host.region[face as usize], n, i)));
             corner = host.next(corner);
         }
         masks.push(mask);
     }
     let mut faces: Vec<Vec<u32>> = (0..host.faces() as u32).map(|face| host.half_edges(face).collect()).collect();
     let mut region = host.region.clone();
+    // A face between faces of one region belongs to it, one between regions to none.
+    let region_of = |h: u32| host.region[host.face[h as usize] as usize];
+    let common = |half_edges: &[u32]| {
+        let first = region_of(half_edges[0]);
+        if half_edges.iter().all(|&h| region_of(h) == first) { first } else { 0 }
+    };
     for h in (0..host.origin.len() as u32).filter(|&h| h < host.twin[h as usize] && host.twin[h as usize] != NONE) {
         let twin = host.twin[h as usize];
         faces.push(vec![host.next(h), h, host.next(twin), twin]);
+        region.push(common(&[h, twin]));
     }
     let (mut ahead, mut behind) = (Vec::new(), Vec::new());
     for &start in host.out.iter().filter(|&&start| start != NONE) {
         if host.fan(start, false, &mut ahead, &mut behind) {
             faces.push(ahead.clone());
+            region.push(common(&ahead));
         }
     }
-    region.resize(faces.len(), 0);
     (Host::new(host.origin.len(), &faces, region).complete(), masks)
 }
 
