@@ -3,7 +3,7 @@
 
 mod cages;
 
-use cages::{attractor, cube, grid, inset_torus, patches, tetrahedron, torus};
+use cages::{attractor, cube, evaluated, grid, inset_torus, patches, tetrahedron, torus};
 use glam::DVec3;
 use lacuna_kernel::model::{BoundaryRule, Corner, Crease, Scheme, Subdivision};
 use std::fmt::Write as _;
@@ -115,6 +115,34 @@ fn sharpened(mut surface: Subdivision, random: &mut Random, share: usize) -> Sub
     surface
 }
 
+/// A random surface and its Euler number.
+fn surface(round: usize, scheme: Scheme, random: &mut Random) -> (Subdivision, i64) {
+    let (cage, euler) = match round / 2 % 5 {
+        0 => (cube(scheme), 2),
+        1 => (grid(scheme, 2, 3, |x, y| x * y), 1),
+        2 => (tetrahedron(scheme), 2),
+        3 => (torus(scheme, 4, 3), 0),
+        _ if scheme == Scheme::Loop => (grid(scheme, 1, 1, |x, _| x), 1),
+        _ => (inset_torus(3, 4, 5), 0),
+    };
+    (sharpened(cage, random, [0, 10, 30, 60][round / 10 % 4]), euler)
+}
+
+#[test]
+fn creases_and_corners_leave_no_crack() {
+    let mut random = Random(11);
+    for round in 0..40 {
+        let scheme = if round % 2 == 0 { Scheme::CatmullClark } else { Scheme::Loop };
+        let (surface, euler) = surface(round, scheme, &mut random);
+        let scale = surface.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
+        let tessellation = evaluated(&attractor(surface.clone()), 0.1 * scale);
+        let complex = tessellation.complex.as_ref().unwrap_or_else(|| panic!("round {round}: no B-rep: {surface:?}"));
+        assert_eq!(complex.euler, euler, "round {round}: {surface:?}");
+        assert_eq!(complex.boundary_loops, u64::from(euler == 1), "round {round}: {surface:?}");
+        assert_eq!(complex.components, 1, "round {round}: {surface:?}");
+    }
+}
+
 #[test]
 fn limit_points_are_opensubdivs() {
     let peer = match peer() {
@@ -125,15 +153,7 @@ fn limit_points_are_opensubdivs() {
     let mut compared = 0;
     for round in 0..60 {
         let scheme = if round % 2 == 0 { Scheme::CatmullClark } else { Scheme::Loop };
-        let surface = match round / 2 % 5 {
-            0 => cube(scheme),
-            1 => grid(scheme, 2, 3, |x, y| x * y),
-            2 => tetrahedron(scheme),
-            3 => torus(scheme, 4, 3),
-            _ if scheme == Scheme::Loop => grid(scheme, 1, 1, |x, _| x),
-            _ => inset_torus(3, 4, 5),
-        };
-        let surface = sharpened(surface, &mut random, [0, 10, 30, 60][round / 10 % 4]);
+        let surface = surface(round, scheme, &mut random).0;
         let scale = surface.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
         let level = 4;
         let theirs = limits(&peer, &surface, level);

@@ -342,6 +342,69 @@ pub(super) const MESH: Object = Object {
     ],
 };
 
+/// A sharpness, as a schema.
+fn sharpness() -> Value {
+    json!({ "anyOf": [{ "type": "number", "minimum": 0 }, { "type": "string", "const": "infinite" }] })
+}
+
+pub(super) const SUBDIVISION: Object = Object {
+    title: "a subdivision",
+    about: "The limit surface of a subdivision scheme on a polygon mesh that is a manifold, with or without boundary.",
+    members: &[
+        family!("subdivision"),
+        required("scheme", "The scheme; loop takes triangles.", || one_of_words(&["catmull_clark", "doo_sabin", "loop"])),
+        required("mesh", "The control mesh.", || reference("ControlMesh")),
+        optional("creases", "Sharp edges; not with doo_sabin.", || list(reference("Crease"), 0)),
+        optional("corners", "Sharp vertices; not with doo_sabin.", || list(reference("Corner"), 0)),
+        optional(
+            "boundary",
+            "What happens at vertices of the boundary that belong to one face alone: the boundary is smooth there, or passes through them.",
+            || json!({ "type": "string", "enum": ["smooth", "sharp_corners"], "default": "smooth" }),
+        ),
+        optional("coefficients", "Masks of one's own, by region of faces; with doo_sabin only.", || list(reference("Coefficients"), 0)),
+    ],
+};
+
+pub(super) const CONTROL_MESH: Object = Object {
+    title: "a control mesh",
+    about: "A polygon mesh whose neighbouring faces run along their common edge in opposite directions.",
+    members: &[
+        required("vertices", "The vertices.", || points(1)),
+        required("faces", "The vertices of each face, counter-clockwise seen from outside.", || faces(1)),
+    ],
+};
+
+pub(super) const CREASE: Object = Object {
+    title: "a crease",
+    about: "An edge that is sharp for some steps of the scheme or for ever.",
+    members: &[
+        required("edge", "The two vertices of the edge.", index_pair),
+        required("sharpness", "Number of steps, fractions allowed; 10 and more is \"infinite\", as in OpenSubdiv.", sharpness),
+    ],
+};
+
+pub(super) const CORNER: Object = Object {
+    title: "a corner",
+    about: "A vertex that is sharp for some steps of the scheme or for ever.",
+    members: &[
+        required("vertex", "The vertex.", index),
+        required("sharpness", "Number of steps, fractions allowed; 10 and more is \"infinite\", as in OpenSubdiv.", sharpness),
+    ],
+};
+
+pub(super) const COEFFICIENTS: Object = Object {
+    title: "coefficients",
+    about: "Masks of the faces of a region: a geometric texture. Faces that arise between faces of one region belong to it.",
+    members: &[
+        optional("faces", "The faces of the region; all when absent.", || list(index(), 0)),
+        required(
+            "weights",
+            "Lists of n weights that sum to 1, for faces of n sides: of the corner itself, of the next vertex, and so on. Faces of other numbers of sides keep the scheme's.",
+            || list(list(number(), 3), 1),
+        ),
+    ],
+};
+
 pub(super) const GROUP: Object = Object {
     title: "a group",
     about: "The union of several shapes.",
@@ -361,17 +424,18 @@ pub(super) const PART: Object = Object {
 };
 
 /// The families that can be evaluated, with the schema's name.
-pub(super) const FAMILIES: [(&str, &str, &Object); 6] = [
+pub(super) const FAMILIES: [(&str, &str, &Object); 7] = [
     ("ifs", "IfsShape", &IFS),
     ("bcifs", "BcifsShape", &BCIFS),
     ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
     ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
+    ("subdivision", "SubdivisionShape", &SUBDIVISION),
     ("mesh", "MeshShape", &MESH),
     ("group", "GroupShape", &GROUP),
 ];
 
 /// Families of the grammar that cannot be evaluated yet.
-pub(super) const LATER_FAMILIES: [&str; 12] = [
+pub(super) const LATER_FAMILIES: [&str; 11] = [
     "bezier_surface",
     "nurbs_curve",
     "nurbs_surface",
@@ -379,7 +443,6 @@ pub(super) const LATER_FAMILIES: [&str; 12] = [
     "catmull_rom",
     "beta_spline",
     "four_point",
-    "subdivision",
     "interpolation",
     "terrain",
     "tensor",

@@ -17,6 +17,7 @@ mod node;
 mod parse;
 mod report;
 mod schema;
+mod subdivision;
 mod transform;
 mod units;
 mod walk;

@@ -8,6 +8,7 @@ use super::grammar::{EMBEDDED_MODEL, FAMILIES, GROUP, LATER_FAMILIES, MODEL, Mem
 use super::ifs::ifs;
 use super::mesh::mesh;
 use super::node::{Place, Value, number_text, quoted};
+use super::subdivision::subdivision;
 use super::transform::affine_map;
 use super::units::{UNITS, Unit};
 use super::walk::{Walker, suggestion};
@@ -63,6 +64,7 @@ fn shape(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<
         "bcifs" => bcifs(walker, place, added).map(Shape::Bcifs),
         "bezier_curve" => bezier_curve(walker, place, added).map(Shape::BezierCurve),
         "corner_cutting" => corner_cutting(walker, place, added).map(Shape::CornerCutting),
+        "subdivision" => subdivision(walker, place, added).map(Shape::Subdivision),
         "mesh" => mesh(walker, place, added).map(Shape::Mesh),
         "group" => group(walker, place, added).map(Shape::Group),
         later if LATER_FAMILIES.contains(&later) => {

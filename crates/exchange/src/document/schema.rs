@@ -7,7 +7,7 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
+    ADJACENCY, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
     Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
     reference,
 };
@@ -45,7 +45,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 12] = [
+    const PLAIN: [(&str, &Object); 16] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -56,6 +56,10 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Adjacency", &ADJACENCY),
         ("RootCell", &ROOT_CELL),
         ("Glue", &GLUE),
+        ("ControlMesh", &CONTROL_MESH),
+        ("Crease", &CREASE),
+        ("Corner", &CORNER),
+        ("Coefficients", &COEFFICIENTS),
         ("JobParams", &JOB_PARAMS),
         ("JobLimits", &JOB_LIMITS),
     ];

@@ -8,8 +8,8 @@ use glam::{DMat3, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
-    Model, Part, PolygonMesh, Primitive, RootCell, Shape,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, CellKind, Coefficients, Corner, CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
+    Model, Part, PolygonMesh, Primitive, RootCell, Shape, Subdivision,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -50,6 +50,15 @@ impl Serialize for Number {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         // why: adding zero turns -0 into 0 and changes nothing else
         if self.0.is_finite() { serializer.serialize_f64(self.0 + 0.0) } else { serializer.serialize_str(&self.0.to_string()) }
+    }
+}
+
+/// A sharpness: a number, or for ever.
+struct Sharpness(f64);
+
+impl Serialize for Sharpness {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0 == f64::INFINITY { serializer.serialize_str("infinite") } else { Number(self.0).serialize(serializer) }
     }
 }
 
@@ -176,6 +185,19 @@ object! {
         .put("a", &Number(curve.a))?
         .put("b", &Number(curve.b))?
         .put_if(curve.closed, "closed", &true)?;
+    Subdivision: |surface, members| members
+        .put("family", &"subdivision")?
+        .put("scheme", &surface.scheme.name())?
+        .put("mesh", &MeshData { vertices: &surface.vertices, faces: &surface.faces })?
+        .put_if(!surface.creases.is_empty(), "creases", &list(&surface.creases))?
+        .put_if(!surface.corners.is_empty(), "corners", &list(&surface.corners))?
+        .put_if(surface.boundary == BoundaryRule::SharpCorners, "boundary", &"sharp_corners")?
+        .put_if(!surface.coefficients.is_empty(), "coefficients", &list(&surface.coefficients))?;
+    Crease: |crease, members| members.put("edge", &crease.edge)?.put("sharpness", &Sharpness(crease.sharpness))?;
+    Corner: |corner, members| members.put("vertex", &corner.vertex)?.put("sharpness", &Sharpness(corner.sharpness))?;
+    Coefficients: |own, members| members
+        .put_some("faces", own.faces.as_ref())?
+        .put("weights", &own.weights.iter().map(|list| list.iter().map(|weight| Number(*weight)).collect::<Vec<_>>()).collect::<Vec<_>>())?;
     PolygonMesh: |mesh, members| members
         .put("family", &"mesh")?
         .put("vertices", &list(&mesh.vertices))?
@@ -195,13 +217,14 @@ impl Serialize for Wire<'_, Shape> {
             Shape::Bcifs(bcifs) => Wire(bcifs).serialize(serializer),
             Shape::BezierCurve(curve) => Wire(curve).serialize(serializer),
             Shape::CornerCutting(curve) => Wire(curve).serialize(serializer),
+            Shape::Subdivision(surface) => Wire(surface).serialize(serializer),
             Shape::Mesh(mesh) => Wire(mesh).serialize(serializer),
             Shape::Group(group) => Wire(group).serialize(serializer),
         }
     }
 }
 
-/// Vertices and faces of a primitive.
+/// Vertices and faces of a primitive or of a control mesh.
 struct MeshData<'m> {
     vertices: &'m [DVec3],
     faces: &'m [Vec<u32>],

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundarySpec, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence,
-    Interior, Matrix, Model, Part, PolygonMesh, Primitive, RootCell, Shape, TransitionSpec,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, BoundarySpec, CellKind, Coefficients, Corner, CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence,
+    Interior, Matrix, Model, Part, PolygonMesh, Primitive, RootCell, Scheme, Shape, Subdivision, TransitionSpec,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -132,12 +132,34 @@ fn bezier() -> impl Strategy<Value = Shape> {
     })
 }
 
+fn subdivision() -> impl Strategy<Value = Shape> {
+    let scheme = proptest::sample::select(vec![Scheme::CatmullClark, Scheme::DooSabin, Scheme::Loop]);
+    let boundary = proptest::sample::select(vec![BoundaryRule::Smooth, BoundaryRule::SharpCorners]);
+    let sharpness = || prop_oneof![number(), Just(f64::INFINITY)];
+    let coefficients = (option::of(vec(0..1_u32, 0..3)), vec(vec(number(), 3..5), 1..3))
+        .prop_map(|(faces, weights)| Coefficients { faces, weights });
+    (mesh_data(), scheme, boundary, vec(sharpness(), 0..3), vec(sharpness(), 0..3), vec(coefficients, 0..2)).prop_map(
+        |((vertices, faces), scheme, boundary, creases, corners, coefficients)| {
+            let last = vertices.len() as u32 - 1;
+            Shape::Subdivision(Subdivision {
+                scheme,
+                vertices,
+                faces,
+                creases: creases.into_iter().map(|sharpness| Crease { edge: [0, last], sharpness }).collect(),
+                corners: corners.into_iter().map(|sharpness| Corner { vertex: last, sharpness }).collect(),
+                boundary,
+                coefficients,
+            })
+        },
+    )
+}
+
 fn shape() -> impl Strategy<Value = Shape> {
     let corner_cutting = (vec(point(), 3..6), number(), number(), any::<bool>())
         .prop_map(|(control_points, a, b, closed)| Shape::CornerCutting(CornerCutting { control_points, a, b, closed }));
     let interior = proptest::sample::select(vec![Interior::Auto, Interior::Solid, Interior::Surface]);
     let mesh = (mesh_data(), interior).prop_map(|((vertices, faces), interior)| Shape::Mesh(PolygonMesh { vertices, faces, interior }));
-    prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, mesh].prop_recursive(3, 8, 3, |shape| {
+    prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, subdivision(), mesh].prop_recursive(3, 8, 3, |shape| {
         let part = (option::of(name()), option::of(map()), shape).prop_map(|(name, transform, shape)| Part { name, transform, shape });
         vec(part, 1..4).prop_map(|parts| Shape::Group(Group { parts }))
     })
