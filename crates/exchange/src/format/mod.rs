@@ -21,6 +21,7 @@
 //! # Ok::<(), lacuna_exchange::format::FormatError>(())
 //! ```
 
+mod addresses;
 mod error;
 mod geometry;
 mod glb;
@@ -62,6 +63,8 @@ pub enum Format {
     Off,
     /// A picture.
     Png,
+    /// The addresses of an evaluation's cells, as comma-separated values.
+    Addresses,
 }
 
 /// The kinds of content that a geometry holds or a format has room for.
@@ -101,7 +104,7 @@ const EVERYTHING: Carries = Carries { solid: true, surface: true, wires: true, p
 /// STL and OFF are lists of faces; 3MF objects of type `model` must be closed, and a printer's
 /// file that is not is a trap, so open surfaces are refused there although the format has a type
 /// for them.
-pub const FORMATS: [FormatFacts; 7] = [
+pub const FORMATS: [FormatFacts; 8] = [
     FormatFacts {
         format: Format::Stl,
         name: "STL",
@@ -137,6 +140,15 @@ pub const FORMATS: [FormatFacts; 7] = [
         reads: true,
     },
     FormatFacts { format: Format::Png, name: "PNG", ending: "png", media_type: "image/png", carries: EVERYTHING, reads: false },
+    FormatFacts {
+        format: Format::Addresses,
+        name: "CSV",
+        ending: "csv",
+        media_type: "text/csv",
+        // No geometry: a table beside it.
+        carries: Carries { solid: false, surface: false, wires: false, points: false },
+        reads: false,
+    },
 ];
 
 impl Format {
@@ -226,7 +238,7 @@ impl Default for Metadata<'_> {
 /// [`FormatError::CannotCarry`] if the format has no room for what the geometry holds,
 /// [`FormatError::Empty`], [`FormatError::NotSinglePrecision`], [`FormatError::NotFinite`],
 /// [`FormatError::IndexOutOfRange`] if the geometry is not fit for a file,
-/// [`FormatError::Limit`] beyond what the format can count, [`FormatError::Stream`] if the sink fails.
+/// [`FormatError::NoAddresses`] for a table of addresses of a shape without B-rep, [`FormatError::Limit`] beyond what the format can count, [`FormatError::Stream`] if the sink fails.
 pub fn write<'a, W: Write + Seek>(
     format: Format,
     geometry: impl Into<Geometry<'a>>,
@@ -234,6 +246,9 @@ pub fn write<'a, W: Write + Seek>(
     sink: &mut W,
 ) -> Result<(), FormatError> {
     let geometry = geometry.into();
+    if format == Format::Addresses {
+        return addresses::write(&geometry, sink);
+    }
     let pieces = fit_pieces(format, &geometry)?;
     match format {
         Format::Stl => stl::write(&pieces, metadata, sink),
@@ -243,6 +258,7 @@ pub fn write<'a, W: Write + Seek>(
         Format::Ply => ply::write(&pieces, metadata, sink),
         Format::Off => off::write(&pieces, metadata, sink),
         Format::Png => preview::write(geometry, &preview::PreviewOptions::default(), sink),
+        Format::Addresses => Err(FormatError::NoAddresses),
     }
 }
 
@@ -286,7 +302,7 @@ pub fn verify_written<'a, R: Read + Seek>(format: Format, source: &mut R, geomet
         Format::Obj => obj::verify(&pieces, source),
         Format::Ply => ply::verify(&pieces, source),
         Format::Off => off::verify(&pieces, source),
-        Format::Png => Err(FormatError::CannotVerify { format }),
+        Format::Png | Format::Addresses => Err(FormatError::CannotVerify { format }),
     }
 }
 

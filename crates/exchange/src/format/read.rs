@@ -125,6 +125,6 @@ pub fn read(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result
         Format::Obj => obj::read(bytes, limits),
         Format::Ply => ply::read(bytes, limits),
         Format::Off => off::read(bytes, limits),
-        Format::Glb | Format::Png => Err(FormatError::CannotRead { format }),
+        Format::Glb | Format::Png | Format::Addresses => Err(FormatError::CannotRead { format }),
     }
 }
