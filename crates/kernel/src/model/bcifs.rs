@@ -82,7 +82,7 @@ pub struct Incidence {
     pub children: Vec<(usize, usize)>,
 }
 
-/// Two children share a boundary.
+/// Two children share a boundary. Without `reversed` or `permutation` the control points agree in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adjacency {
     /// Name of the state.
@@ -91,6 +91,28 @@ pub struct Adjacency {
     pub between: [(usize, usize); 2],
     /// Whether the second is seen from its other end.
     pub reversed: bool,
+    /// Control point j of the first boundary is control point `permutation[j]` of the second; `reversed` is the
+    /// permutation that reverses the order, and not both may be given.
+    pub permutation: Option<Vec<usize>>,
+}
+
+/// One side of a [`Relation`]: T_i T_j ... b_m b_p ..., the nested boundary of a descendant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Side {
+    /// Word i j ... of transitions from the relation's state.
+    pub path: Vec<usize>,
+    /// Word m p ... of boundaries from the descendant.
+    pub boundary: Vec<usize>,
+}
+
+/// Two products of operators and embeddings are equal: constraints over several levels, delays, coherence
+/// of nested boundaries.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Relation {
+    /// Name of the state where both sides begin.
+    pub state: String,
+    /// The two sides, which end in states of one dimension.
+    pub equal: [Side; 2],
 }
 
 /// A root cell: its state and its control points (x, y, z, w), w = 1 unless rational.
@@ -98,8 +120,8 @@ pub struct Adjacency {
 pub struct RootCell {
     /// Name of the state.
     pub state: String,
-    /// Points in mm with their weight: (x, y, z, w), not yet multiplied by w.
-    pub control_points: Vec<DVec4>,
+    /// Points in mm with their weight: (x, y, z, w), not yet multiplied by w; `None` is to be placed.
+    pub control_points: Vec<Option<DVec4>>,
 }
 
 /// Two boundaries of root cells that are one.
@@ -109,6 +131,9 @@ pub struct Glue {
     pub between: [(usize, usize); 2],
     /// Whether the second is seen from its other end.
     pub reversed: bool,
+    /// Control point j of the first boundary is control point `permutation[j]` of the second; `reversed` is the
+    /// permutation that reverses the order, and not both may be given.
+    pub permutation: Option<Vec<usize>>,
 }
 
 /// A BC-IFS with its control points.
@@ -120,6 +145,8 @@ pub struct Bcifs {
     pub incidences: Vec<Incidence>,
     /// Adjacency constraints.
     pub adjacencies: Vec<Adjacency>,
+    /// Longer constraints.
+    pub relations: Vec<Relation>,
     /// The root cells.
     pub cells: Vec<RootCell>,
     /// Root boundaries that are one.
@@ -130,7 +157,7 @@ pub struct Bcifs {
 
 /// Constraints may be violated by this much in barycentric coordinates: operators printed with few digits
 /// leave 1e-6.
-const RESIDUAL_ALLOWED: f64 = 1e-4;
+pub(super) const RESIDUAL_ALLOWED: f64 = 1e-4;
 
 impl Bcifs {
     pub(super) fn lower(&self, draft: &mut Draft) {
@@ -152,12 +179,12 @@ impl Bcifs {
         }
     }
 
-    fn index(&self) -> BTreeMap<&str, usize> {
+    pub(super) fn index(&self) -> BTreeMap<&str, usize> {
         self.states.iter().enumerate().map(|(index, state)| (state.name.as_str(), index)).collect()
     }
 
     /// States that a root cell reaches by transitions and boundaries.
-    fn reachable(&self) -> Vec<bool> {
+    pub(super) fn reachable(&self) -> Vec<bool> {
         let index = self.index();
         let mut reached = vec![false; self.states.len()];
         let mut stack: Vec<usize> = self.cells.iter().filter_map(|cell| index.get(cell.state.as_str()).copied()).collect();
@@ -306,18 +333,20 @@ impl Reader<'_> {
                 draft.error(&format!("{place}/control_points"), "automaton.dimension-mismatch", message);
                 continue;
             }
+            // Unknown points are solved before, so none is left here.
+            let control_points: Vec<DVec4> = cell.control_points.iter().copied().flatten().collect();
             for (k, point) in
-                cell.control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || !super::WEIGHTS.contains(&point.w))
+                control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || !super::WEIGHTS.contains(&point.w))
             {
                 let message = format!("control point {k} is {point}: coordinates must be finite and the weight positive");
                 draft.error(&format!("{place}/control_points/{k}"), "model.not-finite", message);
             }
-            let rational = cell.control_points.iter().any(|point| point.w != cell.control_points[0].w);
+            let rational = control_points.iter().any(|point| point.w != control_points[0].w);
             let homogeneous = |p: &glam::DVec4| {
                 let w = if rational { p.w } else { 1.0 };
                 [w * p.x, w * p.y, w * p.z, w]
             };
-            let points = cell.control_points.iter().map(homogeneous).collect();
+            let points = control_points.iter().map(homogeneous).collect();
             draft.roots.push(Root { state: StateId::new(self.offset + state), points, rational, solid: None });
         }
     }
