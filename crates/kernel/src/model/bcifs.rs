@@ -1,10 +1,13 @@
 //! Boundary controlled iterated function systems, stated in full.
 
 use super::lower::Draft;
+use super::solve::{GLUE_ALLOWED, SolveError, permutation_of};
 use crate::attractor::Root;
 use crate::automaton::{Boundary, LeafPrimitive, OperatorError, State, StateId, SubdivisionOperator, Transition};
+use crate::budget::CancelToken;
 use glam::DVec4;
-use std::collections::BTreeMap;
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Topological kind of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -167,16 +170,83 @@ impl Bcifs {
         if self.cells.is_empty() {
             return draft.error("/cells", "automaton.empty", "the model has no root cell".into());
         }
+        if self.has_unknowns() {
+            // What is filled in has no unknown, so this happens once.
+            if let Some(filled) = self.determined(draft) {
+                filled.lower(draft);
+            }
+            return;
+        }
         let reader = Reader { model: self, offset: draft.states.len(), reachable: self.reachable(), index: self.index() };
         let errors_before = draft.findings.iter().filter(|finding| !finding.warning).count();
         let states: Vec<State> = (0..self.states.len()).map(|index| reader.state(index, draft)).collect();
+        let first_root = draft.roots.len();
         reader.roots(draft);
         if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
             reader.constraints(&states, draft);
+            reader.glue(&states, first_root, draft);
         }
         for (index, state) in states.into_iter().enumerate() {
             draft.state_from(state, &format!("/states/{index}/transitions"));
         }
+    }
+
+    /// Whether something that matters is to be solved.
+    fn has_unknowns(&self) -> bool {
+        let unknown = |matrix: &Matrix| matrix.rows.iter().flatten().any(|entry| *entry == Entry::Unknown);
+        let of = |state: &BcifsState| {
+            state.transitions.iter().any(|t| unknown(&t.operator)) || state.boundaries.iter().any(|b| unknown(&b.incidence))
+        };
+        self.cells.iter().any(|cell| cell.control_points.contains(&None))
+            || self.states.iter().zip(self.reachable()).any(|(state, reached)| reached && of(state))
+    }
+
+    /// The model with its unknowns filled in, if the constraints leave one way and the declared parameters are kept.
+    fn determined(&self, draft: &mut Draft) -> Option<Self> {
+        let values: BTreeMap<String, f64> = self.used_parameters().into_iter().collect();
+        let solution = match self.solve(&values, &CancelToken::new()) {
+            Ok(solution) => solution,
+            Err(SolveError::Invalid(findings)) => {
+                findings.into_iter().for_each(|finding| draft.error(&finding.pointer, finding.code, finding.message));
+                return None;
+            }
+            Err(error) => {
+                let place = match &error {
+                    SolveError::Contradiction { constraints } => constraints.first().map_or("", |constraint| &constraint.pointer),
+                    _ => "/states",
+                };
+                draft.error(place, error.code(), error.to_string());
+                return None;
+            }
+        };
+        let ignored: Vec<String> =
+            self.reachable().iter().enumerate().filter(|(_, reached)| !**reached).map(|(s, _)| format!("/states/{s}/")).collect();
+        let free: Vec<_> = solution
+            .parameters
+            .iter()
+            .filter(|parameter| !parameter.declared && !ignored.iter().any(|place| parameter.pointer.starts_with(place)))
+            .collect();
+        let Some(first) = free.first() else { return Some(solution.model) };
+        let names = free.iter().take(8).map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");
+        let more = if free.len() > 8 { ", ..." } else { "" };
+        let message = format!(
+            "the constraints leave {} degrees of freedom: {names}{more}. Give these entries values, or let `lacuna solve` choose them",
+            free.len()
+        );
+        draft.error(&first.pointer, "automaton.underdetermined", message);
+        None
+    }
+
+    /// Declared parameters that entries name.
+    fn used_parameters(&self) -> Vec<(String, f64)> {
+        let matrices = self.states.iter().flat_map(|state| {
+            state.transitions.iter().map(|t| &t.operator).chain(state.boundaries.iter().map(|boundary| &boundary.incidence))
+        });
+        let used: BTreeSet<&str> = matrices
+            .flat_map(|matrix| matrix.rows.iter().flatten())
+            .filter_map(|entry| if let Entry::Parameter(name) = entry { Some(name.as_str()) } else { None })
+            .collect();
+        self.parameters.iter().filter(|(name, _)| used.contains(name.as_str())).cloned().collect()
     }
 
     pub(super) fn index(&self) -> BTreeMap<&str, usize> {
@@ -363,6 +433,83 @@ impl Reader<'_> {
             let sides = self.adjacency(adjacency, states);
             self.judge(draft, &place, "automaton.adjacency-mismatch", sides);
         }
+        for (index, relation) in self.model.relations.iter().enumerate() {
+            let sides = self.relation(relation, states);
+            self.judge(draft, &format!("/relations/{index}"), "automaton.relation-mismatch", sides);
+        }
+    }
+
+    /// The product along a side, column after column, and the state where it ends.
+    fn product<'s>(&self, states: &'s [State], state: &'s State, side: &Side) -> Result<(Columns, &'s State), String> {
+        let mut factors = Vec::new();
+        let mut current = state;
+        for &child in &side.path {
+            let found = current.transitions.get(child).ok_or_else(|| format!("state '{}' has no child {child}", current.name))?;
+            factors.push(&found.operator);
+            current = self.local(states, found.to);
+        }
+        for &boundary in &side.boundary {
+            let found = current.boundaries.get(boundary).ok_or_else(|| format!("state '{}' has no boundary {boundary}", current.name))?;
+            factors.push(&found.incidence);
+            current = self.local(states, found.state);
+        }
+        let (last, rest) = factors.split_last().ok_or("a side names neither a child nor a boundary")?;
+        let image = |j| rest.iter().rev().fold(last.column(j).to_vec(), |column, factor| factor.apply(&column));
+        Ok(((0..last.columns()).map(image).collect(), current))
+    }
+
+    fn relation(&self, relation: &Relation, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
+        let state = self.find(states, &relation.state)?;
+        let [(left, _), (right, _)] = [self.product(states, state, &relation.equal[0])?, self.product(states, state, &relation.equal[1])?];
+        let [first, second] = &relation.equal;
+        let words = |side: &Side| format!("(child {:?}, boundary {:?})", side.path, side.boundary);
+        Ok(vec![(format!("{} and {} of state '{}'", words(first), words(second), state.name), left, right)])
+    }
+
+    /// Checks that glued boundaries have the same control points: P_a b_m = P_b b_n, homogeneous.
+    fn glue(&self, states: &[State], first_root: usize, draft: &mut Draft) {
+        let size = extent(&draft.roots[first_root..]);
+        for (index, glue) in self.model.glue.iter().enumerate() {
+            let place = format!("/glue/{index}");
+            let [(c, m), (d, n)] = glue.between;
+            let words = format!("boundary {m} of root cell {c} and boundary {n} of root cell {d}");
+            let roots = &draft.roots[first_root..];
+            let sides = self.glued(states, roots, (c, m)).and_then(|(left, first)| {
+                let (right, second) = self.glued(states, roots, (d, n))?;
+                if first.name != second.name {
+                    return Err(format!("{words} are of different states, '{}' and '{}'", first.name, second.name));
+                }
+                let permutation = permutation_of(glue.reversed, glue.permutation.as_deref(), left.len())?;
+                Ok((left, permuted(right, permutation)))
+            });
+            let (left, right) = match sides {
+                Ok(sides) => sides,
+                Err(message) => {
+                    draft.error(&place, "automaton.glue-mismatch", message);
+                    continue;
+                }
+            };
+            let residual = left.iter().flatten().zip(right.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            draft.constraint_residual = draft.constraint_residual.max(residual / size);
+            let allowed = GLUE_ALLOWED * size;
+            // Written so that a residual that is not a number is refused.
+            if !matches!(residual.partial_cmp(&allowed), Some(Ordering::Less | Ordering::Equal)) {
+                let message = format!("{words} are {residual:.3e} mm apart, and may be {allowed:.1e} mm apart (1e-6 of the model's size)");
+                draft.error(&place, "automaton.glue-mismatch", message);
+            }
+        }
+    }
+
+    /// P b and the boundary's state.
+    fn glued<'s>(&self, states: &'s [State], roots: &[Root], (cell, boundary): (usize, usize)) -> Result<(Columns, &'s State), String> {
+        let root = roots.get(cell).ok_or_else(|| format!("there is no root cell {cell}"))?;
+        let state = self.local(states, root.state);
+        let found = state.boundaries.get(boundary).ok_or_else(|| format!("state '{}' has no boundary {boundary}", state.name))?;
+        let point = |j: usize| -> Vec<f64> {
+            let weights = found.incidence.column(j);
+            (0..4).map(|axis| weights.iter().zip(&root.points).map(|(weight, point)| weight * point[axis]).sum()).collect()
+        };
+        Ok(((0..found.incidence.columns()).map(point).collect(), self.local(states, found.state)))
     }
 
     fn judge(&self, draft: &mut Draft, place: &str, code: &'static str, sides: Result<Vec<(String, Columns, Columns)>, String>) {
@@ -428,25 +575,42 @@ impl Reader<'_> {
         Ok(sides)
     }
 
-    /// T_i b_m = T_j b_m2, the second side's control points in reverse order when `reversed`.
+    /// T_i b_m = T_j b_m2, the second side's control points in the stated order.
     fn adjacency(&self, adjacency: &Adjacency, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
         let state = self.find(states, &adjacency.state)?;
         let [first, second] = adjacency.between;
         let (left, left_state) = self.child_boundary(states, state, first)?;
-        let (mut right, right_state) = self.child_boundary(states, state, second)?;
+        let (right, right_state) = self.child_boundary(states, state, second)?;
         if left_state != right_state {
             return Err(format!(
                 "boundary {} of child {} and boundary {} of child {} are of different states",
                 first.1, first.0, second.1, second.0
             ));
         }
-        if adjacency.reversed {
-            right.reverse();
-        }
+        let right = permuted(right, permutation_of(adjacency.reversed, adjacency.permutation.as_deref(), left.len())?);
         let paths =
             format!("boundary {} of child {} and boundary {} of child {} of state '{}'", first.1, first.0, second.1, second.0, state.name);
         Ok(vec![(paths, left, right)])
     }
+}
+
+/// Column j becomes column `permutation[j]`.
+fn permuted(columns: Columns, permutation: Option<Vec<usize>>) -> Columns {
+    match permutation {
+        None => columns,
+        Some(permutation) => permutation.into_iter().map(|j| columns[j].clone()).collect(),
+    }
+}
+
+/// The largest extent of the control points, 1 if there is none.
+fn extent(roots: &[Root]) -> f64 {
+    let range = |axis: usize| {
+        let values = roots.iter().flat_map(|root| root.points.iter().map(move |point| point[axis] / point[3]));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        high - low
+    };
+    let size = (0..3).map(range).fold(0.0, f64::max);
+    if size > 0.0 && size.is_finite() { size } else { 1.0 }
 }
 
 /// The columns of a product of operators.
