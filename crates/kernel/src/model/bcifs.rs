@@ -421,19 +421,24 @@ impl Reader<'_> {
         }
     }
 
-    /// Checks the stated incidences and adjacencies; the residual is the largest difference of entries.
+    /// Whether the state of that name exists and nothing reaches it.
+    fn ignores(&self, state: &str) -> bool {
+        self.index.get(state).is_some_and(|&index| !self.reachable[index])
+    }
+
+    /// Checks the stated incidences, adjacencies and relations; the residual is the largest difference of entries.
     fn constraints(&self, states: &[State], draft: &mut Draft) {
-        for (index, incidence) in self.model.incidences.iter().enumerate() {
+        for (index, incidence) in self.model.incidences.iter().enumerate().filter(|(_, incidence)| !self.ignores(&incidence.state)) {
             let place = format!("/incidences/{index}");
             let sides = self.incidence(incidence, states);
             self.judge(draft, &place, "automaton.incidence-mismatch", sides);
         }
-        for (index, adjacency) in self.model.adjacencies.iter().enumerate() {
+        for (index, adjacency) in self.model.adjacencies.iter().enumerate().filter(|(_, adjacency)| !self.ignores(&adjacency.state)) {
             let place = format!("/adjacencies/{index}");
             let sides = self.adjacency(adjacency, states);
             self.judge(draft, &place, "automaton.adjacency-mismatch", sides);
         }
-        for (index, relation) in self.model.relations.iter().enumerate() {
+        for (index, relation) in self.model.relations.iter().enumerate().filter(|(_, relation)| !self.ignores(&relation.state)) {
             let sides = self.relation(relation, states);
             self.judge(draft, &format!("/relations/{index}"), "automaton.relation-mismatch", sides);
         }

@@ -4,7 +4,7 @@ use super::rational::Rational;
 use super::system::{Array, Cell, Constraint, Equations, Place, System, Unknown};
 use super::{ConflictingConstraint, SolveError};
 use crate::automaton::operator::COLUMN_SUM_CORRECTED;
-use crate::model::bcifs::{Bcifs, CellKind, Entry, Glue, Matrix, RESIDUAL_ALLOWED, Side};
+use crate::model::bcifs::{Bcifs, CellKind, Entry, Matrix, RESIDUAL_ALLOWED, Side};
 use crate::model::lower::Finding;
 use std::collections::BTreeMap;
 
@@ -268,7 +268,6 @@ impl<'a> Reader<'a> {
 
     fn incidences(&mut self) {
         for (index, incidence) in self.model.incidences.iter().enumerate() {
-            let place = format!("/incidences/{index}");
             let k = incidence.boundary;
             let edge = self.state_of(&incidence.state).and_then(|state| {
                 let (_, edge) = self.product(state, &[], &[k])?;
@@ -278,10 +277,19 @@ impl<'a> Reader<'a> {
                 }
                 Ok((state, edge))
             });
+            let statement = |place, words| Statement {
+                place,
+                code: "automaton.incidence-mismatch",
+                words,
+                state: Some(&incidence.state),
+                one_state: true,
+                orientation: (false, None),
+                size: None,
+            };
             let (state, edge) = match edge {
                 Ok(found) => found,
                 Err(message) => {
-                    self.fault(place, "automaton.incidence-mismatch", message);
+                    self.equal(statement(format!("/incidences/{index}"), String::new()), Err(message));
                     continue;
                 }
             };
@@ -292,16 +300,7 @@ impl<'a> Reader<'a> {
                     left.extend(inner);
                     Ok([(left, to), self.product(state, &[i], &[m])?])
                 });
-                self.equal(
-                    format!("{place}/children/{j}"),
-                    "automaton.incidence-mismatch",
-                    words,
-                    sides,
-                    true,
-                    None,
-                    RESIDUAL_ALLOWED,
-                    1.0,
-                );
+                self.equal(statement(format!("/incidences/{index}/children/{j}"), words), sides);
             }
         }
     }
@@ -309,19 +308,34 @@ impl<'a> Reader<'a> {
     fn adjacencies(&mut self) {
         for (index, adjacency) in self.model.adjacencies.iter().enumerate() {
             let [(i, m), (j, n)] = adjacency.between;
-            let how = orientation(adjacency.reversed, adjacency.permutation.as_deref());
-            let words = format!("boundary {m} of child {i} of state '{}' is boundary {n} of child {j}{how}", adjacency.state);
+            let orientation = (adjacency.reversed, adjacency.permutation.as_deref());
+            let how = order(orientation);
+            let statement = Statement {
+                place: format!("/adjacencies/{index}"),
+                code: "automaton.adjacency-mismatch",
+                words: format!("boundary {m} of child {i} of state '{}' is boundary {n} of child {j}{how}", adjacency.state),
+                state: Some(&adjacency.state),
+                one_state: true,
+                orientation,
+                size: None,
+            };
             let sides = self.state_of(&adjacency.state).and_then(|s| Ok([self.product(s, &[i], &[m])?, self.product(s, &[j], &[n])?]));
-            let permutation = Some((adjacency.reversed, adjacency.permutation.as_deref()));
-            let place = format!("/adjacencies/{index}");
-            self.equal(place, "automaton.adjacency-mismatch", words, sides, true, permutation, RESIDUAL_ALLOWED, 1.0);
+            self.equal(statement, sides);
         }
     }
 
     fn relations(&mut self) {
         for (index, relation) in self.model.relations.iter().enumerate() {
             let [first, second] = &relation.equal;
-            let words = format!("in state '{}', {} is {}", relation.state, side(first), side(second));
+            let statement = Statement {
+                place: format!("/relations/{index}"),
+                code: "automaton.relation-mismatch",
+                words: format!("in state '{}', {} is {}", relation.state, side(first), side(second)),
+                state: Some(&relation.state),
+                one_state: false,
+                orientation: (false, None),
+                size: None,
+            };
             let of = |s: usize, side: &Side| {
                 if side.path.is_empty() && side.boundary.is_empty() {
                     return Err("a side names neither a child nor a boundary".into());
@@ -329,41 +343,37 @@ impl<'a> Reader<'a> {
                 self.product(s, &side.path, &side.boundary)
             };
             let sides = self.state_of(&relation.state).and_then(|s| Ok([of(s, first)?, of(s, second)?]));
-            let place = format!("/relations/{index}");
-            self.equal(place, "automaton.relation-mismatch", words, sides, false, None, RESIDUAL_ALLOWED, 1.0);
+            self.equal(statement, sides);
         }
     }
 
     fn glue(&mut self, size: f64) {
         for (index, glue) in self.model.glue.iter().enumerate() {
-            let Glue { between: [(c, m), (d, n)], reversed, permutation } = glue;
-            let how = orientation(*reversed, permutation.as_deref());
-            let words = format!("boundary {m} of root cell {c} is boundary {n} of root cell {d}{how}");
+            let [(c, m), (d, n)] = glue.between;
+            let orientation = (glue.reversed, glue.permutation.as_deref());
+            let statement = Statement {
+                place: format!("/glue/{index}"),
+                code: "automaton.glue-mismatch",
+                words: format!("boundary {m} of root cell {c} is boundary {n} of root cell {d}{}", order(orientation)),
+                state: None,
+                one_state: true,
+                orientation,
+                size: Some(size),
+            };
             let of = |cell: usize, boundary: usize| {
                 let points = *self.points.get(cell).ok_or_else(|| format!("there is no root cell {cell}"))?;
                 let points = points.ok_or_else(|| format!("root cell {cell} is not well formed"))?;
                 let (factors, end) = self.product(self.state_of(&self.model.cells[cell].state)?, &[], &[boundary])?;
                 Ok(([vec![points], factors].concat(), end))
             };
-            let sides = of(*c, *m).and_then(|first| Ok([first, of(*d, *n)?]));
-            let place = format!("/glue/{index}");
-            let permutation = Some((*reversed, permutation.as_deref()));
-            self.equal(place, "automaton.glue-mismatch", words, sides, true, permutation, GLUE_ALLOWED, size);
+            let sides = of(c, m).and_then(|first| Ok([first, of(d, n)?]));
+            self.equal(statement, sides);
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the parts of one sentence")]
-    fn equal(
-        &mut self,
-        place: String,
-        code: &'static str,
-        words: String,
-        sides: Result<[Product; 2], String>,
-        one_state: bool,
-        orientation: Option<(bool, Option<&[usize]>)>,
-        tolerance: f64,
-        scale: f64,
-    ) {
+    /// States that two products are equal, or why they cannot be compared.
+    fn equal(&mut self, statement: Statement<'_>, sides: Result<[Product; 2], String>) {
+        let Statement { place, code, words, state, one_state, orientation: (reversed, permutation), size } = statement;
         let checked = sides.and_then(|[(left, first), (right, second)]| {
             let states = &self.model.states;
             let count = states[first].dimension;
@@ -373,12 +383,18 @@ impl<'a> Reader<'a> {
             if count != states[second].dimension {
                 return Err(format!("{words}: the two have {count} and {} control points", states[second].dimension));
             }
-            let (reversed, permutation) = orientation.unwrap_or((false, None));
             Ok(Equations::Equal { left, right, permutation: permutation_of(reversed, permutation, count)? })
         });
+        let (tolerance, scale) = size.map_or((RESIDUAL_ALLOWED, 1.0), |size| (GLUE_ALLOWED, size));
         match checked {
             Ok(equations) => self.constraint(place, words, equations, tolerance, scale),
-            Err(message) => self.fault(place, code, message),
+            Err(message) => {
+                // A state that nothing reaches need not be well formed.
+                let index = state.and_then(|name| self.index.get(name));
+                if index.is_none_or(|&index| self.reachable[index]) {
+                    self.fault(place, code, message);
+                }
+            }
         }
     }
 
@@ -425,6 +441,21 @@ struct Source<'a> {
     rank: Rank,
 }
 
+/// A constraint "these two products are equal".
+struct Statement<'a> {
+    place: String,
+    code: &'static str,
+    words: String,
+    /// The state that it is about.
+    state: Option<&'a str>,
+    /// Whether both sides must end in one state.
+    one_state: bool,
+    /// Whether the second is reversed, or permuted.
+    orientation: (bool, Option<&'a [usize]>),
+    /// The size of the model if the products are control points.
+    size: Option<f64>,
+}
+
 /// Spreads the excess of given columns that are off by rounding, as the operators' constructor does; the
 /// largest excess.
 fn correct_columns(array: &mut Array) -> f64 {
@@ -452,7 +483,7 @@ fn correct_columns(array: &mut Array) -> f64 {
     rounding
 }
 
-fn orientation(reversed: bool, permutation: Option<&[usize]>) -> String {
+fn order((reversed, permutation): (bool, Option<&[usize]>)) -> String {
     match permutation {
         Some(permutation) => format!(" with its control points in the order {permutation:?}"),
         None if reversed => " reversed".into(),
