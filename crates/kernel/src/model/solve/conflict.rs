@@ -1,16 +1,22 @@
 //! Smallest reasons for a contradiction.
 
+use super::SolveError;
 use super::linear::Support;
 use super::propagate::Knowledge;
 use super::system::System;
-use super::{ConflictingConstraint, SolveError};
 use crate::budget::CancelToken;
+
+/// The error that names the constraints of a smallest reason.
+pub(super) fn contradiction(system: &System, start: &Support, cancel: &CancelToken) -> Result<SolveError, SolveError> {
+    let set = irreducible(system, start, cancel)?;
+    Ok(SolveError::Contradiction { constraints: set.into_iter().map(|index| system.constraints[index].named.clone()).collect() })
+}
 
 /// An irreducible contradictory subset of constraints that are contradictory together: the deletion filter of
 /// Chinneck and Dravnieks ("Locating minimal infeasible constraint sets in linear programs", ORSA J. Computing 3(2),
 /// 1991). What is contradictory without a constraint replaces the set, so members that do not matter leave in
 /// numbers.
-pub(super) fn irreducible(system: &System, start: &Support, cancel: &CancelToken) -> Result<SolveError, SolveError> {
+fn irreducible(system: &System, start: &Support, cancel: &CancelToken) -> Result<Vec<usize>, SolveError> {
     let mut set = start.members();
     let mut position = 0;
     while position < set.len() {
@@ -26,6 +32,69 @@ pub(super) fn irreducible(system: &System, start: &Support, cancel: &CancelToken
             }
         }
     }
-    let named = |&index: &usize| system.constraints[index].named.clone();
-    Ok(SolveError::Contradiction { constraints: set.iter().map(named).collect::<Vec<ConflictingConstraint>>() })
+    Ok(set)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::solve::read::read;
+    use crate::model::{Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Incidence, Matrix, TransitionSpec};
+    use std::collections::BTreeMap;
+
+    /// A curve of four points with vertices of two, in which random entries are given at random.
+    fn overdetermined(seed: u64) -> Bcifs {
+        let mut bits = seed;
+        let mut entry = move || {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            if (bits >> 40) % 5 == 0 { Entry::Number(((bits >> 50) % 100) as f64 / 100.0) } else { Entry::Unknown }
+        };
+        let mut matrix = |n: usize| Matrix { rows: (0..n).map(|_| (0..n).map(|_| entry()).collect()).collect() };
+        let transition = |to: &str, operator| TransitionSpec { to: to.into(), operator };
+        let end = |first: usize| {
+            let number = |row: usize, column: usize| Entry::Number(f64::from(u8::from(row == first + column)));
+            let incidence = Matrix { rows: (0..4).map(|row| (0..2).map(|column| number(row, column)).collect()).collect() };
+            BoundarySpec { state: "vertex".into(), incidence }
+        };
+        let edge = BcifsState {
+            name: "edge".into(),
+            cell: CellKind::Edge,
+            dimension: 4,
+            transitions: vec![transition("edge", matrix(4)), transition("edge", matrix(4))],
+            boundaries: vec![end(0), end(2)],
+        };
+        let vertex = BcifsState {
+            name: "vertex".into(),
+            cell: CellKind::Vertex,
+            dimension: 2,
+            transitions: vec![transition("vertex", matrix(2))],
+            boundaries: Vec::new(),
+        };
+        Bcifs {
+            states: vec![edge, vertex],
+            incidences: (0..2).map(|k| Incidence { state: "edge".into(), boundary: k, children: vec![(k, k)] }).collect(),
+            adjacencies: vec![Adjacency { state: "edge".into(), between: [(0, 1), (1, 0)], reversed: false, permutation: None }],
+            ..Bcifs::default()
+        }
+    }
+
+    #[test]
+    fn every_member_of_a_smallest_reason_is_needed() {
+        let cancel = CancelToken::new();
+        let (mut contradictory, mut sizes) = (0, Vec::new());
+        for seed in 0..200 {
+            let system = read(&overdetermined(seed), &BTreeMap::new()).expect("well formed");
+            let all: Vec<usize> = (0..system.constraints.len()).collect();
+            let Err(support) = Knowledge::of(&system, &all, &cancel).expect("within limits") else { continue };
+            let set = irreducible(&system, &support, &cancel).expect("within limits");
+            assert!(Knowledge::of(&system, &set, &cancel).expect("within limits").is_err());
+            for member in &set {
+                let without: Vec<usize> = set.iter().copied().filter(|index| index != member).collect();
+                assert!(Knowledge::of(&system, &without, &cancel).expect("within limits").is_ok(), "seed {seed}: {member} of {set:?}");
+            }
+            contradictory += 1;
+            sizes.push(set.len());
+        }
+        assert!(contradictory > 50 && sizes.iter().any(|&size| size > 2), "{contradictory} {sizes:?}");
+    }
 }

@@ -149,8 +149,8 @@ impl Problem {
     }
 }
 
-/// A solution of what `knowledge` leaves, with `fixed` values of free unknowns that it does not join: the first that
-/// contracts, else the first.
+/// A solution of what `knowledge` leaves: the first that contracts, else the first. Free unknowns begin at their `fixed`
+/// values, and keep them unless products join them.
 pub(super) fn find(
     model: &Bcifs,
     system: &System,

@@ -227,7 +227,7 @@ impl Bcifs {
         let all: Vec<usize> = (0..system.constraints.len()).collect();
         let general = match Knowledge::of(&system, &all, cancel)? {
             Ok(general) => general,
-            Err(support) => return Err(conflict::irreducible(&system, &support, cancel)?),
+            Err(support) => return Err(conflict::contradiction(&system, &support, cancel)?),
         };
         let special = with_values(&mut system, &general, cancel)?;
         let (point, method, dependent) = if general.pending.is_empty() {
@@ -255,11 +255,11 @@ fn with_values(system: &mut System, general: &Knowledge, cancel: &CancelToken) -
         let equations = Equations::Value(unknown as u32, exact.clone());
         system.constraints.push(Constraint { named, equations, tolerance, scale: 1.0 });
         if let Err(support) = special.assign(unknown as u32, &exact, system.constraints.len() - 1, cancel)? {
-            return Err(conflict::irreducible(system, &support, cancel)?);
+            return Err(conflict::contradiction(system, &support, cancel)?);
         }
     }
     match special.advance(cancel)? {
-        Some(support) => Err(conflict::irreducible(system, &support, cancel)?),
+        Some(support) => Err(conflict::contradiction(system, &support, cancel)?),
         None => Ok(special),
     }
 }
@@ -293,7 +293,7 @@ fn nonlinear(model: &Bcifs, system: &System, special: &Knowledge, cancel: &Cance
             found => return found,
         }
     }
-    find(special, &BTreeMap::new())
+    find(special, &fixed)
 }
 
 /// The solution's public form. `dependent` are those free unknowns of the linear part that are not free.

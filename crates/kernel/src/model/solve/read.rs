@@ -137,12 +137,15 @@ impl<'a> Reader<'a> {
         }
         let mut array = Array { rows, columns, cells, place };
         let rounding = correct_columns(&mut array);
-        self.system.rounding = self.system.rounding.max(rounding);
+        if rounding.is_finite() {
+            self.system.rounding = self.system.rounding.max(rounding);
+        }
         let given = !array.cells.iter().any(|cell| matches!(cell, Cell::Unknown(_)));
         let tolerance = if given { COLUMN_SUM_CORRECTED } else { RESIDUAL_ALLOWED };
         let index = self.system.arrays.len();
         self.system.arrays.push(array);
-        if self.reachable[source.s] || !given {
+        // Given columns are corrected, or too far off.
+        if !given || (self.reachable[source.s] && !rounding.is_finite()) {
             self.constraint(pointer, source.words.clone(), Equations::ColumnSums(index), tolerance, 1.0);
         }
         Some(index)
@@ -399,16 +402,21 @@ impl<'a> Reader<'a> {
     }
 
     fn choose(&mut self, values: &BTreeMap<String, f64>) -> Result<(), SolveError> {
+        let index = self.system.index();
+        let mut chosen = Vec::with_capacity(values.len());
         for (name, &value) in values {
             if !value.is_finite() {
                 return Err(SolveError::NotFinite { name: name.clone(), value });
             }
-            let Some(&unknown) = self.system.index().get(name.as_str()) else {
+            let Some(&unknown) = index.get(name.as_str()) else {
                 let known = self.system.unknowns.iter().take(8).map(|unknown| unknown.name.clone()).collect();
                 return Err(SolveError::UnknownName { name: name.clone(), known });
             };
-            self.system.unknowns[unknown as usize].chosen = Some(value);
-            self.keys[unknown as usize] = Rank::Chosen;
+            chosen.push((unknown as usize, value));
+        }
+        for (unknown, value) in chosen {
+            self.system.unknowns[unknown].chosen = Some(value);
+            self.keys[unknown] = Rank::Chosen;
         }
         Ok(())
     }
@@ -457,7 +465,7 @@ struct Statement<'a> {
 }
 
 /// Spreads the excess of given columns that are off by rounding, as the operators' constructor does; the
-/// largest excess.
+/// largest excess, infinite if one is too far off.
 fn correct_columns(array: &mut Array) -> f64 {
     let mut rounding = 0.0_f64;
     for column in 0..array.columns {
@@ -470,7 +478,9 @@ fn correct_columns(array: &mut Array) -> f64 {
                 Cell::Unknown(_) => given = false,
             }
         }
-        if given && !excess.is_zero() && excess.magnitude() <= COLUMN_SUM_CORRECTED {
+        if given && excess.magnitude() > COLUMN_SUM_CORRECTED {
+            rounding = f64::INFINITY;
+        } else if given && !excess.is_zero() {
             rounding = rounding.max(excess.magnitude());
             let share = excess.times(&Rational::from(-(array.rows as i64)).inverse());
             for index in indices {
