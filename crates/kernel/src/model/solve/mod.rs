@@ -68,7 +68,7 @@ pub struct SolvedEntry {
 /// How the solution was found, and so what it tells.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
-    /// By elimination in rational numbers: the parameters describe every solution.
+    /// By elimination in rational numbers (see [`Rational`] for their limit): the parameters describe every solution.
     Exact,
     /// Equations between products of unknowns were left: one solution was found, and the parameters are coordinates
     /// of the solutions near it.

@@ -1,11 +1,13 @@
-//! Rational numbers of any size, fast while they are small.
+//! Rational numbers, fast while they are small, and long floating numbers when they outgrow what their inputs mean.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{FromPrimitive, Signed, ToPrimitive, Zero};
+use num_traits::{FromPrimitive, ToPrimitive, Zero};
 use std::fmt;
 
-/// An exact number p/q in lowest terms, q > 0.
+/// An exact number p/q in lowest terms, q > 0. When p and q together outgrow 256 bits, which takes dozens of operations
+/// on numbers of all digits, it goes on as a floating number of 256 significant bits (a relative error of 1e-77 in
+/// each operation): such inputs are rounded themselves, by 1e-16.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Rational(Repr);
 
@@ -14,7 +16,14 @@ pub struct Rational(Repr);
 enum Repr {
     Small(i64, i64),
     Big(Box<BigRational>),
+    /// mantissa * 2^exponent, not 0.
+    Float(Box<(BigInt, i64)>),
 }
+
+/// Bits of numerator and denominator that stay exact.
+const EXACT_BITS: u64 = 256;
+/// Significant bits of floating numbers.
+const FLOAT_BITS: u64 = 256;
 
 /// Magnitudes for which the interval of half a unit in the last place fits 128 bits.
 const SIMPLE: std::ops::Range<f64> = 1e-9..1e9;
@@ -60,8 +69,33 @@ impl Rational {
     fn big(value: BigRational) -> Self {
         match (value.numer().to_i64(), value.denom().to_i64()) {
             (Some(p), Some(q)) => Self(Repr::Small(p, q)),
+            _ if value.numer().bits() + value.denom().bits() > EXACT_BITS => Self::float(divided(&value)),
             _ => Self(Repr::Big(Box::new(value))),
         }
+    }
+
+    /// Rounds towards zero.
+    fn float((mantissa, exponent): (BigInt, i64)) -> Self {
+        if mantissa.is_zero() {
+            return Self::ZERO;
+        }
+        let excess = mantissa.bits().saturating_sub(FLOAT_BITS);
+        let cut = if excess > 0 { mantissa / (BigInt::from(1) << excess) } else { mantissa };
+        Self(Repr::Float(Box::new((cut, exponent + excess as i64))))
+    }
+
+    /// As mantissa and exponent.
+    fn floated(&self) -> (BigInt, i64) {
+        match &self.0 {
+            Repr::Small(p, 1) => (BigInt::from(*p), 0),
+            Repr::Small(..) => divided(&self.widened()),
+            Repr::Big(value) => divided(value),
+            Repr::Float(value) => (**value).clone(),
+        }
+    }
+
+    fn is_float(&self) -> bool {
+        matches!(self.0, Repr::Float(_))
     }
 
     fn widened(&self) -> BigRational {
@@ -69,6 +103,10 @@ impl Rational {
             // A small one is in lowest terms with a positive denominator.
             Repr::Small(p, q) => BigRational::new_raw(BigInt::from(*p), BigInt::from(*q)),
             Repr::Big(value) => (**value).clone(),
+            Repr::Float(value) => {
+                let power = BigInt::from(1) << value.1.unsigned_abs();
+                if value.1 >= 0 { BigRational::from_integer(&value.0 * power) } else { BigRational::new(value.0.clone(), power) }
+            }
         }
     }
 
@@ -90,6 +128,13 @@ impl Rational {
         const EXACT: std::ops::RangeInclusive<i64> = -(1 << 53)..=1 << 53;
         match &self.0 {
             Repr::Small(p, q) if EXACT.contains(p) && EXACT.contains(q) => *p as f64 / *q as f64,
+            Repr::Float(value) => {
+                // The leading 64 bits, scaled in two steps so that neither power overflows.
+                let excess = value.0.bits().saturating_sub(64);
+                let leading = (&value.0 >> excess).to_f64().unwrap_or(f64::NAN);
+                let exponent = (value.1 + excess as i64).clamp(-2200, 2200) as i32;
+                leading * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
+            }
             _ => self.widened().to_f64().unwrap_or(f64::NAN),
         }
     }
@@ -99,6 +144,7 @@ impl Rational {
         match &self.0 {
             Repr::Small(..) => 1,
             Repr::Big(value) => 2 + (value.numer().bits() + value.denom().bits()) / 16,
+            Repr::Float(_) => 3,
         }
     }
 
@@ -111,12 +157,31 @@ impl Rational {
             // Each product is below 2^126, so the sum is below 2^127.
             return Self::small(p * s + r * q, q * s);
         }
+        if self.is_zero() {
+            return other.clone();
+        }
+        if self.is_float() || other.is_float() {
+            let ((a, i), (b, j)) = (self.floated(), other.floated());
+            // What lies wholly below the other's last bit does not count.
+            if i + a.bits() as i64 + FLOAT_BITS as i64 + 2 < j || b.is_zero() {
+                return if b.is_zero() { self.clone() } else { Self::float((b, j)) };
+            }
+            if j + b.bits() as i64 + FLOAT_BITS as i64 + 2 < i {
+                return Self::float((a, i));
+            }
+            let low = i.min(j);
+            return Self::float(((a << (i - low).unsigned_abs()) + (b << (j - low).unsigned_abs()), low));
+        }
         Self::big(self.widened() + other.widened())
     }
 
     pub(super) fn times(&self, other: &Self) -> Self {
         if let (Repr::Small(p, q), Repr::Small(r, s)) = (&self.0, &other.0) {
             return Self::small(i128::from(*p) * i128::from(*r), i128::from(*q) * i128::from(*s));
+        }
+        if self.is_float() || other.is_float() {
+            let ((a, i), (b, j)) = (self.floated(), other.floated());
+            return Self::float((a * b, i + j));
         }
         Self::big(self.widened() * other.widened())
     }
@@ -125,6 +190,7 @@ impl Rational {
         match &self.0 {
             Repr::Small(p, q) => Self::small(-i128::from(*p), i128::from(*q)),
             Repr::Big(value) => Self::big(-(**value).clone()),
+            Repr::Float(value) => Self(Repr::Float(Box::new((-&value.0, value.1)))),
         }
     }
 
@@ -133,19 +199,24 @@ impl Rational {
         match &self.0 {
             Repr::Small(p, q) => Self::small(i128::from(*q), i128::from(*p)),
             Repr::Big(value) => Self::big(value.recip()),
+            Repr::Float(value) => {
+                let shift = 2 * FLOAT_BITS;
+                Self::float(((BigInt::from(1) << shift) / &value.0, -value.1 - shift as i64))
+            }
         }
     }
 
     /// |self| as a double; never 0 unless it is 0.
     pub(super) fn magnitude(&self) -> f64 {
-        match &self.0 {
-            Repr::Small(..) => self.to_f64().abs(),
-            Repr::Big(value) => {
-                let size = value.abs().to_f64().unwrap_or(f64::INFINITY);
-                if size == 0.0 && !value.is_zero() { f64::MIN_POSITIVE } else { size }
-            }
-        }
+        let size = self.to_f64().abs();
+        if size == 0.0 && !self.is_zero() { f64::MIN_POSITIVE } else { size }
     }
+}
+
+/// A quotient as mantissa and exponent, to 256 bits and more.
+fn divided(value: &BigRational) -> (BigInt, i64) {
+    let shift = FLOAT_BITS + 1 + value.denom().bits();
+    ((value.numer() << shift) / value.denom(), -(shift as i64))
 }
 
 impl From<i64> for Rational {
@@ -154,9 +225,15 @@ impl From<i64> for Rational {
     }
 }
 
+/// `p/q`; a decimal where the fraction outgrew its limit.
 impl fmt::Display for Rational {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.widened().fmt(formatter)
+        match &self.0 {
+            Repr::Small(p, 1) => p.fmt(formatter),
+            Repr::Small(p, q) => write!(formatter, "{p}/{q}"),
+            Repr::Big(value) => value.fmt(formatter),
+            Repr::Float(_) => write!(formatter, "{:e}", self.to_f64()),
+        }
     }
 }
 
@@ -250,5 +327,22 @@ mod tests {
         let least = Rational::from(i64::MIN);
         assert_eq!(least.negated().negated(), least);
         assert_eq!(least.inverse().inverse(), least);
+    }
+
+    /// (2/3)^600 through floats, and back.
+    #[test]
+    fn what_outgrows_its_limit_goes_on_with_256_bits() {
+        let third = Rational::small(2, 3);
+        let mut power = Rational::ONE;
+        (0..600).for_each(|_| power = power.times(&third));
+        assert!(power.is_float());
+        assert!((power.to_f64() / (2.0_f64 / 3.0).powi(600) - 1.0).abs() < 1e-12);
+        (0..600).for_each(|_| power = power.times(&third.inverse()));
+        let error = power.plus(&Rational::from(-1));
+        assert!(error.magnitude() < 1e-70, "{error}");
+        let inverse = power.plus(&Rational::ONE).inverse().plus(&Rational::small(-1, 2));
+        assert!(inverse.magnitude() < 1e-70, "{inverse}");
+        assert_eq!(power.plus(&power.negated()), Rational::ZERO);
+        assert_eq!(Rational::ONE.plus(&power.negated()).to_f64(), -error.to_f64());
     }
 }
