@@ -282,38 +282,6 @@ fn a_contradiction_names_what_is_needed_for_it() {
     assert_eq!(error.code(), "automaton.contradiction");
 }
 
-/// Every stated constraint of a contradiction is needed: without it the others have a solution.
-#[test]
-fn contradictions_are_irreducible() {
-    for turned in [false, true] {
-        let mut model = quad(3, turned);
-        let curve = quadratic(0.25);
-        model.states[1].transitions[0].operator =
-            given(&tensor(&curve[0], &curve[0])[..6].iter().map(|row| row[..6].to_vec()).collect::<Vec<_>>());
-        // Corner 2 of the face pulls three times as strongly as the vertex allows.
-        model.states[0].transitions[2].operator.rows[8][8] = Entry::Number(0.8);
-        model.states[2].transitions[0].operator.rows[0][0] = Entry::Number(9.0 / 16.0);
-        let Err(error) = solve(&model) else { panic!("consistent") };
-        let found = words(&error);
-        let stated: Vec<usize> = found.iter().filter_map(|(place, _)| place.strip_prefix("/adjacencies/")?.parse().ok()).collect();
-        for index in stated {
-            let mut without = model.clone();
-            // Only the constraints of the set, so that another contradiction does not hide the effect.
-            without.adjacencies =
-                keep(&without.adjacencies, |k| k != index && found.iter().any(|(place, _)| *place == format!("/adjacencies/{k}")));
-            without.incidences =
-                keep(&without.incidences, |k| found.iter().any(|(place, _)| place.starts_with(&format!("/incidences/{k}/"))));
-            if without.incidences.iter().zip(&model.incidences).all(|(a, b)| a == b) {
-                assert!(solve(&without).is_ok(), "{index} of {found:?}");
-            }
-        }
-    }
-}
-
-fn keep<T: Clone>(list: &[T], wanted: impl Fn(usize) -> bool) -> Vec<T> {
-    list.iter().enumerate().filter(|(k, _)| wanted(*k)).map(|(_, item)| item.clone()).collect()
-}
-
 /// The end vertex of a curve that is given is the fixed point of its first operator: (1/2, 1/2, 0) for Chaikin's curve,
 /// (1/6, 2/3, 1/6, 0) for the cubic spline.
 #[test]
@@ -486,6 +454,26 @@ fn the_jacobian_tells_the_local_degrees_of_freedom() {
     let chosen = model.solve(&names.collect(), &CancelToken::new()).unwrap();
     assert_eq!(chosen.degrees_of_freedom(), 6);
     assert!(chosen.parameters.iter().all(|parameter| parameter.value == 0.25) && chosen.residual < 1e-12);
+}
+
+/// Everything of a curve with point ends is unknown, embeddings too. For independent ends b_0, b_1 (2 choices each) the rest is linear
+/// and leaves the 6 of MATH.md 2, so 10 together.
+#[test]
+fn unknown_embeddings_and_operators_are_solved_together() {
+    let mut model = curve(3, 1);
+    model.states[0].boundaries.iter_mut().for_each(|boundary| boundary.incidence = unknown(3, 1));
+    let solution = solve(&model).unwrap();
+    assert_eq!(solution.degrees_of_freedom(), 10);
+    assert!(matches!(solution.method, Method::Local { rank: 6, .. }), "{:?}", solution.method);
+    assert!(solution.residual < 1e-12, "{}", solution.residual);
+    // Once the ends are chosen the rest is linear; what is free stays where it is put.
+    let ends = [("edge.boundary0", [1.0, 0.0]), ("edge.boundary1", [0.25, 0.25])];
+    let values: BTreeMap<String, f64> =
+        ends.iter().flat_map(|(name, rows)| rows.iter().enumerate().map(move |(k, &value)| (format!("{name}[{k}][0]"), value))).collect();
+    let chosen = model.solve(&values, &CancelToken::new()).unwrap();
+    assert_eq!(chosen.degrees_of_freedom(), 10);
+    assert!(chosen.residual < 1e-12 && chosen.contraction.unwrap()[1] < 1.0);
+    assert_eq!(numbers(&chosen.model.states[0].boundaries[1].incidence), vec![vec![0.25], vec![0.25], vec![0.5]]);
 }
 
 #[test]

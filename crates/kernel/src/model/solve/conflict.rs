@@ -86,7 +86,7 @@ mod tests {
         let mut model = blank.solve(&values, &CancelToken::new()).expect("the parameters are free").model;
         let mut given = Vec::new();
         for entry in model.states.iter_mut().flat_map(|state| &mut state.transitions).flat_map(|t| t.operator.rows.iter_mut().flatten()) {
-            let keep = *entry != Entry::Number(0.0) && next(&mut bits).is_multiple_of(3);
+            let keep = *entry != Entry::Number(0.0) && next(&mut bits).is_multiple_of(4);
             if !keep {
                 *entry = Entry::Unknown;
             } else if let Entry::Number(value) = entry {
@@ -117,6 +117,6 @@ mod tests {
             contradictory += 1;
             sizes.push(set.len());
         }
-        assert!(contradictory > 50 && sizes.iter().filter(|&&size| size > 2).count() > 10, "{contradictory} {sizes:?}");
+        assert!(contradictory > 50 && sizes.iter().filter(|&&size| size > 2).count() > 5, "{contradictory} {sizes:?}");
     }
 }

@@ -131,9 +131,9 @@ impl Echelon {
     pub(super) fn insert(&mut self, mut row: Row, tolerance: f64, cancel: &CancelToken) -> Result<Inserted, SolveError> {
         while let Some((unknown, factor)) = row.terms.last().cloned() {
             let Some(pivot) = &self.rows[unknown as usize] else { break };
-            self.work += (pivot.size() + row.terms.len() as u64) * factor.size();
+            let work = (pivot.size() + row.terms.len() as u64) * factor.size();
             row.subtract(&factor, pivot, self.rounding);
-            self.charge(cancel)?;
+            self.charge(work, cancel)?;
         }
         let Some((unknown, factor)) = row.terms.last().cloned() else {
             return Ok(match row.constant.magnitude() {
@@ -165,12 +165,14 @@ impl Echelon {
                 }
             }
             self.rows[index] = Some(row);
-            self.charge(cancel)?;
+            self.charge(1, cancel)?;
         }
         Ok(())
     }
 
-    fn charge(&self, cancel: &CancelToken) -> Result<(), SolveError> {
+    /// Counts work.
+    pub(super) fn charge(&mut self, work: u64, cancel: &CancelToken) -> Result<(), SolveError> {
+        self.work += work;
         cancel.check()?;
         if self.work > WORK {
             return Err(SolveError::Limit { what: "operations of the elimination", asked: self.work, allowed: WORK });

@@ -23,6 +23,8 @@ const STARTS: usize = 12;
 const STEPS: usize = 200;
 /// Unknowns that products may join: the work of a step grows with the cube.
 const COUPLED: usize = 400;
+/// Work allowed for all starts, in multiplications: seconds.
+const WORK: f64 = 5e9;
 /// An equation holds if it leaves no more than this share of its largest term (at least 1).
 const SOLVED: f64 = 1e-12;
 /// A column of the Jacobian depends on others if it leaves no more than this share of the largest.
@@ -89,7 +91,7 @@ impl Problem {
     /// Levenberg's method with the damping |F|^2, which keeps quadratic convergence where the solutions are not isolated
     /// (Yamashita and Fukushima, "On the rate of convergence of the Levenberg-Marquardt method", Computing Suppl. 15,
     /// 2001). Returns the largest residual that is left.
-    fn descend(&self, values: &mut Vec<f64>, cancel: &CancelToken) -> Result<f64, SolveError> {
+    fn descend(&self, values: &mut Vec<f64>, work: &mut f64, cancel: &CancelToken) -> Result<f64, SolveError> {
         let square = |residuals: &[f64]| residuals.iter().map(|value| value * value).sum::<f64>();
         let mut residuals = self.residuals(values);
         let mut factor = 1.0;
@@ -97,8 +99,9 @@ impl Problem {
             cancel.check()?;
             let error = square(&residuals);
             let largest = residuals.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            *work += self.step_work();
             // Beyond the tolerance, until rounding stops it.
-            if largest <= 1e-3 * SOLVED || !error.is_finite() {
+            if *work > WORK || largest <= 1e-3 * SOLVED || !error.is_finite() {
                 break;
             }
             let Some(step) = self.step(values, &residuals, factor * error.min(1.0)) else {
@@ -120,6 +123,12 @@ impl Problem {
             }
         }
         Ok(residuals.iter().fold(0.0, |largest, value| if value.is_finite() { value.abs().max(largest) } else { f64::INFINITY }))
+    }
+
+    /// Multiplications of a step, about: the factorisation, and derivatives of all terms.
+    fn step_work(&self) -> f64 {
+        let terms: usize = self.equations.iter().map(Vec::len).sum();
+        (self.coupled.len() as f64).powi(3) / 3.0 + 50.0 * terms as f64
     }
 
     /// -(J^T J + damping)^-1 J^T F.
@@ -161,8 +170,10 @@ pub(super) fn find(
     let problem = Problem::new(knowledge)?;
     let centre = choose::smallest(system, &problem.forms, fixed, cancel)?;
     let mut first: Option<Found> = None;
-    let mut best = f64::INFINITY;
-    for start in 0..STARTS {
+    let (mut best, mut work, mut starts) = (f64::INFINITY, 0.0, 0);
+    while starts < STARTS && work <= WORK {
+        let start = starts;
+        starts += 1;
         let mut values = centre.clone();
         // Spread evenly by multiples of irrational numbers, wider from start to start.
         let spread = 0.25 * start as f64;
@@ -171,7 +182,7 @@ pub(super) fn find(
             values[unknown as usize] += spread * (2.0 * turn - 1.0);
         }
         choose::complete(&problem.forms, &mut values);
-        let residual = problem.descend(&mut values, cancel)?;
+        let residual = problem.descend(&mut values, &mut work, cancel)?;
         best = best.min(residual);
         if residual <= SOLVED {
             let mut held = fixed.clone();
@@ -179,14 +190,14 @@ pub(super) fn find(
             let point = choose::point(model, system, &problem.forms, &held, cancel)?;
             let enough = point.contraction.is_none() || point.contracts();
             if enough || first.is_none() {
-                first = Some(Found { point, starts: start + 1 });
+                first = Some(Found { point, starts });
             }
             if enough {
                 break;
             }
         }
     }
-    first.ok_or(SolveError::NotFound { best_residual: best, starts: STARTS })
+    first.ok_or(SolveError::NotFound { best_residual: best, starts })
 }
 
 /// Local structure of the solutions.

@@ -31,11 +31,11 @@ impl Knowledge {
     pub(super) fn of(system: &System, constraints: &[usize], cancel: &CancelToken) -> Result<Result<Self, Support>, SolveError> {
         let mut knowledge = Self { echelon: Echelon::new(system.unknowns.len(), system.rounding), pending: Vec::new() };
         let mut linear = Vec::new();
-        let mut terms = 0;
+        let mut work = 0;
         for &index in constraints {
             cancel.check()?;
             let constraint = &system.constraints[index];
-            for equation in system.equations(constraint, &mut terms)? {
+            for equation in system.equations(constraint, &mut work)? {
                 if equation.degree() > 1 {
                     knowledge.pending.push(Pending { equation, support: Support::of(index), tolerance: constraint.tolerance });
                 } else if equation.terms() > 0 {
@@ -78,7 +78,7 @@ impl Knowledge {
             let images: Vec<Option<Polynomial>> = (0..self.echelon.unknowns()).map(|unknown| self.image(unknown as u32)).collect();
             let mut progress = false;
             for mut pending in std::mem::take(&mut self.pending) {
-                cancel.check()?;
+                self.echelon.charge(pending.equation.terms() as u64, cancel)?;
                 let known: Vec<u32> = pending.equation.unknowns().filter(|&unknown| images[unknown as usize].is_some()).collect();
                 if !known.is_empty() {
                     let most = 64 + 4 * pending.equation.terms();

@@ -94,12 +94,12 @@ pub(super) struct System {
     pub(super) rounding: f64,
 }
 
-/// Terms that the equations may have together.
-const TERMS: u64 = 4_000_000;
+/// Multiplications of terms that the equations may take together: seconds.
+const PRODUCTS: u64 = 20_000_000;
 
 impl System {
-    /// The scalar equations "polynomial = 0" of a constraint; `terms` counts what all constraints need.
-    pub(super) fn equations(&self, constraint: &Constraint, terms: &mut u64) -> Result<Vec<Polynomial>, SolveError> {
+    /// The scalar equations "polynomial = 0" of a constraint; `work` counts what all constraints need.
+    pub(super) fn equations(&self, constraint: &Constraint, work: &mut u64) -> Result<Vec<Polynomial>, SolveError> {
         match &constraint.equations {
             Equations::Value(unknown, value) => {
                 let mut equation = Polynomial::unknown(*unknown);
@@ -116,7 +116,7 @@ impl System {
                 Ok((0..array.columns).map(sum).collect())
             }
             Equations::Equal { left, right, permutation } => {
-                let (left, right) = (self.product(left, terms)?, self.product(right, terms)?);
+                let (left, right) = (self.product(left, work)?, self.product(right, work)?);
                 let mut equations = Vec::with_capacity(left.entries.len());
                 for row in 0..left.rows {
                     for column in 0..left.columns {
@@ -132,7 +132,7 @@ impl System {
     }
 
     /// From the right: the last factor has the fewest columns.
-    fn product(&self, factors: &[usize], terms: &mut u64) -> Result<Product, SolveError> {
+    fn product(&self, factors: &[usize], work: &mut u64) -> Result<Product, SolveError> {
         let array = |index: usize| &self.arrays[factors[index]];
         let last = array(factors.len() - 1);
         let entries = (0..last.rows).flat_map(|row| (0..last.columns).map(move |column| last.entry(row, column))).collect();
@@ -143,19 +143,20 @@ impl System {
             for row in 0..factor.rows {
                 for column in 0..product.columns {
                     let mut sum = Polynomial::default();
+                    *work += factor.columns as u64 / 16;
                     for inner in 0..factor.columns {
                         let right = &product.entries[inner * product.columns + column];
                         if right.terms() > 0 {
+                            *work += right.terms() as u64;
                             match &factor.cells[row * factor.columns + inner] {
-                                Cell::Number(value) if value.is_zero() => {}
+                                Cell::Number(value) if value.is_zero() => *work -= right.terms() as u64,
                                 Cell::Number(value) => sum.add_scaled(right, value),
                                 Cell::Unknown(unknown) => sum.add_product(&Polynomial::unknown(*unknown), right),
                             }
                         }
                     }
-                    *terms += sum.terms() as u64;
-                    if *terms > TERMS {
-                        return Err(SolveError::Limit { what: "terms of the constraints", asked: *terms, allowed: TERMS });
+                    if *work > PRODUCTS {
+                        return Err(SolveError::Limit { what: "multiplications of the constraints", asked: *work, allowed: PRODUCTS });
                     }
                     entries.push(sum);
                 }
