@@ -1,6 +1,6 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
-use lacuna_kernel::attractor::Attractor;
+use lacuna_kernel::attractor::{Attractor, CellComplex};
 use lacuna_kernel::dilation::Dilation;
 use lacuna_kernel::measure::AxisBox;
 use lacuna_kernel::measure::mass::{area, dilated_area, dilated_volume, mesh_measures, volume};
@@ -78,6 +78,9 @@ pub struct Certificate {
     /// Edges with one triangle.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub boundary_edges: Option<u64>,
+    /// Closed curves that the edges with one triangle form.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub boundary_loops: Option<u64>,
     /// Edges with three triangles or more.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub nonmanifold_edges: Option<u64>,
@@ -186,14 +189,21 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
     certificate
 }
 
-/// What is proven of an evaluation.
+/// What is proven of an evaluation. Counts of its topology are those of the shape's own cells, when all of it has a
+/// B-rep.
 pub(crate) fn of_evaluation(attractor: &Attractor, tessellation: &Tessellation, bounds: &AxisBox, tolerance: Tolerance) -> Certificate {
+    let whole = |complex: &&CellComplex| complex.drawn_vertices() == tessellation.vertices.len() as u64;
+    let complex = tessellation.complex.as_ref().filter(whole);
     Certificate {
         achieved_bound_mm: tessellation.deviation_mm + bounds.single_precision(),
         leaf_cells: tessellation.leaf_cells,
         vertices: tessellation.vertices.len() as u64,
-        edges: tessellation.segments.len() as u64,
+        edges: complex.map_or(tessellation.segments.len() as u64, CellComplex::drawn_edges),
         triangles: tessellation.triangles.len() as u64,
+        components: complex.map(|complex| complex.components),
+        euler: complex.map(|complex| complex.euler),
+        boundary_edges: complex.map(|complex| complex.boundary_edges),
+        boundary_loops: complex.map(|complex| complex.boundary_loops),
         bbox_mm: corners(bounds),
         ..start(attractor, tolerance)
     }

@@ -1,5 +1,6 @@
 //! Points, wires and triangles sampled from an attractor, with the bound they reach.
 
+use crate::attractor::CellComplex;
 use glam::DVec3;
 
 /// What an evaluation produced: a set within `deviation_mm` of the shape, in both directions.
@@ -17,4 +18,6 @@ pub struct Tessellation {
     pub deviation_mm: f64,
     /// Leaf cells evaluated.
     pub leaf_cells: u64,
+    /// The cells behind it, when the shape has a B-rep: its vertices are the first ones here.
+    pub complex: Option<CellComplex>,
 }

@@ -248,6 +248,8 @@ impl Attractor {
                 let margin = self.bound(cell.state).margin();
                 if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord }
             }
+            // Points of the cell, and segments between them, are in the ball too.
+            LeafPrimitive::Star(_) => 2.0 * cell.ball.radius,
             // Corners belong to the surface and every point of the polygon and of the cell is within the ball:
             // no two points of them are farther apart than its diameter.
             LeafPrimitive::Polygon(_) => 2.0 * cell.ball.radius,
@@ -269,6 +271,15 @@ impl Attractor {
             },
             LeafPrimitive::Chord(ends) => {
                 sink(Site::Segment([self.barycentric(points, &ends.start, rational), self.barycentric(points, &ends.end, rational)]));
+            }
+            LeafPrimitive::Star(ends) => {
+                let first = self.barycentric(points, &ends[0], rational);
+                for end in &ends[1..] {
+                    sink(Site::Segment([first, self.barycentric(points, end, rational)]));
+                }
+                if ends.len() == 1 {
+                    sink(Site::Point(first));
+                }
             }
             LeafPrimitive::Polygon(corners) => {
                 let first = self.barycentric(points, &corners[0], rational);
@@ -293,7 +304,7 @@ impl Attractor {
         }
     }
 
-    fn barycentric(&self, points: &[ControlPoint], weights: &[f64], rational: bool) -> Point {
+    pub(super) fn barycentric(&self, points: &[ControlPoint], weights: &[f64], rational: bool) -> Point {
         let mut sum = [0.0; 4];
         for (point, &weight) in points.iter().zip(weights) {
             for (total, &coordinate) in sum.iter_mut().zip(point) {

@@ -3,16 +3,20 @@
 
 mod bound;
 pub mod cell;
+mod complex;
 mod cover;
 mod defect;
 mod refine;
 pub(crate) mod sites;
 
+use crate::automaton::topology::{Topology, TopologyError};
 use crate::automaton::{Automaton, AutomatonError, Contraction, StateId, convergence};
 use crate::error::Kind;
 pub use bound::StateBound;
+pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::PointCover;
 pub use refine::{RefineError, count_cells, refine};
+use std::sync::Arc;
 
 /// Where a shape begins: a state and its control points.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +59,10 @@ pub struct Attractor {
     covers: Vec<Option<PointCover>>,
     contraction: Contraction,
     warnings: Vec<String>,
+    /// The B-rep and where it begins, when the states have one.
+    brep: Option<(Arc<Topology>, complex::Start)>,
+    /// Largest distance between control points of glued boundaries, in mm.
+    seam_mm: f64,
 }
 
 /// Why an automaton has no attractor that can be evaluated.
@@ -181,9 +189,21 @@ impl Attractor {
         }
         defect::measure_drawings(&mut automaton, &bounds);
         let covers = cover::covers(&automaton, &bounds, &contraction);
-        let attractor = Self { automaton, roots, solids, bounds, covers, contraction, warnings };
+        let attractor = Self { automaton, roots, solids, bounds, covers, contraction, warnings, brep: None, seam_mm: 0.0 };
         attractor.check_roots()?;
         Ok(attractor)
+    }
+
+    /// Gives the attractor its B-rep: the topology of its states, and which boundaries of roots are one. `seam_mm`
+    /// bounds the distance between control points that gluing takes for equal.
+    ///
+    /// # Errors
+    /// [`TopologyError`] when a gluing contradicts the boundaries' subdivision.
+    pub fn with_topology(mut self, mut topology: Topology, gluings: &[Gluing], seam_mm: f64) -> Result<Self, TopologyError> {
+        let start = complex::Start::new(&mut topology, &self.automaton, &self.roots, gluings)?;
+        self.brep = Some((Arc::new(topology), start));
+        self.seam_mm = seam_mm;
+        Ok(self)
     }
 
     fn check_roots(&self) -> Result<(), AttractorError> {

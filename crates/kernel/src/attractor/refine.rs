@@ -1,8 +1,8 @@
 //! Evaluation: cells refined, depth first and in address order, until what stands for each is within
 //! the tolerance.
 
-use super::Attractor;
 use super::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared};
+use super::{Attractor, complex};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::tessellation::Tessellation;
@@ -150,9 +150,9 @@ impl<'a> Walker<'a> {
 }
 
 /// Splits the roots into about [`TASKS`] cells, in address order.
-fn tasks(attractor: &Attractor, tolerance_mm: f64) -> Vec<(Cell, Vec<ControlPoint>, u32)> {
+fn tasks(attractor: &Attractor, indices: &[usize], tolerance_mm: f64) -> Vec<(Cell, Vec<ControlPoint>, u32)> {
     let roots = attractor.roots();
-    let mut level: Vec<_> = (0..roots.len()).map(|index| (attractor.root_cell(index), roots[index].points.clone(), 0)).collect();
+    let mut level: Vec<_> = indices.iter().map(|&index| (attractor.root_cell(index), roots[index].points.clone(), 0)).collect();
     for _ in 0..24 {
         if level.len() >= TASKS {
             break;
@@ -181,14 +181,17 @@ fn tasks(attractor: &Attractor, tolerance_mm: f64) -> Vec<(Cell, Vec<ControlPoin
 
 /// Refines every cell until what stands for it is within the tolerance, and draws it.
 ///
+/// Cells with a B-rep become one conforming complex; what is left is drawn cell by cell, in parallel.
 /// Cost: proportional to the number of leaf cells. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`RefineError`] when a limit is hit or somebody stops it.
 pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, RefineError> {
-    let total = AtomicU64::new(0);
+    let (with_brep, without): (Vec<usize>, Vec<usize>) = (0..attractor.roots().len()).partition(|&root| attractor.has_brep(root));
+    let mut whole = Part { tessellation: complex::refine(attractor, &with_brep, tolerance, budget)?, ..Part::default() };
+    let total = AtomicU64::new(whole.tessellation.leaf_cells);
     let tolerance_mm = tolerance.mm();
-    let parts: Vec<Result<Part, RefineError>> = tasks(attractor, tolerance_mm)
+    let parts: Vec<Result<Part, RefineError>> = tasks(attractor, &without, tolerance_mm)
         .par_iter()
         .with_max_len(1)
         .map(|(cell, points, depth)| {
@@ -200,7 +203,6 @@ pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> R
             Ok(part)
         })
         .collect();
-    let mut whole = Part::default();
     for part in parts {
         whole.append(part?);
     }
@@ -224,7 +226,8 @@ fn largest_coordinate(vertices: &[glam::DVec3]) -> f64 {
 /// As [`refine`].
 pub fn count_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<u64, RefineError> {
     let total = AtomicU64::new(0);
-    tasks(attractor, tolerance.mm())
+    let all: Vec<usize> = (0..attractor.roots().len()).collect();
+    tasks(attractor, &all, tolerance.mm())
         .par_iter()
         .with_max_len(1)
         .map(|(cell, points, depth)| {

@@ -4,6 +4,7 @@ mod connection;
 pub mod convergence;
 pub(crate) mod matrix;
 pub mod operator;
+pub mod topology;
 
 pub use connection::Ends;
 pub use convergence::Contraction;
@@ -62,6 +63,9 @@ pub enum LeafPrimitive {
     /// The segment between the two ends of a cell that is a curve from one to the other: the error is
     /// the largest distance of a control point from the segment.
     Chord(Ends),
+    /// Segments from the first of some points of the attractor to the others, for a connected cell that branches; one
+    /// point alone is a point.
+    Star(Vec<Vec<f64>>),
     /// The polygon of a face's corners (barycentric points), in order around the face.
     Polygon(Vec<Vec<f64>>),
     /// A compact drawn in the affine frame (o, o+e1, o+e2, o+e3) that the four control points hold.
@@ -185,8 +189,8 @@ impl Automaton {
     }
 
     /// Chooses chords for edges that are proven to be curves, and polygons for faces whose sides close.
-    pub(crate) fn connect(&mut self) {
-        connection::connect(self);
+    pub(crate) fn connect(&mut self, topology: &topology::Topology) {
+        connection::connect(self, topology);
     }
 
     /// Replaces what stands for a leaf cell of a state.

@@ -128,6 +128,12 @@ impl SubdivisionOperator {
         image
     }
 
+    /// The product `self * other`, n x the other's columns.
+    #[must_use]
+    pub fn times(&self, other: &Self) -> Self {
+        Self::exact(self.rows, (0..other.columns).flat_map(|column| self.apply(other.column(column))).collect())
+    }
+
     /// Whether no entry is negative (beyond rounding): such operators keep cells in the convex
     /// hull of their control points.
     #[must_use]

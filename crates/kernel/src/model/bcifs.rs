@@ -2,7 +2,8 @@
 
 use super::lower::Draft;
 use super::solve::{GLUE_ALLOWED, SolveError, permutation_of};
-use crate::attractor::Root;
+use crate::attractor::{Gluing, Root};
+use crate::automaton::topology::{Declared, Shared};
 use crate::automaton::{Boundary, LeafPrimitive, OperatorError, State, StateId, SubdivisionOperator, Transition};
 use crate::budget::CancelToken;
 use glam::DVec4;
@@ -184,8 +185,11 @@ impl Bcifs {
         reader.roots(draft);
         if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
             reader.constraints(&states, draft);
-            reader.glue(&states, first_root, draft);
+            reader.seams(&states, first_root, draft);
         }
+        draft.declared.resize(draft.states.len(), Declared::default());
+        draft.declared.extend(reader.declared());
+        reader.glue(&states, draft);
         for (index, state) in states.into_iter().enumerate() {
             draft.state_from(state, &format!("/states/{index}/transitions"));
         }
@@ -426,6 +430,62 @@ impl Reader<'_> {
         self.index.get(state).is_some_and(|&index| !self.reachable[index])
     }
 
+    /// What the model says of every state's subdivision.
+    fn declared(&self) -> Vec<Declared> {
+        let mut declared = vec![Declared::default(); self.model.states.len()];
+        for incidence in &self.model.incidences {
+            if let Some(&state) = self.index.get(incidence.state.as_str()) {
+                declared[state].incidences.push((incidence.boundary, incidence.children.clone()));
+            }
+        }
+        for adjacency in &self.model.adjacencies {
+            if let Some(&state) = self.index.get(adjacency.state.as_str()) {
+                let permutation = self.order(state, adjacency);
+                declared[state].adjacencies.push(Shared { between: adjacency.between, permutation });
+            }
+        }
+        declared
+    }
+
+    /// Control point j of the first boundary is control point `order[j]` of the second; `None` for the same order (or where
+    /// the constraint does not fit, which its check reports).
+    fn order(&self, state: usize, adjacency: &Adjacency) -> Option<Vec<usize>> {
+        let (child, boundary) = adjacency.between[0];
+        let target = *self.index.get(self.model.states[state].transitions.get(child)?.to.as_str())?;
+        self.order_of(target, boundary, adjacency.reversed, adjacency.permutation.as_deref())
+    }
+
+    fn order_of(&self, state: usize, boundary: usize, reversed: bool, permutation: Option<&[usize]>) -> Option<Vec<usize>> {
+        let edge = *self.index.get(self.model.states[state].boundaries.get(boundary)?.state.as_str())?;
+        permutation_of(reversed, permutation, self.model.states[edge].dimension).ok().flatten()
+    }
+
+    /// Which boundaries of root cells are one.
+    fn glue(&self, states: &[State], draft: &mut Draft) {
+        let first = draft.roots.len() - self.model.cells.len().min(draft.roots.len());
+        for glue in &self.model.glue {
+            let root = |(cell, _): (usize, usize)| self.model.cells.get(cell).and_then(|cell| self.index.get(cell.state.as_str()));
+            let permutation = root(glue.between[0])
+                .and_then(|&state| self.order_of(state, glue.between[0].1, glue.reversed, glue.permutation.as_deref()));
+            let between = glue.between.map(|(cell, boundary)| (first + cell, boundary));
+            let side = |(cell, boundary): (usize, usize)| {
+                let root: &Root = draft.roots.get(cell)?;
+                let state = states.get(root.state.index() - self.offset)?;
+                let incidence = &state.boundaries.get(boundary)?.incidence;
+                Some((0..incidence.columns()).map(|column| placed(root, incidence.column(column))).collect::<Vec<_>>())
+            };
+            if let (Some(left), Some(right)) = (side(between[0]), side(between[1])) {
+                let matched = |(j, point): (usize, &glam::DVec3)| {
+                    let other = permutation.as_ref().map_or(j, |order| order[j]);
+                    right.get(other).map_or(f64::INFINITY, |other| point.distance(*other))
+                };
+                let apart = left.iter().enumerate().map(matched).fold(0.0, f64::max);
+                draft.seam_mm = draft.seam_mm.max(apart);
+            }
+            draft.gluings.push(Gluing { between, permutation });
+        }
+    }
+
     /// Checks the stated incidences, adjacencies and relations; the residual is the largest difference of entries.
     fn constraints(&self, states: &[State], draft: &mut Draft) {
         for (index, incidence) in self.model.incidences.iter().enumerate().filter(|(_, incidence)| !self.ignores(&incidence.state)) {
@@ -472,7 +532,7 @@ impl Reader<'_> {
     }
 
     /// Checks that glued boundaries have the same control points: P_a b_m = P_b b_n, homogeneous.
-    fn glue(&self, states: &[State], first_root: usize, draft: &mut Draft) {
+    fn seams(&self, states: &[State], first_root: usize, draft: &mut Draft) {
         let size = extent(&draft.roots[first_root..]);
         for (index, glue) in self.model.glue.iter().enumerate() {
             let place = format!("/glue/{index}");
@@ -616,6 +676,12 @@ fn extent(roots: &[Root]) -> f64 {
     };
     let size = (0..3).map(range).fold(0.0, f64::max);
     if size > 0.0 && size.is_finite() { size } else { 1.0 }
+}
+
+/// The point of space with these barycentric coordinates in a root.
+fn placed(root: &Root, weights: &[f64]) -> glam::DVec3 {
+    let sum = root.points.iter().zip(weights).map(|(point, &weight)| weight * DVec4::from_array(*point)).sum::<DVec4>();
+    sum.truncate() / sum.w
 }
 
 /// The columns of a product of operators.

@@ -3,7 +3,7 @@
 use super::CellKind;
 use super::lower::Draft;
 use crate::attractor::Root;
-use crate::automaton::{Ends, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
+use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
 use glam::DVec3;
 
 /// A polynomial or rational Bezier curve of degree n - 1, n control points.
@@ -51,32 +51,29 @@ impl BezierCurve {
             })
             .collect();
         // Curves of one degree share their state.
-        let fresh = bezier_state(count, StateId::new(draft.states.len()));
-        let known = draft.states.iter().position(|state| state.name == fresh.name && state.dimension == count);
-        let state = known.map_or_else(|| draft.state(fresh), StateId::new);
+        let name = format!("bezier curve of degree {}", count - 1);
+        let known = draft.states.iter().position(|state| state.name == name && state.dimension == count);
+        let state = known.map_or_else(|| bezier_state(draft, name, count), StateId::new);
         draft.roots.push(Root { state, points, rational, solid: None });
     }
 }
 
 /// The state of a Bezier curve with n control points: de Casteljau's two halves. One point is a point, two
 /// are a segment.
-fn bezier_state(n: usize, own: StateId) -> State {
-    let unit = |at: usize| {
-        let mut point = vec![0.0; n];
-        point[at] = 1.0;
-        point
-    };
-    let leaf = if n <= 2 { LeafPrimitive::Simplex } else { LeafPrimitive::Chord(Ends { start: unit(0), end: unit(n - 1) }) };
+fn bezier_state(draft: &mut Draft, name: String, n: usize) -> StateId {
+    let unit = |at: usize| (0..n).map(|k| if k == at { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+    let boundaries = if n == 1 { Vec::new() } else { vec![draft.end_point(unit(0)), draft.end_point(unit(n - 1))] };
+    let own = StateId::new(draft.states.len());
     let subdivide = || halves(n).into_iter().enumerate().map(|(label, operator)| Transition { to: own, operator, label }).collect();
-    State {
-        name: format!("bezier curve of degree {}", n - 1),
+    draft.state(State {
+        name,
         kind: Some(if n == 1 { CellKind::Vertex } else { CellKind::Edge }),
         dimension: n,
         transitions: if n <= 2 { Vec::new() } else { subdivide() },
-        boundaries: Vec::new(),
-        leaf,
+        boundaries,
+        leaf: if n <= 2 { LeafPrimitive::Simplex } else { LeafPrimitive::Centre },
         frame: false,
-    }
+    })
 }
 
 /// De Casteljau at 1/2: column j of the left half holds binomial(j, k) / 2^j, the right half mirrors it.

@@ -2,8 +2,8 @@
 
 use super::CellKind;
 use super::lower::Draft;
-use crate::attractor::Root;
-use crate::automaton::{Ends, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
+use crate::attractor::{Gluing, Root};
+use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
 use glam::DVec3;
 
 /// The limit of the corner-cutting scheme (a, b) on a control polygon; a = b = 1/4 is Chaikin's,
@@ -49,6 +49,12 @@ impl CornerCutting {
         if !(a.is_finite() && b.is_finite()) || a.abs().max(b.abs()) > 1e6 || count < 3 {
             return;
         }
+        let sum = a + b;
+        let boundaries = if sum == 0.0 {
+            Vec::new()
+        } else {
+            vec![draft.end_point(vec![b / sum, a / sum, 0.0]), draft.end_point(vec![0.0, b / sum, a / sum])]
+        };
         let own = StateId::new(draft.states.len());
         let columns = [vec![1.0 - a, a, 0.0, b, 1.0 - b, 0.0, 0.0, 1.0 - a, a], vec![b, 1.0 - b, 0.0, 0.0, 1.0 - a, a, 0.0, b, 1.0 - b]];
         let transitions = columns
@@ -56,22 +62,22 @@ impl CornerCutting {
             .enumerate()
             .map(|(label, columns)| Transition { to: own, operator: SubdivisionOperator::exact(3, columns), label })
             .collect();
-        let sum = a + b;
-        let leaf = if sum == 0.0 {
-            LeafPrimitive::Centre
-        } else {
-            LeafPrimitive::Chord(Ends { start: vec![b / sum, a / sum, 0.0], end: vec![0.0, b / sum, a / sum] })
-        };
         draft.state(State {
             name: "corner cutting".into(),
             kind: Some(CellKind::Edge),
             dimension: 3,
             transitions,
-            boundaries: Vec::new(),
-            leaf,
+            boundaries,
+            leaf: LeafPrimitive::Centre,
             frame: false,
         });
-        for first in 0..if self.closed { count } else { count - 2 } {
+        let first_root = draft.roots.len();
+        let spans = if self.closed { count } else { count - 2 };
+        for span in 0..if sum == 0.0 { 0 } else { spans - usize::from(!self.closed) } {
+            let next = (span + 1) % spans;
+            draft.gluings.push(Gluing { between: [(first_root + span, 1), (first_root + next, 0)], permutation: None });
+        }
+        for first in 0..spans {
             let point = |k: usize| {
                 let p = self.control_points[(first + k) % count];
                 [p.x, p.y, p.z, 1.0]

@@ -1,9 +1,10 @@
 //! From shapes to one automaton: every family adds states and roots to a [`Draft`], which becomes an
 //! [`Attractor`] once.
 
-use super::{AffineMap, Model, Shape};
-use crate::attractor::{Attractor, AttractorError, Root, SolidSurface};
-use crate::automaton::{Automaton, State, StateId};
+use super::{AffineMap, CellKind, Model, Shape};
+use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
+use crate::automaton::topology::{Declared, Topology, TopologyError};
+use crate::automaton::{Automaton, Boundary, LeafPrimitive, State, StateId, SubdivisionOperator};
 
 /// Something about a model that its author should know: an error, or a warning.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,11 +38,20 @@ pub(super) struct Draft {
     pub(super) solids: Vec<SolidSurface>,
     pub(super) findings: Vec<Finding>,
     pub(super) constraint_residual: f64,
+    /// What the model says of the states' subdivision, by state; may be shorter than the states.
+    pub(super) declared: Vec<Declared>,
+    /// Boundaries of roots that are one.
+    pub(super) gluings: Vec<Gluing>,
+    /// Largest distance between control points of glued boundaries.
+    pub(super) seam_mm: f64,
     /// Where every state's transitions are listed in the model.
     origins: Vec<String>,
     /// Where the family that is being lowered stands in the model.
     pub(super) place: String,
 }
+
+/// Name of the state of single points.
+const POINT: &str = "point";
 
 impl Draft {
     /// Notes an error at `pointer` below the current place.
@@ -61,6 +71,31 @@ impl Draft {
         self.states.push(state);
         self.origins.push(String::new());
         StateId::new(self.states.len() - 1)
+    }
+
+    /// The state of single points: a vertex of one control point. Shared by all that need it.
+    pub(super) fn point_state(&mut self) -> StateId {
+        let known = self.states.iter().position(|state| state.name == POINT && state.leaf == LeafPrimitive::Simplex);
+        known.map_or_else(
+            || {
+                self.state(State {
+                    name: POINT.into(),
+                    kind: Some(CellKind::Vertex),
+                    dimension: 1,
+                    transitions: Vec::new(),
+                    boundaries: Vec::new(),
+                    leaf: LeafPrimitive::Simplex,
+                    frame: false,
+                })
+            },
+            StateId::new,
+        )
+    }
+
+    /// The boundary of a state that is one point of its barycentric space.
+    pub(super) fn end_point(&mut self, point: Vec<f64>) -> Boundary {
+        let state = self.point_state();
+        Boundary { state, incidence: SubdivisionOperator::exact(point.len(), point) }
     }
 
     /// Adds a state whose transitions are listed at `pointer` below the current place.
@@ -158,11 +193,25 @@ impl Model {
             Ok(automaton) => automaton,
             Err(error) => return Err(fail(draft.findings, &error.into())),
         };
-        automaton.connect();
+        let topology = match Topology::new(&automaton, &draft.declared) {
+            Ok(topology) => topology,
+            Err(error) => return Err(incoherent(draft.findings, &error)),
+        };
+        automaton.connect(&topology);
         let warnings = draft.findings.iter().map(|finding| finding.message.clone()).collect();
-        match Attractor::new(automaton, draft.roots, draft.solids, warnings) {
+        let attractor = match Attractor::new(automaton, draft.roots, draft.solids, warnings) {
+            Ok(attractor) => attractor,
+            Err(error) => return Err(fail(draft.findings, &error)),
+        };
+        match attractor.with_topology(topology, &draft.gluings, draft.seam_mm) {
             Ok(attractor) => Ok(Lowered { attractor, findings: draft.findings, constraint_residual: draft.constraint_residual }),
-            Err(error) => Err(fail(draft.findings, &error)),
+            Err(error) => Err(incoherent(draft.findings, &error)),
         }
     }
+}
+
+/// A B-rep that contradicts itself.
+fn incoherent(mut findings: Vec<Finding>, error: &TopologyError) -> Vec<Finding> {
+    findings.push(Finding { pointer: String::new(), code: error.code(), message: error.to_string(), warning: false });
+    findings
 }

@@ -1,0 +1,175 @@
+//! Where every vertex, edge and face of an evaluation comes from.
+
+use crate::automaton::StateId;
+use crate::automaton::topology::Topology;
+use std::fmt;
+use std::sync::Arc;
+
+/// One step from a cell to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Step {
+    /// To child i.
+    Child(usize),
+    /// To boundary m.
+    Boundary(usize),
+}
+
+/// How a cell is reached from a root. Text: the root, a colon, children as numbers and boundaries as `/m`:
+/// `0: 2 1 /3 0 /1` is boundary 1 of child 0 of boundary 3 of the root's descendant 2 1.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CellAddress {
+    /// The root.
+    pub root: usize,
+    /// The way.
+    pub steps: Vec<Step>,
+}
+
+impl fmt::Display for CellAddress {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}:", self.root)?;
+        for step in &self.steps {
+            match step {
+                Step::Child(index) => write!(formatter, " {index}")?,
+                Step::Boundary(index) => write!(formatter, " /{index}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where a cell was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Origin {
+    /// A cell of a root's closure, or the root itself.
+    Root { root: u32, cell: u32 },
+    /// Inside a face: which fresh cell of its split.
+    Face { node: u32, piece: u32 },
+    /// Inside an edge: which piece of its split.
+    Edge { edge: u32, piece: u32 },
+    /// The middle of a face.
+    Middle { node: u32 },
+}
+
+/// The cell complex behind a tessellation: counts, and the address of every vertex, edge and face.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CellComplex {
+    /// Leaf faces.
+    pub faces: u64,
+    /// Leaf edges, of faces and wires.
+    pub edges: u64,
+    /// Vertices of leaf edges.
+    pub vertices: u64,
+    /// Pieces connected through vertices.
+    pub components: u64,
+    /// Leaf edges with one face.
+    pub boundary_edges: u64,
+    /// Closed curves that these form.
+    pub boundary_loops: u64,
+    /// vertices - edges + faces.
+    pub euler: i64,
+    /// The B-rep of the states, and the state of every root.
+    pub(super) topology: Arc<Topology>,
+    pub(super) root_states: Vec<StateId>,
+    pub(super) nodes: Vec<(u32, u32)>,
+    pub(super) vertex_origins: Vec<Origin>,
+    pub(super) edge_origins: Vec<Origin>,
+    /// The node of every triangle.
+    pub(super) triangle_nodes: Vec<u32>,
+    /// The edge of every segment.
+    pub(super) segment_edges: Vec<u32>,
+}
+
+impl CellComplex {
+    /// Vertices of the tessellation that belong to the complex.
+    #[must_use]
+    pub fn drawn_vertices(&self) -> u64 {
+        self.vertex_origins.len() as u64
+    }
+
+    /// Edges of the tessellation: those of the cells, and those that fill faces which are not triangles.
+    #[must_use]
+    pub fn drawn_edges(&self) -> u64 {
+        // Filling a face changes no Euler number.
+        (self.vertex_origins.len() as i64 + self.triangle_nodes.len() as i64 - self.euler).unsigned_abs()
+    }
+
+    /// The address of a vertex of the tessellation; `None` beyond the complex.
+    #[must_use]
+    pub fn vertex_address(&self, vertex: usize) -> Option<CellAddress> {
+        self.origin_address(*self.vertex_origins.get(vertex)?)
+    }
+
+    /// The address of the edge that a segment of the tessellation stands for.
+    #[must_use]
+    pub fn segment_address(&self, segment: usize) -> Option<CellAddress> {
+        self.origin_address(self.edge_origins[*self.segment_edges.get(segment)? as usize])
+    }
+
+    /// The address of the face that a triangle of the tessellation belongs to.
+    #[must_use]
+    pub fn triangle_address(&self, triangle: usize) -> Option<CellAddress> {
+        Some(self.node_address(*self.triangle_nodes.get(triangle)?))
+    }
+
+    fn node_address(&self, node: u32) -> CellAddress {
+        let mut steps = Vec::new();
+        let mut current = self.nodes[node as usize];
+        while current.0 != super::NONE {
+            steps.push(Step::Child(current.1 as usize));
+            current = self.nodes[current.0 as usize];
+        }
+        steps.reverse();
+        CellAddress { root: current.1 as usize, steps }
+    }
+
+    fn origin_address(&self, origin: Origin) -> Option<CellAddress> {
+        let topology = &self.topology;
+        let child_of = |state: StateId, child: usize| topology.state(state).split.pieces[child].state;
+        let mut pieces = Vec::new();
+        let mut current = origin;
+        while let Origin::Edge { edge, piece } = current {
+            pieces.push(piece as usize);
+            current = self.edge_origins[edge as usize];
+        }
+        let boundary = |path: &[usize]| path.iter().map(|&index| Step::Boundary(index)).collect::<Vec<_>>();
+        let (mut address, mut state) = match current {
+            Origin::Middle { node } => return Some(self.node_address(node)),
+            Origin::Root { root, cell } => {
+                let state = self.root_states[root as usize];
+                let sub = topology.state(state).closure.cells.get(cell as usize);
+                let steps = sub.map_or_else(Vec::new, |sub| boundary(&sub.path));
+                (CellAddress { root: root as usize, steps }, sub.map_or(state, |sub| sub.state))
+            }
+            Origin::Face { node, piece } => {
+                let mut address = self.node_address(node);
+                let mut state = self.root_states[address.root];
+                for step in &address.steps {
+                    if let Step::Child(index) = step {
+                        state = child_of(state, *index);
+                    }
+                }
+                let (child, cell) = topology.state(state).split.origins[piece as usize];
+                let sub = &topology.state(child_of(state, child)).closure.cells[cell];
+                address.steps.push(Step::Child(child));
+                address.steps.extend(boundary(&sub.path));
+                (address, sub.state)
+            }
+            Origin::Edge { .. } => return None,
+        };
+        for piece in pieces.into_iter().rev() {
+            let split = &topology.state(state).split;
+            let (child, cell) = match piece.checked_sub(split.children.len()) {
+                None => (piece, None),
+                Some(fresh) => (split.origins[fresh].0, Some(split.origins[fresh].1)),
+            };
+            address.steps.push(Step::Child(child));
+            state = child_of(state, child);
+            if let Some(cell) = cell {
+                let sub = &topology.state(state).closure.cells[cell];
+                address.steps.extend(boundary(&sub.path));
+                state = sub.state;
+            }
+        }
+        Some(address)
+    }
+}
