@@ -260,7 +260,10 @@ fn a_boundary_seen_backwards_must_be_alike_backwards() {
     assert_eq!(agreed(&tessellation), (1, 1, 1));
     // Glue the patch's side 0 to a copy's side 0, turned round.
     let mut copy = bcifs.cells[0].clone();
-    copy.control_points.iter_mut().flatten().for_each(|point| point.x = 20.0 - point.x);
+    // Half a turn about the middle of the edge's points, so that they agree.
+    for point in copy.control_points.iter_mut().flatten() {
+        (point.x, point.y) = (20.0 - point.x, 10.0 - point.y);
+    }
     bcifs.cells.push(copy);
     bcifs.glue.push(Glue { between: [(0, 0), (1, 0)], reversed: true, permutation: None });
     let findings = Model { name: None, shape: Shape::Bcifs(bcifs) }.lower().expect_err("the edge is not symmetric");

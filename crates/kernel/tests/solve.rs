@@ -584,7 +584,11 @@ fn constraints_hold_for_every_choice_of_parameters() {
         // Measured by the lowering too, which knows nothing of the solver.
         match lower(&solution.model) {
             Ok(lowered) => assert!(lowered.constraint_residual < 1e-10),
-            Err(findings) => assert!(findings.iter().all(|f| f.warning || f.code.contains("contract")), "{findings:?}"),
+            // Random edges are not alike backwards and random operators may diverge; neither is a constraint.
+            Err(findings) => {
+                let other = |code: &str| !code.contains("contract") && code != "automaton.asymmetric-boundary";
+                assert!(findings.iter().all(|finding| finding.warning || !other(finding.code)), "{findings:?}");
+            }
         }
     }
 }
