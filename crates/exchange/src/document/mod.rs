@@ -7,6 +7,7 @@
 //! mathematics can tell: the kernel's business.
 
 mod bcifs;
+mod constraint;
 mod curve;
 mod grammar;
 mod ifs;

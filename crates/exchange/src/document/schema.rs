@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::grammar::{
     ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
-    Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
+    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
     reference,
 };
 
@@ -45,7 +45,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 12] = [
+    const PLAIN: [(&str, &Object); 14] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -54,6 +54,8 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Boundary", &BOUNDARY),
         ("Incidence", &INCIDENCE),
         ("Adjacency", &ADJACENCY),
+        ("Relation", &RELATION),
+        ("Side", &SIDE),
         ("RootCell", &ROOT_CELL),
         ("Glue", &GLUE),
         ("JobParams", &JOB_PARAMS),
