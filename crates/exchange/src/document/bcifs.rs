@@ -131,7 +131,8 @@ fn root_states<'p>(cells: &'p Node<'p>) -> Option<Vec<Option<&'p str>>> {
     Some(elements(cells)?.iter().map(|cell| member(cell, "state").and_then(Node::text)).collect())
 }
 
-fn parameters(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Vec<(String, f64)>> {
+/// Named numbers.
+pub(super) fn parameters(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Vec<(String, f64)>> {
     let Value::Object(entries) = &place.node.value else {
         return walker.wrong_type(&place, "an object of named numbers");
     };

@@ -448,6 +448,21 @@ pub(super) const JOB: Object = Object {
     ],
 };
 
+pub(super) const SOLVE: Object = Object {
+    title: "a solve request",
+    about: "A model with unknown entries, and the values chosen for what its constraints leave free. Exactly one of model and model_ref is given.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "values",
+            "Values of free parameters by their names; those that are absent keep the value that the solver chooses.",
+            || json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() }),
+        ),
+    ],
+};
+
 pub(super) const JOB_INPUT: Object = Object {
     title: "an input",
     about: "A named model. Exactly one of model and model_ref is given.",

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::grammar::{
     ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
-    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
+    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
     reference,
 };
 
@@ -76,6 +76,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
+    schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
     schemas.push(("Job".into(), job()));
     schemas.sort_by(|(one, _), (other, _)| one.cmp(other));
     schemas

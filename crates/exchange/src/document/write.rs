@@ -28,6 +28,12 @@ pub fn write_model_indented(model: &Model) -> String {
     text(&Wire(model), true)
 }
 
+/// The canonical document of a model as a value, to stand in another one.
+#[must_use]
+pub fn model_value(model: &Model) -> impl Serialize + '_ {
+    Wire(model)
+}
+
 /// The canonical document of a job, models in full and limits complete: what `input_digest` hashes.
 #[must_use]
 pub fn write_job(job: &Job) -> String {
