@@ -75,6 +75,17 @@ fn a_member_that_no_certificate_has_fails() {
 }
 
 #[test]
+fn a_wrong_solution_is_noticed() {
+    let corner_cutting = "bcifs/free_corner_cutting";
+    assert_fails(&altered(corner_cutting, "degrees_of_freedom = 2", "degrees_of_freedom = 3"), "degrees_of_freedom");
+    assert_fails(&altered(corner_cutting, "value = 0.625", "value = 0.626"), "operator/0/0");
+    assert_fails(&altered(corner_cutting, "constant = \"1\"", "constant = \"2\""), "constant");
+    assert_fails(&altered(corner_cutting, "{a = \"-1\"}", "{a = \"-1\", b = \"1\"}"), "coefficients");
+    assert_fails(&altered(corner_cutting, "a = 0.375", "c = 0.375"), "solve.unknown-name");
+    assert_fails(&altered("bcifs/free_contradiction", ", \"/shape/relations/1\"", ""), "refused.pointers");
+}
+
+#[test]
 fn an_expectation_that_cannot_be_read_fails() {
     assert_fails(&altered("meshes/point", "genus = 0", "genus = "), "case");
     assert_fails(&altered("meshes/point", "[exact]", "[exactly]"), "exactly");
@@ -115,14 +126,14 @@ fn every_expectation_has_a_source() {
         assert!(expected.about.len() > 10, "{}", case.name);
         let sources = expected.scalar.values().flat_map(|s| [&s.source, &s.reason]);
         let sources = sources.chain(expected.exact_box.iter().flat_map(|b| [&b.source, &b.reason]));
-        for words in sources {
+        for words in sources.chain(expected.entry.values().map(|entry| &entry.source)) {
             assert!(words.len() >= 5, "{}: {words:?} is no source", case.name);
         }
         if !expected.exact.is_empty() {
             let source = expected.exact.get("source").and_then(toml::Value::as_str).unwrap_or("");
             assert!(source.len() >= 5, "{}: [exact] has no source", case.name);
         }
-        let stated = !expected.exact.is_empty() || !expected.scalar.is_empty() || expected.exact_box.is_some();
+        let stated = !expected.exact.is_empty() || !expected.scalar.is_empty() || expected.exact_box.is_some() || !expected.entry.is_empty();
         assert_ne!(stated, expected.refused.is_some(), "{} states a result or a refusal", case.name);
     }
 }
