@@ -168,7 +168,13 @@ mod tests {
         assert!(read(entry).is_ok());
         assert!(read(&format!("[values]\na = 0.25\n{entry}")).is_ok());
         assert!(read("[refused]\ncode = \"c\"\npointers = [\"/shape\"]").is_ok());
-        for bad in ["", "[values]\na = 1", "[entry.x]\nvalue = 1", "tolerance_mm = 1\n[exact]\nsource = \"s\"", "radius_mm = 1\n[refused]\ncode = \"c\""] {
+        for bad in [
+            "",
+            "[values]\na = 1",
+            "[entry.x]\nvalue = 1",
+            "tolerance_mm = 1\n[exact]\nsource = \"s\"",
+            "radius_mm = 1\n[refused]\ncode = \"c\"",
+        ] {
             assert!(read(bad).is_err(), "{bad}");
         }
         assert!(Manifest::read(&format!("{HEAD}{entry}")).is_err());

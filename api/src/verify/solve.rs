@@ -72,7 +72,8 @@ fn entry_rows(pointer: &str, expected: &ExpectedEntry, found: Option<&Value>) ->
         rows.push(Row::verdict(&format!("{pointer} constant"), constant, &got, *constant == got));
     }
     if let Some(coefficients) = &expected.coefficients {
-        let got = found["coefficients"].as_object().map(|list| list.iter().map(|(name, number)| (name.clone(), fraction(number))).collect());
+        let got =
+            found["coefficients"].as_object().map(|list| list.iter().map(|(name, number)| (name.clone(), fraction(number))).collect());
         let same = got.as_ref() == Some(coefficients);
         rows.push(Row::verdict(&format!("{pointer} coefficients"), &format!("{coefficients:?}"), &format!("{got:?}"), same));
     }

@@ -289,13 +289,10 @@ pub fn validate(model: &Model, budget: &Budget) -> Validation {
             match freedom(&model.shape, budget) {
                 None => Validation { diagnostics, degrees_of_freedom: Some(0), ..Validation::default() },
                 Some(freedom) => Validation {
-                    valid: false,
-                    // why: what the solver says of the whole comes before what is said of each entry
-                    diagnostics: freedom.diagnostics.into_iter().chain(diagnostics).collect(),
+                    diagnostics: diagnostics.into_iter().chain(freedom.conflicts).collect(),
                     states: freedom.states,
                     degrees_of_freedom: freedom.degrees,
-                    constraint_residual: freedom.residual,
-                    spectral_radius: None,
+                    ..Validation::default()
                 },
             }
         }

@@ -1,6 +1,6 @@
 //! Unknown entries of a model, solved: the solution space as a document tells it, and the filled model.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::error::{Kind, LimitFacts};
@@ -156,7 +156,7 @@ pub fn solve(model: &Model, values: &BTreeMap<String, f64>, budget: &Budget) -> 
         let message = "only a model of the family \"bcifs\" has operators to solve; solve the parts of a group one by one".to_owned();
         return Err(JobError::new(Kind::Invalid, "solve.no-operators", message).into());
     };
-    let solution = bcifs.solve(values, &budget.cancel).map_err(|error| refusal(error))?;
+    let solution = bcifs.solve(values, &budget.cancel).map_err(refusal)?;
     let space = space(&solution)?;
     Ok(Solved { space, model: Model { name: model.name.clone(), shape: Shape::Bcifs(solution.model) } })
 }
@@ -177,15 +177,15 @@ impl From<SolveError> for JobError {
             SolveError::Invalid(findings) => Self::model(findings),
             SolveError::Contradiction { constraints } => {
                 let code = plain.code;
-                let diagnostic = |(pointer, message)| ModelDiagnostic { pointer, code, message, warning: false };
-                Self { diagnostics: constraints.into_iter().map(|c| diagnostic((c.pointer, c.words))).collect(), ..plain }
+                let diagnostics = constraints.into_iter();
+                let diagnostics = diagnostics.map(|c| ModelDiagnostic { pointer: c.pointer, code, message: c.words, warning: false });
+                Self { diagnostics: diagnostics.collect(), ..plain }
             }
             // why: counts are far below 2^53
             #[allow(clippy::cast_precision_loss)]
-            SolveError::Limit { asked, allowed, .. } => Self {
-                limit: Some(LimitFacts { limit: "solve", asked: asked as f64, allowed: allowed as f64, remedy: None }),
-                ..plain
-            },
+            SolveError::Limit { asked, allowed, .. } => {
+                Self { limit: Some(LimitFacts { limit: "solve", asked: asked as f64, allowed: allowed as f64, remedy: None }), ..plain }
+            }
             _ => plain,
         }
     }
@@ -213,11 +213,8 @@ fn space(solution: &Solution) -> Result<SolutionSpace, JobError> {
         declared: parameter.declared,
         pointer: format!("/shape{}", parameter.pointer),
     });
-    let determined = solution.determined.iter().map(|(name, stated, value)| DeterminedParameter {
-        name: name.clone(),
-        stated: *stated,
-        value: *value,
-    });
+    let determined =
+        solution.determined.iter().map(|(name, stated, value)| DeterminedParameter { name: name.clone(), stated: *stated, value: *value });
     let entries = solution.entries.iter().map(|entry| SolvedEntry {
         pointer: format!("/shape{}", entry.pointer),
         name: entry.name.clone(),
@@ -246,16 +243,14 @@ fn coefficients(form: &LinearForm, solution: &Solution) -> BTreeMap<String, Exac
 }
 
 /// What the unknowns of a model leave open, for [`crate::validate`].
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Freedom {
-    /// Number of independent choices; `None` if it could not be found.
+    /// Number of independent choices besides the declared parameters; `None` if it could not be found.
     pub(crate) degrees: Option<u64>,
-    /// Largest violation of a constraint in the filled model.
-    pub(crate) residual: f64,
     /// States of the parts with unknowns.
     pub(crate) states: u64,
-    /// What to tell.
-    pub(crate) diagnostics: Vec<ModelDiagnostic>,
+    /// Constraints that contradict each other, but for the first of each part: that one lowering has told.
+    pub(crate) conflicts: Vec<ModelDiagnostic>,
 }
 
 /// Degrees of freedom of the unknown entries of a shape, those of a group's parts added; `None` if none is unknown.
@@ -265,42 +260,30 @@ pub(crate) fn freedom(shape: &Shape, budget: &Budget) -> Option<Freedom> {
     if systems.is_empty() {
         return None;
     }
-    let mut freedom = Freedom { degrees: Some(0), ..Freedom::default() };
-    for (place, system, unknowns) in systems {
+    let mut freedom = Freedom { degrees: Some(0), states: 0, conflicts: Vec::new() };
+    for (place, system) in systems {
         freedom.states += system.states.len() as u64;
         match system.solve(&BTreeMap::new(), &budget.cancel) {
             Ok(solution) => {
-                freedom.degrees = freedom.degrees.map(|degrees| degrees + solution.degrees_of_freedom() as u64);
-                freedom.residual = freedom.residual.max(solution.residual);
-                freedom.diagnostics.push(ModelDiagnostic {
-                    pointer: format!("{place}/states"),
-                    code: "automaton.degrees-of-freedom",
-                    message: in_words(&solution, unknowns),
-                    warning: true,
-                });
+                let free = solution.parameters.iter().filter(|parameter| !parameter.declared).count() as u64;
+                freedom.degrees = freedom.degrees.map(|degrees| degrees + free);
             }
             Err(error) => {
                 freedom.degrees = None;
-                let error = JobError::from(error);
-                let told = |diagnostic: ModelDiagnostic| ModelDiagnostic { pointer: format!("{place}{}", diagnostic.pointer), ..diagnostic };
-                let whole = ModelDiagnostic { pointer: String::new(), code: error.code, message: error.message, warning: false };
-                let findings = if error.diagnostics.is_empty() { vec![whole] } else { error.diagnostics };
-                freedom.diagnostics.extend(findings.into_iter().map(told));
+                let placed = |d: ModelDiagnostic| ModelDiagnostic { pointer: format!("{place}{}", d.pointer), ..d };
+                if let SolveError::Contradiction { .. } = error {
+                    freedom.conflicts.extend(JobError::from(error).diagnostics.into_iter().skip(1).map(placed));
+                }
             }
         }
     }
     Some(freedom)
 }
 
-/// The systems that have unknowns: where they stand, and how many unknowns each has.
-fn unknown_systems<'m>(shape: &'m Shape, place: &str, systems: &mut Vec<(String, &'m Bcifs, usize)>) {
+/// The systems that have unknowns, and where they stand.
+fn unknown_systems<'m>(shape: &'m Shape, place: &str, systems: &mut Vec<(String, &'m Bcifs)>) {
     match shape {
-        Shape::Bcifs(bcifs) => {
-            let unknowns = unknowns(bcifs);
-            if unknowns > 0 {
-                systems.push((place.to_owned(), bcifs, unknowns));
-            }
-        }
+        Shape::Bcifs(bcifs) if has_unknowns(bcifs) => systems.push((place.to_owned(), bcifs)),
         Shape::Group(group) => {
             for (index, part) in group.parts.iter().enumerate() {
                 unknown_systems(&part.shape, &format!("{place}/parts/{index}/shape"), systems);
@@ -310,32 +293,9 @@ fn unknown_systems<'m>(shape: &'m Shape, place: &str, systems: &mut Vec<(String,
     }
 }
 
-fn unknowns(bcifs: &Bcifs) -> usize {
+fn has_unknowns(bcifs: &Bcifs) -> bool {
     let transitions = bcifs.states.iter().flat_map(|state| state.transitions.iter().map(|transition| &transition.operator));
     let boundaries = bcifs.states.iter().flat_map(|state| state.boundaries.iter().map(|boundary| &boundary.incidence));
-    let entries = transitions.chain(boundaries).flat_map(|matrix| matrix.rows.iter().flatten());
-    let points = bcifs.cells.iter().flat_map(|cell| &cell.control_points);
-    entries.filter(|entry| **entry == Entry::Unknown).count() + points.filter(|point| point.is_none()).count()
-}
-
-/// Names of free parameters that a sentence lists.
-const LISTED: usize = 8;
-
-fn in_words(solution: &Solution, unknowns: usize) -> String {
-    let subject = if unknowns == 1 { "1 entry or control point is".into() } else { format!("{unknowns} entries or control points are") };
-    let free: BTreeSet<&str> = solution.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-    let count = free.len();
-    let freedom = match count {
-        0 => "the constraints determine all of them".into(),
-        1 => "the constraints leave 1 degree of freedom".into(),
-        _ => format!("the constraints leave {count} degrees of freedom"),
-    };
-    let near = if solution.method == Method::Exact { "" } else { " near the solution that was found" };
-    let listed: Vec<&str> = solution.parameters.iter().take(LISTED).map(|parameter| parameter.name.as_str()).collect();
-    let names = match count {
-        0 => String::new(),
-        _ if count > LISTED => format!(": {}, ...", listed.join(", ")),
-        _ => format!(": {}", listed.join(", ")),
-    };
-    format!("{subject} unknown (null), and {freedom}{near}{names}; `lacuna solve` fills them in")
+    let mut entries = transitions.chain(boundaries).flat_map(|matrix| matrix.rows.iter().flatten());
+    entries.any(|entry| *entry == Entry::Unknown) || bcifs.cells.iter().any(|cell| cell.control_points.contains(&None))
 }

@@ -307,10 +307,7 @@ pub(super) const ADJACENCY: Object = Object {
 pub(super) const RELATION: Object = Object {
     title: "a relation",
     about: "Two products of a state's operators and embeddings that are equal.",
-    members: &[
-        required("state", "Name of the state.", text),
-        required("equal", "The two products.", || tuple(reference("Side"), 2)),
-    ],
+    members: &[required("state", "Name of the state.", text), required("equal", "The two products.", || tuple(reference("Side"), 2))],
 };
 
 pub(super) const SIDE: Object = Object {

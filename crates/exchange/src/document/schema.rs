@@ -8,8 +8,8 @@ use serde_json::{Map, Value, json};
 
 use super::grammar::{
     ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
-    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
-    reference,
+    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema,
+    matrix_schema, reference,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references

@@ -99,8 +99,7 @@ fn bcifs() -> impl Strategy<Value = Shape> {
         let child = || (0..CHILDREN, 0..BOUNDARIES);
         let placed = (option::weighted(0.8, point()), prop_oneof![Just(1.0), positive()])
             .prop_map(|(point, weight): (Option<DVec3>, f64)| -> Option<DVec4> { point.map(|point| point.extend(weight)) });
-        let cell = (0..STATES, vec(placed, 1..4))
-            .prop_map(|(state, control_points)| RootCell { state: state_name(state), control_points });
+        let cell = (0..STATES, vec(placed, 1..4)).prop_map(|(state, control_points)| RootCell { state: state_name(state), control_points });
         let incidence = (0..STATES, 0..BOUNDARIES, vec(child(), 0..3)).prop_map(|(state, boundary, children)| Incidence {
             state: state_name(state),
             boundary,
