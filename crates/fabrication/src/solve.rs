@@ -17,7 +17,7 @@ const TERMS: usize = 500_000;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 pub struct ExactNumber {
-    /// As a fraction in lowest terms, for example `-3/4`; without a denominator that is 1.
+    /// As a fraction in lowest terms, for example `-3/4`; a decimal where the fraction outgrew 256 bits.
     pub exact: String,
     /// The nearest double.
     pub value: f64,
