@@ -374,8 +374,7 @@ fn unknown_operators_are_solved_over_http() {
     // what comes out is a model: nothing is unknown, and it can be evaluated
     let report = service.post("/v1/validate", &space["model"]).json();
     assert_eq!((&report["valid"], &report["degrees_of_freedom"]), (&json!(true), &json!(0)), "{report}");
-    let evaluated =
-        service.done(&json!({ "lacuna": 1, "kind": "evaluate", "model": space["model"], "params": { "tolerance_mm": 0.1 } }));
+    let evaluated = service.done(&json!({ "lacuna": 1, "kind": "evaluate", "model": space["model"], "params": { "tolerance_mm": 0.1 } }));
     assert_eq!(evaluated["state"], "succeeded");
     // the same of a stored model
     let id = service.post("/v1/models", &model("bcifs/free_corner_cutting")).json()["id"].clone();
