@@ -4,7 +4,6 @@ use super::choose::Form;
 use super::polynomial::Polynomial;
 use super::rational::Rational;
 use super::{ConflictingConstraint, SolveError};
-use crate::budget::CancelToken;
 use std::collections::BTreeMap;
 
 /// An entry of a matrix.
