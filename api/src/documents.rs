@@ -1,13 +1,15 @@
 //! Documents at the doors: bytes to typed models and jobs, all findings as one problem, and the digest of
 //! what was meant.
 
+use std::collections::BTreeMap;
+
 use lacuna_exchange::diagnostic::{Diagnostic, code};
 use lacuna_exchange::document::{self, DocumentLimits};
 use lacuna_exchange::format::{FORMATS, Format};
-use lacuna_fabrication::{Job, JobKind};
-use lacuna_kernel::budget::Limits;
+use lacuna_fabrication::{Job, JobKind, SolutionSpace, Solved};
+use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::Model;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use utoipa::ToSchema;
 
 use crate::digest::Digest;
@@ -27,7 +29,7 @@ pub struct ValidationReport {
     /// Number of states of the automaton, once the document is legal.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub states: Option<u64>,
-    /// Degrees of freedom of the unknown operators; 0 when none is unknown.
+    /// Degrees of freedom of the unknown operators: 0 when none is unknown, absent when they could not be found.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub degrees_of_freedom: Option<u64>,
     /// Largest violation of a constraint.
@@ -106,6 +108,50 @@ pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Jo
     Ok(job)
 }
 
+/// Reads a request to solve a model, and fetches the model if it is stored.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_solve(bytes: &[u8], find: ModelFinder<'_>) -> Result<(Model, BTreeMap<String, f64>), Problem> {
+    let read = production::guarded(|| document::read_solve(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    let model = read.input.resolve(|id| find(id).and_then(|bytes| read_model(&bytes).ok()));
+    Ok((model.map_err(|diagnostic| refused(vec![diagnostic]))?, read.values))
+}
+
+/// A solved model: the solution space, and the model document for the chosen values.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct SolveReport {
+    /// All solutions.
+    #[serde(flatten)]
+    pub space: SolutionSpace,
+    /// The model for the chosen values, without unknowns, lengths in mm.
+    #[schema(value_type = crate::openapi::Model)]
+    #[serde(serialize_with = "as_document")]
+    pub model: Model,
+}
+
+fn as_document<S: Serializer>(model: &Model, serializer: S) -> Result<S::Ok, S::Error> {
+    document::model_value(model).serialize(serializer)
+}
+
+impl SolveReport {
+    /// What is told of a solved model.
+    ///
+    /// # Errors
+    /// When a number in it is not finite, which JSON cannot carry.
+    pub fn of(solved: Solved) -> Result<Self, Problem> {
+        let Solved { space, model } = solved;
+        match space.entries.iter().find(|entry| !entry.value.is_finite()) {
+            None if space.residual.is_finite() => Ok(Self { space, model }),
+            None => Err(Problem::internal("the residual of a solution is not finite")),
+            Some(entry) => {
+                let detail = format!("the entry {} has no finite value for the chosen parameters; choose smaller ones", entry.name);
+                Err(one_finding(&entry.pointer, "solve.not-finite", &detail))
+            }
+        }
+    }
+}
+
 /// What a job makes when it asks for no format: what printers read, and what carries wires.
 fn default_outputs(kind: JobKind) -> &'static [&'static str] {
     match kind {
@@ -146,11 +192,19 @@ pub fn model_document(model: &Model) -> String {
     document::write_model(model)
 }
 
-/// Reads and examines a model.
+/// The canonical document of a model for people: indented, with a line end.
+#[must_use]
+pub fn model_file(model: &Model) -> String {
+    let mut text = document::write_model_indented(model);
+    text.push('\n');
+    text
+}
+
+/// Reads and examines a model; the budget bounds the search for degrees of freedom.
 ///
 /// # Errors
 /// When the bytes are not a JSON text at all, or the kernel has a defect.
-pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
+pub fn validate(bytes: &[u8], budget: &Budget) -> Result<ValidationReport, Problem> {
     let model = match production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))? {
         Ok(model) => model,
         Err(diagnostics) if diagnostics.iter().any(is_about_the_text) => return Err(refused(diagnostics)),
@@ -161,7 +215,7 @@ pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
             return Ok(ValidationReport { valid: false, diagnostics, states, degrees_of_freedom, constraint_residual, spectral_radius });
         }
     };
-    let found = production::validate(&model)?;
+    let found = production::validate(&model, budget)?;
     let diagnostics = found.diagnostics.into_iter().map(|d| Remark {
         pointer: format!("/shape{}", d.pointer),
         code: d.code.to_owned(),
@@ -174,7 +228,7 @@ pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
         valid: found.valid,
         diagnostics: diagnostics.collect(),
         states: Some(found.states),
-        degrees_of_freedom: Some(found.degrees_of_freedom),
+        degrees_of_freedom: found.degrees_of_freedom,
         constraint_residual: Some(found.constraint_residual),
         spectral_radius: found.spectral_radius.map(|bounds| bounds.map(|bound| bound.is_finite().then_some(bound))),
     })

@@ -1,10 +1,11 @@
 //! From a legal job to finished files: what the service's workers and the command line share.
 
+use std::collections::BTreeMap;
 use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::{self, Format, FormatError, Metadata};
-use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, Validation};
+use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::model::Model;
@@ -67,8 +68,42 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, Problem> {
 ///
 /// # Errors
 /// When the kernel has a defect.
-pub fn validate(model: &Model) -> Result<Validation, Problem> {
-    guarded(|| lacuna_fabrication::validate(model))
+pub fn validate(model: &Model, budget: &Budget) -> Result<Validation, Problem> {
+    guarded(|| lacuna_fabrication::validate(model, budget))
+}
+
+/// Solves the unknown entries of a model for chosen values.
+///
+/// # Errors
+/// The kernel's refusal, with pointers into the model document, or into the request for a chosen value.
+pub fn solve(model: &Model, values: &BTreeMap<String, f64>, budget: &Budget) -> Result<Solved, SolveProblem> {
+    let solved = guarded(|| lacuna_fabrication::solve(model, values, budget))?;
+    solved.map_err(|refusal| match refusal {
+        SolveRefusal::Model(error) => SolveProblem::Model(why_stopped(budget).unwrap_or_else(|| error.into())),
+        SolveRefusal::Value { name, code, message } => SolveProblem::Value { name, code, message },
+    })
+}
+
+/// Why a model is not solved: which of the two that were sent is at fault.
+#[derive(Debug)]
+pub enum SolveProblem {
+    /// The model, with pointers into its document; or neither.
+    Model(Problem),
+    /// The value that was chosen under a name.
+    Value {
+        /// The name.
+        name: String,
+        /// Stable code.
+        code: &'static str,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+impl From<Problem> for SolveProblem {
+    fn from(problem: Problem) -> Self {
+        Self::Model(problem)
+    }
 }
 
 /// Why the budget's token was fired, if it was.

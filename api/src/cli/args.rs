@@ -60,6 +60,8 @@ pub(super) enum Command {
         /// The model document.
         model: PathBuf,
     },
+    /// Solve the unknown entries of a model; all solutions as JSON on stdout.
+    Solve(SolveArgs),
     /// Predict what a job costs; JSON on stdout.
     Plan {
         /// The job document.
@@ -171,6 +173,24 @@ pub(super) struct MeasureArgs {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct SolveArgs {
+    /// The model document, in which `null` is unknown.
+    pub(super) model: PathBuf,
+    /// File for the model without unknowns. `-` is stdout, and the solutions are then summed up on stderr.
+    #[arg(short, long = "output", value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Value of a free parameter; may be given several times.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = named_value)]
+    pub(super) values: Vec<(String, f64)>,
+    /// Print one JSON object with the solutions and the model, as `POST /v1/solve` answers.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Most time, in seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 300.0, help_heading = "Limits")]
+    pub(super) limit_seconds: f64,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct RunArgs {
     /// The job document.
     pub(super) job: PathBuf,
@@ -222,6 +242,15 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The value stands behind the last `=`: names may have one.
+fn named_value(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.rsplit_once('=').filter(|(name, _)| !name.is_empty()).ok_or("NAME=VALUE is expected, for example a=0.25")?;
+    match value.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok((name.to_owned(), value)),
+        _ => Err(format!("{value:?} is not a finite number")),
+    }
+}
+
 fn bytes(text: &str) -> Result<u64, String> {
     let (digits, shift) = match text.trim_end_matches(['b', 'B', 'i']) {
         text if text.ends_with(['k', 'K']) => (&text[..text.len() - 1], 10),
@@ -241,6 +270,15 @@ mod tests {
     #[test]
     fn the_grammar_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn named_values() {
+        assert_eq!(named_value("a=-0.25"), Ok(("a".to_owned(), -0.25)));
+        assert_eq!(named_value("b=c.0[1][2]=1e-3"), Ok(("b=c.0[1][2]".to_owned(), 1e-3)));
+        for bad in ["a", "=1", "a=", "a=nan", "a=inf", "a=1e999", "a=1/4", "a=0,25"] {
+            assert!(named_value(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -43,6 +43,7 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Measure(args) => work::measure(&args, manner),
         Command::Run(args) => work::run(&args, manner),
         Command::Validate { model } => study::validate(&model),
+        Command::Solve(args) => study::solve(&args, cli.quiet),
         Command::Plan { job } => study::plan(&job),
         Command::Inspect { file } => inspect::inspect(&file),
         Command::Verify(args) => study::verify(&args, cli.quiet),

@@ -1,17 +1,20 @@
 //! Commands that say something about a document, a job or a set of cases.
 
+use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use lacuna_fabrication::SolutionSpace;
 use lacuna_kernel::budget::Limits;
 
-use super::args::VerifyArgs;
-use super::{DOCUMENT_BYTES, print, print_json, read_input};
-use crate::documents::{self, Remark, Severity, ValidationReport};
-use crate::files;
+use super::args::{SolveArgs, VerifyArgs};
+use super::{DOCUMENT_BYTES, print, print_json, read_input, stop};
+use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
 use crate::problem::{Problem, ProblemKind};
-use crate::production::Engine;
-use crate::verify;
+use crate::production::{self, Engine, SolveProblem};
+use crate::routes::studies;
+use crate::{files, verify};
 
 /// Longest time for a prediction on the command line, where nobody else waits for it.
 const PLAN_TIME: Duration = Duration::from_secs(300);
@@ -19,7 +22,7 @@ const PLAN_TIME: Duration = Duration::from_secs(300);
 /// `lacuna validate`.
 pub(super) fn validate(model: &Path) -> Result<(), Problem> {
     let bytes = read_input(model, DOCUMENT_BYTES)?;
-    let report = match documents::validate(&bytes) {
+    let report = match studies::watched(PLAN_TIME, |budget| documents::validate(&bytes, budget)) {
         // What is no JSON is an invalid model as well, to whoever reads the report.
         Err(problem) if problem.kind == ProblemKind::MalformedJson => unreadable(&problem),
         other => other?,
@@ -51,12 +54,62 @@ fn unreadable(problem: &Problem) -> ValidationReport {
     }
 }
 
+/// `lacuna solve`.
+pub(super) fn solve(args: &SolveArgs, quiet: bool) -> Result<(), Problem> {
+    let usage = |detail: String| Problem::new(ProblemKind::Usage, detail);
+    let to_stdout = args.output.as_deref() == Some(Path::new("-"));
+    if to_stdout && args.json {
+        return Err(usage("--json prints the model too; name a file with -o, or leave one of them out".into()));
+    }
+    let mut values = BTreeMap::new();
+    for (name, value) in &args.values {
+        if values.insert(name.clone(), *value).is_some() {
+            return Err(usage(format!("--set gives two values to {name:?}")));
+        }
+    }
+    let model = documents::read_model(&read_input(&args.model, DOCUMENT_BYTES)?)?;
+    let time = Duration::try_from_secs_f64(args.limit_seconds).unwrap_or(Duration::MAX);
+    let solved = studies::watched(time, |budget| {
+        stop::on_signals(&budget.cancel)?;
+        production::solve(&model, &values, budget)
+    });
+    let solved = solved.map_err(|problem| match problem {
+        SolveProblem::Model(problem) => problem,
+        SolveProblem::Value { code, message, .. } => usage(message).code(code),
+    })?;
+    let report = SolveReport::of(solved)?;
+    let text = documents::model_file(&report.model);
+    if to_stdout {
+        print(text.as_bytes())?;
+    } else {
+        if let Some(path) = &args.output {
+            files::write_whole(path, text.as_bytes()).map_err(|error| Problem::io(path.display(), &error))?;
+        }
+        if args.json { print_json(&report)? } else { print_json(&report.space)? }
+    }
+    if to_stdout && !quiet {
+        sum_up(&report.space);
+    }
+    Ok(())
+}
+
+/// The solutions in a line on stderr, when the model takes stdout.
+fn sum_up(space: &SolutionSpace) {
+    const LISTED: usize = 8;
+    let listed: Vec<String> = space.parameters.iter().take(LISTED).map(|p| format!("{} = {}", p.name, p.value)).collect();
+    let more = if space.parameters.len() > LISTED { ", ..." } else { "" };
+    let parameters = if listed.is_empty() { String::new() } else { format!(": {}{more}", listed.join(", ")) };
+    let mut stderr = std::io::stderr().lock();
+    // With stderr gone there is nobody left to tell.
+    let _ = writeln!(stderr, "{} degrees of freedom{parameters}; residual {:e}", space.degrees_of_freedom, space.residual);
+}
+
 /// `lacuna plan`.
 pub(super) fn plan(job: &Path) -> Result<(), Problem> {
     let bytes = read_input(job, DOCUMENT_BYTES)?;
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let job = documents::read_job(&bytes, &most, &|_| None)?;
-    print_json(&crate::routes::studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
+    print_json(&studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
 }
 
 /// `lacuna verify`.

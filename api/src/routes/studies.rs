@@ -5,16 +5,16 @@ use std::time::Duration;
 use axum::Json;
 use axum::extract::{Extension, State};
 use lacuna_fabrication::Plan;
-use lacuna_kernel::budget::{Budget, CancelToken};
+use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
-use crate::documents::{self, ValidationReport};
+use crate::documents::{self, SolveReport, ValidationReport};
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
 use crate::http::state::Shared;
 use crate::jobs::watchdog::Watchdog;
-use crate::openapi::{Job, Model};
-use crate::problem::Problem;
-use crate::production::{self, Engine};
+use crate::openapi::{Job, Model, SolveRequest};
+use crate::problem::{Finding, Problem, ProblemKind};
+use crate::production::{self, Engine, SolveProblem};
 
 /// Longest time that a prediction may take: it is asked inside of a request.
 pub const PLAN_TIME: Duration = Duration::from_secs(10);
@@ -27,7 +27,7 @@ pub const PLAN_TIME: Duration = Duration::from_secs(10);
     responses((status = 200, body = ValidationReport), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn validate(State(state): State<Shared>, JsonBody(body): JsonBody) -> Result<Json<ValidationReport>, Problem> {
-    state.beside(move |_| documents::validate(&body)).await.map(Json)
+    state.beside(move |_| watched(PLAN_TIME, |budget| documents::validate(&body, budget))).await.map(Json)
 }
 
 /// Predicts what a job costs, without doing it.
@@ -47,6 +47,45 @@ pub async fn plan(
         predict(state.engine, &job, PLAN_TIME)
     });
     plan.await.map(Json)
+}
+
+/// Solves the unknown entries of a model.
+///
+/// 200 with all solutions, and the model for the chosen values in `model`. Constraints that contradict each other are
+/// refused with 422: `errors` are the fewest of them that already do.
+#[utoipa::path(
+    post, path = "/v1/solve", tag = "studies", request_body = SolveRequest,
+    responses((status = 200, body = SolveReport), (status = "4XX", body = Problem, content_type = "application/problem+json"))
+)]
+pub async fn solve(
+    State(state): State<Shared>,
+    Extension(owner): Extension<Owner>,
+    JsonBody(body): JsonBody,
+) -> Result<Json<SolveReport>, Problem> {
+    let report = state.beside(move |state| {
+        let (model, values) = documents::read_solve(&body, &state.models_of(&owner))?;
+        let solved = watched(PLAN_TIME, |budget| production::solve(&model, &values, budget)).map_err(|problem| match problem {
+            SolveProblem::Model(problem) => problem.under("/model"),
+            SolveProblem::Value { name, code, message } => {
+                let pointer = format!("/values/{}", name.replace('~', "~0").replace('/', "~1"));
+                let finding = Finding { pointer, code: code.to_owned(), message: message.clone(), line: None, column: None };
+                Problem::new(ProblemKind::InvalidModel, message).code(code).errors(vec![finding])
+            }
+        })?;
+        SolveReport::of(solved)
+    });
+    report.await.map(Json)
+}
+
+/// Does what looks at its budget within a time.
+///
+/// # Errors
+/// The work's own, or that there is no thread to watch the time.
+pub fn watched<T, E: From<Problem>>(time: Duration, work: impl FnOnce(&Budget) -> Result<T, E>) -> Result<T, E> {
+    let limits = Limits { seconds: time.as_secs_f64(), ..Limits::default() };
+    let budget = Budget { limits, cancel: CancelToken::new(), progress: None };
+    let _watchdog = Watchdog::start(&budget.cancel, limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
+    work(&budget)
 }
 
 /// Predicts within a time.

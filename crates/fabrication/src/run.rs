@@ -10,6 +10,7 @@ use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
+use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, certificate};
 
 /// The geometry of a result.
@@ -58,8 +59,8 @@ pub struct Validation {
     pub diagnostics: Vec<ModelDiagnostic>,
     /// Number of states of the automaton.
     pub states: u64,
-    /// Degrees of freedom of the unknown operators; 0 when none is unknown.
-    pub degrees_of_freedom: u64,
+    /// Degrees of freedom of the unknown operators: 0 when none is unknown, absent when they could not be found.
+    pub degrees_of_freedom: Option<u64>,
     /// Largest violation of a constraint.
     pub constraint_residual: f64,
     /// [lower, upper] bounds of the joint spectral radius on the zero-sum subspaces, when the model is sound
@@ -104,12 +105,12 @@ impl From<Finding> for ModelDiagnostic {
 }
 
 impl JobError {
-    fn new(kind: Kind, code: &'static str, message: String) -> Self {
+    pub(crate) fn new(kind: Kind, code: &'static str, message: String) -> Self {
         Self { kind, code, message, limit: None, diagnostics: Vec::new() }
     }
 
     /// The first error speaks for all; every finding is listed.
-    fn model(findings: Vec<Finding>) -> Self {
+    pub(crate) fn model(findings: Vec<Finding>) -> Self {
         let first = findings.iter().find(|finding| !finding.warning).cloned();
         let (code, message) = first.map_or(("invalid-model", String::new()), |finding| (finding.code, finding.message));
         let kind = if code == "automaton.convergence-undecided" { Kind::Unreachable } else { Kind::Invalid };
@@ -268,9 +269,9 @@ fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -
     Ok(known.first().map_or(f64::INFINITY, |(_, count)| *count))
 }
 
-/// Says what is wrong with a model.
+/// Says what is wrong with a model, and what its unknown operators leave open.
 #[must_use]
-pub fn validate(model: &Model) -> Validation {
+pub fn validate(model: &Model, budget: &Budget) -> Validation {
     match model.lower() {
         Ok(lowered) => {
             let contraction = lowered.attractor.contraction();
@@ -278,11 +279,22 @@ pub fn validate(model: &Model) -> Validation {
                 valid: true,
                 diagnostics: lowered.findings.into_iter().map(ModelDiagnostic::from).collect(),
                 states: lowered.attractor.automaton().states().len() as u64,
-                degrees_of_freedom: 0,
+                degrees_of_freedom: Some(0),
                 constraint_residual: lowered.constraint_residual,
                 spectral_radius: Some([contraction.lower, contraction.upper]),
             }
         }
-        Err(findings) => Validation { diagnostics: findings.into_iter().map(ModelDiagnostic::from).collect(), ..Validation::default() },
+        Err(findings) => {
+            let diagnostics: Vec<ModelDiagnostic> = findings.into_iter().map(ModelDiagnostic::from).collect();
+            match freedom(&model.shape, budget) {
+                None => Validation { diagnostics, degrees_of_freedom: Some(0), ..Validation::default() },
+                Some(freedom) => Validation {
+                    diagnostics: diagnostics.into_iter().chain(freedom.conflicts).collect(),
+                    states: freedom.states,
+                    degrees_of_freedom: freedom.degrees,
+                    ..Validation::default()
+                },
+            }
+        }
     }
 }

@@ -83,6 +83,19 @@ fn rational_points(least: usize) -> Value {
     list(reference("ControlPoint"), least)
 }
 
+/// Control points of a root cell, some of them to be placed.
+fn placed_points() -> Value {
+    list(json!({ "anyOf": [reference("ControlPoint"), { "type": "null" }] }), 1)
+}
+
+fn permutation() -> Value {
+    json!({ "type": "array", "items": index(), "minItems": 1, "uniqueItems": true })
+}
+
+fn path() -> Value {
+    json!({ "type": "array", "items": index(), "maxItems": 64 })
+}
+
 fn faces(least: usize) -> Value {
     list(list(index(), 1), least)
 }
@@ -225,6 +238,7 @@ pub(super) const BCIFS: Object = Object {
             list(reference("Incidence"), 0)
         }),
         optional("adjacencies", "Adjacency constraints: boundaries that two children share.", || list(reference("Adjacency"), 0)),
+        optional("relations", "Further equations between products of operators and embeddings.", || list(reference("Relation"), 0)),
         required("cells", "The root cells.", || list(reference("RootCell"), 1)),
         optional("glue", "Boundaries of root cells that are one; as objects or as bare pairs.", || {
             list(json!({ "anyOf": [reference("Glue"), tuple(index_pair(), 2)] }), 0)
@@ -277,6 +291,8 @@ pub(super) const INCIDENCE: Object = Object {
     ],
 };
 
+const PERMUTATION: &str = "The order in which the second's control points are taken: the k-th of the first is number permutation[k] of the second. Excludes reversed.";
+
 pub(super) const ADJACENCY: Object = Object {
     title: "an adjacency",
     about: "Two children share a boundary.",
@@ -284,6 +300,22 @@ pub(super) const ADJACENCY: Object = Object {
         required("state", "Name of the state.", text),
         required("between", "Two pairs [child, boundary of that child].", || tuple(index_pair(), 2)),
         optional("reversed", "Whether the second is seen from its other end.", flag),
+        optional("permutation", PERMUTATION, permutation),
+    ],
+};
+
+pub(super) const RELATION: Object = Object {
+    title: "a relation",
+    about: "Two products of a state's operators and embeddings that are equal.",
+    members: &[required("state", "Name of the state.", text), required("equal", "The two products.", || tuple(reference("Side"), 2))],
+};
+
+pub(super) const SIDE: Object = Object {
+    title: "a side of a relation",
+    about: "The product T_i T_j ... b_m b_p ...: a child, a child of that child and so on, then a boundary of the last, a boundary of that boundary and so on.",
+    members: &[
+        optional("path", "Children i, j, ...; none when absent.", path),
+        optional("boundary", "Boundaries m, p, ...; none when absent.", path),
     ],
 };
 
@@ -292,7 +324,7 @@ pub(super) const ROOT_CELL: Object = Object {
     about: "A cell that the shape starts from.",
     members: &[
         required("state", "Name of the cell's state.", text),
-        required("control_points", "As many points as the state's dimension.", || rational_points(1)),
+        required("control_points", "As many points as the state's dimension; null for one that is to be placed.", placed_points),
     ],
 };
 
@@ -302,6 +334,7 @@ pub(super) const GLUE: Object = Object {
     members: &[
         required("between", "Two pairs [root cell, boundary of its state].", || tuple(index_pair(), 2)),
         optional("reversed", "Whether the second is seen from its other end.", flag),
+        optional("permutation", PERMUTATION, permutation),
     ],
 };
 
@@ -409,6 +442,21 @@ pub(super) const JOB: Object = Object {
             || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
         ),
         optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
+    ],
+};
+
+pub(super) const SOLVE: Object = Object {
+    title: "a solve request",
+    about: "A model with unknown entries, and the values chosen for what its constraints leave free. Exactly one of model and model_ref is given.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "values",
+            "Values of free parameters by their names; those that are absent keep the value that the solver chooses.",
+            || json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() }),
+        ),
     ],
 };
 

@@ -7,6 +7,7 @@
 //! mathematics can tell: the kernel's business.
 
 mod bcifs;
+mod constraint;
 mod curve;
 mod grammar;
 mod ifs;
@@ -17,6 +18,7 @@ mod node;
 mod parse;
 mod report;
 mod schema;
+mod solve;
 mod transform;
 mod units;
 mod walk;
@@ -27,7 +29,8 @@ mod tests;
 
 pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
 pub use schema::{job_schema, model_schema, schemas};
-pub use write::{write_job, write_model, write_model_indented};
+pub use solve::SolveDocument;
+pub use write::{model_value, write_job, write_model, write_model_indented};
 
 use lacuna_kernel::model::Model;
 
@@ -76,6 +79,14 @@ pub fn read_model(bytes: &[u8], limits: &DocumentLimits) -> Result<Model, Vec<Di
 /// As [`read_model`], and what the kind of job needs or cannot have.
 pub fn read_job(bytes: &[u8], limits: &DocumentLimits) -> Result<JobDocument, Vec<Diagnostic>> {
     read(bytes, limits, job::job)
+}
+
+/// Reads a request to solve a model.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_solve(bytes: &[u8], limits: &DocumentLimits) -> Result<SolveDocument, Vec<Diagnostic>> {
+    read(bytes, limits, solve::solve)
 }
 
 fn read<T>(

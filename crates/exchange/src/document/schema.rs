@@ -8,8 +8,8 @@ use serde_json::{Map, Value, json};
 
 use super::grammar::{
     ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
-    Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
-    reference,
+    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema,
+    matrix_schema, reference,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -45,7 +45,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 12] = [
+    const PLAIN: [(&str, &Object); 14] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -54,6 +54,8 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Boundary", &BOUNDARY),
         ("Incidence", &INCIDENCE),
         ("Adjacency", &ADJACENCY),
+        ("Relation", &RELATION),
+        ("Side", &SIDE),
         ("RootCell", &ROOT_CELL),
         ("Glue", &GLUE),
         ("JobParams", &JOB_PARAMS),
@@ -74,6 +76,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
+    schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
     schemas.push(("Job".into(), job()));
     schemas.sort_by(|(one, _), (other, _)| one.cmp(other));
     schemas

@@ -9,7 +9,7 @@ use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
-    Model, Part, PolygonMesh, Primitive, RootCell, Shape,
+    Model, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -26,6 +26,12 @@ pub fn write_model(model: &Model) -> String {
 #[must_use]
 pub fn write_model_indented(model: &Model) -> String {
     text(&Wire(model), true)
+}
+
+/// The canonical document of a model as a value, to stand in another one.
+#[must_use]
+pub fn model_value(model: &Model) -> impl Serialize + '_ {
+    Wire(model)
 }
 
 /// The canonical document of a job, models in full and limits complete: what `input_digest` hashes.
@@ -133,9 +139,17 @@ object! {
     Adjacency: |adjacency, members| members
         .put("state", &adjacency.state)?
         .put("between", &adjacency.between)?
-        .put_if(adjacency.reversed, "reversed", &true)?;
-    RootCell: |cell, members| members.put("state", &cell.state)?.put("control_points", &list(&cell.control_points))?;
-    Glue: |glue, members| members.put("between", &glue.between)?.put_if(glue.reversed, "reversed", &true)?;
+        .put_if(adjacency.reversed, "reversed", &true)?
+        .put_some("permutation", adjacency.permutation.as_ref())?;
+    Relation: |relation, members| members.put("state", &relation.state)?.put("equal", &list(&relation.equal))?;
+    Side: |side, members| members
+        .put_if(!side.path.is_empty(), "path", &side.path)?
+        .put_if(!side.boundary.is_empty(), "boundary", &side.boundary)?;
+    RootCell: |cell, members| members.put("state", &cell.state)?.put("control_points", &PlacedPoints(&cell.control_points))?;
+    Glue: |glue, members| members
+        .put("between", &glue.between)?
+        .put_if(glue.reversed, "reversed", &true)?
+        .put_some("permutation", glue.permutation.as_ref())?;
     Job: |job, members| members
         .put("lacuna", &1)?
         .put("kind", &job.kind)?
@@ -163,6 +177,7 @@ object! {
         .put("states", &list(&bcifs.states))?
         .put_if(!bcifs.incidences.is_empty(), "incidences", &list(&bcifs.incidences))?
         .put_if(!bcifs.adjacencies.is_empty(), "adjacencies", &list(&bcifs.adjacencies))?
+        .put_if(!bcifs.relations.is_empty(), "relations", &list(&bcifs.relations))?
         .put("cells", &list(&bcifs.cells))?
         .put_if(!bcifs.glue.is_empty(), "glue", &list(&bcifs.glue))?
         .put_if(!bcifs.parameters.is_empty(), "parameters", &Parameters(&bcifs.parameters))?;
@@ -212,6 +227,15 @@ impl Serialize for MeshData<'_> {
         let mut map = Members(serializer.serialize_map(Some(2))?);
         map.put("vertices", &list(self.vertices))?.put("faces", &self.faces)?;
         map.0.end()
+    }
+}
+
+/// Control points of a root cell; null for one that is to be placed.
+struct PlacedPoints<'m>(&'m [Option<DVec4>]);
+
+impl Serialize for PlacedPoints<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|point| point.as_ref().map(Wire)))
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod connection;
 pub mod convergence;
-mod matrix;
+pub(crate) mod matrix;
 pub mod operator;
 pub mod topology;
 

@@ -8,8 +8,11 @@ mod group;
 mod ifs;
 mod lower;
 mod mesh;
+pub mod solve;
 
-pub use bcifs::{Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec};
+pub use bcifs::{
+    Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, Relation, RootCell, Side, TransitionSpec,
+};
 pub use bezier::BezierCurve;
 pub use corner_cutting::CornerCutting;
 pub use group::{Group, Part};
