@@ -6,7 +6,7 @@ use lacuna_fabrication::{Input, Job, JobKind, Outcome, Params};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
 use super::args::{EvaluateArgs, LimitArgs, MeasureArgs, OutputArgs, ProgressMode, RunArgs, SolidifyArgs};
-use super::output::{Target, Written, deliver, target};
+use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
 use super::{DOCUMENT_BYTES, print_json, read_input, stop};
 use crate::jobs::watchdog::Watchdog;
@@ -72,8 +72,13 @@ fn make(kind: JobKind, model: &Path, params: Params, output: &OutputArgs, limit_
         targets.push(Target { name: None, ..target(path, Some("png"))? });
     }
     let title = job.inputs.first().map(|input| input.name.clone());
-    let (outcome, written) = perform(&job, limit_args, manner, |outcome, budget| {
-        deliver(outcome, title.as_deref(), &targets, output.certificate.as_deref(), budget)
+    let certificate = output.certificate.as_deref();
+    let (outcome, written) = watched(&job, limit_args, manner, |budget| {
+        // Points need not be held to be written.
+        if let Some(done) = deliver_streamed(&job, title.as_deref(), &targets, certificate, budget)? {
+            return Ok(done);
+        }
+        computed(&job, budget, |outcome, budget| deliver(outcome, title.as_deref(), &targets, certificate, budget))
     })?;
     if !manner.quiet {
         summarize(&outcome, &written);
@@ -120,18 +125,29 @@ fn perform(
     manner: Manner,
     deliver: impl FnOnce(&mut Outcome, &Budget) -> Result<Vec<Written>, Problem>,
 ) -> Result<(Outcome, Vec<Written>), Problem> {
+    watched(job, limit_args, manner, |budget| computed(job, budget, deliver))
+}
+
+fn computed(
+    job: &Job,
+    budget: &Budget,
+    deliver: impl FnOnce(&mut Outcome, &Budget) -> Result<Vec<Written>, Problem>,
+) -> Result<(Outcome, Vec<Written>), Problem> {
+    let mut outcome = production::compute(job, budget)?;
+    outcome.certificate.input_digest = documents::job_digest(job).to_string();
+    let written = deliver(&mut outcome, budget)?;
+    Ok((outcome, written))
+}
+
+/// Works under the eyes of the clock and of the user.
+fn watched<T>(job: &Job, limit_args: &LimitArgs, manner: Manner, work: impl FnOnce(&Budget) -> Result<T, Problem>) -> Result<T, Problem> {
     use_threads(limit_args.threads)?;
     let reporter = Reporter::new(manner.progress, manner.quiet);
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: reporter.sink() };
     stop::on_signals(&budget.cancel)?;
     let _watchdog =
         Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
-    let done = production::compute(job, &budget).and_then(|mut outcome| {
-        outcome.certificate.input_digest = documents::job_digest(job).to_string();
-        let written = deliver(&mut outcome, &budget)?;
-        Ok((outcome, written))
-    });
-    done.map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
+    work(&budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
 }
 
 /// Sets the number of threads of this process's computations.

@@ -1,10 +1,10 @@
 //! One entry for every door: `plan` predicts, `run` does, `validate` tells what is wrong.
 
-use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine};
+use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
 use lacuna_kernel::dilation::{DilationError, dilate, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::bounding_box;
+use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::{Finding, Lowered, Model};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
@@ -188,7 +188,8 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     }
 }
 
-fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+/// The box, and the share of the tolerance that single precision leaves.
+fn share_of(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(AxisBox, Tolerance), JobError> {
     let bounds = bounding_box(attractor, budget)?;
     let rounding = bounds.single_precision();
     let share = tolerance.mm() - rounding;
@@ -204,9 +205,65 @@ fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Res
             LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
         return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) });
     }
-    let tessellation = refine(attractor, Tolerance::new(share)?, budget)?;
+    Ok((bounds, Tolerance::new(share)?))
+}
+
+fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+    let (bounds, share) = share_of(attractor, tolerance, budget)?;
+    let tessellation = refine(attractor, share, budget)?;
     let certificate = certificate::of_evaluation(attractor, &tessellation, &bounds, tolerance);
     Ok(Outcome { geometry: Geometry::Tessellation(tessellation), certificate })
+}
+
+/// Why a streamed evaluation ended early.
+#[derive(Debug)]
+pub enum StreamError<E> {
+    /// The job has no result.
+    Job(JobError),
+    /// Whoever takes the points failed.
+    Sink(E),
+    /// Something other than points stands for a cell; some points may have been handed over.
+    NotPoints,
+}
+
+impl<E> From<RefineError> for StreamError<E> {
+    fn from(error: RefineError) -> Self {
+        Self::Job(error.into())
+    }
+}
+
+impl<E> From<JobError> for StreamError<E> {
+    fn from(error: JobError) -> Self {
+        Self::Job(error)
+    }
+}
+
+/// Evaluates a shape that is drawn as points, and hands them over in address order without holding them: memory
+/// does not grow with their number. The certificate is that of [`run`].
+///
+/// # Errors
+/// As [`run`]; what `sink` returns; [`StreamError::NotPoints`] for every other shape, as a rule before any work.
+pub fn stream_points<E>(
+    job: &Job,
+    budget: &Budget,
+    sink: &mut dyn FnMut(&Tessellation) -> Result<(), E>,
+) -> Result<Certificate, StreamError<E>> {
+    let tolerance = Tolerance::new(job.params.tolerance_mm).map_err(JobError::from)?;
+    let lowered = lower(job, budget)?;
+    let attractor = &lowered.attractor;
+    if !attractor.is_drawn_as_points() {
+        return Err(StreamError::NotPoints);
+    }
+    let (bounds, share) = share_of(attractor, tolerance, budget)?;
+    let mut points = 0;
+    let streamed = stream(attractor, share, budget, &mut |piece| {
+        if piece.vertices.len() != piece.points.len() {
+            return Err(StreamError::NotPoints);
+        }
+        points += piece.vertices.len() as u64;
+        sink(&piece).map_err(StreamError::Sink)
+    })?;
+    Ok(certificate::of_points(attractor, points, streamed, &bounds, tolerance))
 }
 
 /// Bytes of a binary STL file with so many triangles.

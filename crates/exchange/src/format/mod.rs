@@ -39,6 +39,7 @@ mod threemf;
 pub use error::{FormatError, Place};
 pub use geometry::{Geometry, NamedMesh};
 pub use limits::ReadLimits;
+pub use ply::PointFile;
 pub use read::{MeshFacts, MeshFile, Unit, detect, read};
 
 use geometry::Piece;

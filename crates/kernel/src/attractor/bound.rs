@@ -237,7 +237,7 @@ fn radii(automaton: &Automaton, contraction: &Contraction, centres: &[Vec<f64>])
         .collect();
     let largest = contraction.step_norms.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
     let longest = steps.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
-    let global = contraction.transient * (longest / (1.0 - contraction.upper) + drawn.iter().fold(0.0_f64, |a, &b| a.max(b)));
+    let global = contraction.sum_of_norms() * longest + contraction.transient * drawn.iter().fold(0.0_f64, |a, &b| a.max(b));
     if largest >= 0.999 {
         return vec![global * (1.0 + 1e-9); states.len()];
     }

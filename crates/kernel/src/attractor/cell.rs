@@ -197,6 +197,20 @@ impl Attractor {
         Cell { state, root: cell.root, ball, stretch }
     }
 
+    /// As [`Attractor::child_cell`], for a walk that only asks for the leaf's error and sites: where neither looks at
+    /// the ball, it is left without bounds.
+    #[inline]
+    pub(super) fn refined_cell(&self, cell: &Cell, index: usize, points: &[ControlPoint]) -> Cell {
+        let state = self.automaton().state(cell.state).transitions[index].to;
+        if let (StateBound::Hull { .. }, LeafPrimitive::Chord(_) | LeafPrimitive::Simplex) =
+            (self.bound(state), &self.automaton().state(state).leaf)
+        {
+            let ball = Ball { centre: [0.0; 3], radius: f64::INFINITY };
+            return Cell { state, root: cell.root, ball, stretch: 0.0 };
+        }
+        self.child_cell(cell, index, points)
+    }
+
     /// The bounding ball of a cell; see `StateBound` for the proof.
     #[inline]
     fn ball(&self, state: StateId, points: &[ControlPoint], rational: bool, stretch: f64) -> Ball {

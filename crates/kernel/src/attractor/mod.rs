@@ -6,16 +6,18 @@ pub mod cell;
 mod complex;
 mod cover;
 mod defect;
+mod early;
 mod refine;
 pub(crate) mod sites;
+mod walk;
 
 use crate::automaton::topology::{Topology, TopologyError};
-use crate::automaton::{Automaton, AutomatonError, Contraction, StateId, convergence};
+use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, StateId, convergence};
 use crate::error::Kind;
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::PointCover;
-pub use refine::{RefineError, count_cells, refine};
+pub use refine::{RefineError, Streamed, count_cells, refine, stream};
 use std::sync::Arc;
 
 /// Where a shape begins: a state and its control points.
@@ -229,6 +231,19 @@ impl Attractor {
     #[must_use]
     pub fn roots(&self) -> &[Root] {
         &self.roots
+    }
+
+    /// Whether every leaf is drawn as points, cell by cell.
+    #[must_use]
+    pub fn is_drawn_as_points(&self) -> bool {
+        let apart = (0..self.roots.len()).all(|root| !self.has_brep(root));
+        apart
+            && self.automaton.states().iter().all(|state| match &state.leaf {
+                LeafPrimitive::Centre => true,
+                LeafPrimitive::Drawn(drawing) => drawing.segments.is_empty() && drawing.triangles.is_empty(),
+                LeafPrimitive::Simplex => state.dimension == 1,
+                LeafPrimitive::Chord(_) | LeafPrimitive::Star(_) | LeafPrimitive::Polygon(_) => false,
+            })
     }
 
     /// Surfaces that stand for solids.
