@@ -233,7 +233,7 @@ impl Attractor {
     pub(crate) fn leaf_error(&self, cell: &Cell, points: &[ControlPoint]) -> f64 {
         let rational = self.roots()[cell.root as usize].rational;
         match &self.automaton().state(cell.state).leaf {
-            LeafPrimitive::Centre => cell.ball.radius,
+            LeafPrimitive::Centre => self.needle(cell, points).map_or(cell.ball.radius, |needle| needle.error.min(cell.ball.radius)),
             LeafPrimitive::Simplex => 0.0,
             LeafPrimitive::Chord(ends) => {
                 // The curve lies within `off` of the chord because its hull does, the distance to a segment being
@@ -263,7 +263,10 @@ impl Attractor {
         let rational = self.roots()[cell.root as usize].rational;
         let corner = |j: usize| project(&points[j], rational);
         match &self.automaton().state(cell.state).leaf {
-            LeafPrimitive::Centre => sink(Site::Point(cell.ball.centre)),
+            LeafPrimitive::Centre => match self.needle(cell, points) {
+                Some(needle) if needle.error < cell.ball.radius => sink(Site::Segment(needle.ends)),
+                _ => sink(Site::Point(cell.ball.centre)),
+            },
             LeafPrimitive::Simplex => match points.len() {
                 1 => sink(Site::Point(corner(0))),
                 2 => sink(Site::Segment([corner(0), corner(1)])),
