@@ -125,7 +125,8 @@ fn round_halo(contraction: &Contraction, index: usize, excess: f64) -> Halo {
 /// conv(S_v) plus the box e_v, and the attractors lie in these sets. `None` where no such boxes are found.
 fn boxes(automaton: &Automaton, covers: &[Option<Vec<Point>>], round: &[Halo]) -> Option<Vec<Halo>> {
     let states = automaton.states();
-    let extent = |halo: &Halo| -> Point { std::array::from_fn(|i| halo.columns.iter().map(|column| column[i].powi(2)).sum::<f64>().sqrt()) };
+    let extent =
+        |halo: &Halo| -> Point { std::array::from_fn(|i| halo.columns.iter().map(|column| column[i].powi(2)).sum::<f64>().sqrt()) };
     let mut extents: Vec<Point> = round.iter().map(extent).collect();
     for _ in 0..BOX_ROUNDS {
         // Offsets are measured in units of the extents so far: where hulls are exact along an axis, they stay so.

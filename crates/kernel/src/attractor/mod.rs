@@ -8,6 +8,7 @@ mod connected;
 mod cover;
 mod defect;
 mod needle;
+mod precision;
 mod refine;
 pub(crate) mod sites;
 
@@ -17,6 +18,7 @@ use crate::error::Kind;
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
+pub use precision::LinearPrecision;
 pub use refine::{RefineError, count_cells, refine};
 use std::sync::Arc;
 
@@ -61,6 +63,7 @@ pub struct Attractor {
     covers: Vec<Option<PointCover>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
+    precisions: Vec<Option<LinearPrecision>>,
     contraction: Contraction,
     warnings: Vec<String>,
     /// The B-rep and where it begins, when the states have one.
@@ -194,7 +197,8 @@ impl Attractor {
         defect::measure_drawings(&mut automaton, &bounds);
         let covers = cover::covers(&automaton, &bounds, &contraction);
         let connected = connected::connected(&automaton, &bounds, &contraction);
-        let attractor = Self { automaton, roots, solids, bounds, covers, connected, contraction, warnings, brep: None, seam_mm: 0.0 };
+        let precisions = precision::precisions(&automaton, &bounds);
+        let attractor = Self { automaton, roots, solids, bounds, covers, connected, precisions, contraction, warnings, brep: None, seam_mm: 0.0 };
         attractor.check_roots()?;
         Ok(attractor)
     }
@@ -257,6 +261,12 @@ impl Attractor {
     /// The points that stand for a state, where they are known.
     pub(crate) fn cover(&self, state: StateId) -> Option<&PointCover> {
         self.covers[state.index()].as_ref()
+    }
+
+    /// Parameters of a state's points, where its curves or faces are proven to have linear precision.
+    #[must_use]
+    pub fn precision(&self, state: StateId) -> Option<&LinearPrecision> {
+        self.precisions[state.index()].as_ref()
     }
 
     /// Whether cells of a state may be needles: it is proven connected, and its cells are of different proportions.

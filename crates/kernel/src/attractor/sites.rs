@@ -1,8 +1,8 @@
 //! What stands for cells in a dilation: for every state the kind of site that allows the largest cells.
 
-use super::cell::{Cell, ControlPoint, Point, Site, child_points, dot, frame_columns, subtract, times};
 use super::Attractor;
-use crate::automaton::{LeafPrimitive, StateId};
+use super::cell::{Cell, ControlPoint, Point, Site, child_points, dot, frame_columns, subtract, times};
+use crate::automaton::{Automaton, LeafPrimitive, StateId};
 
 /// Errors of replacing a cell of A by its sites S, in mm: d(x, A) <= d(x, S) + outer, and
 /// d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
@@ -140,7 +140,7 @@ fn choose(rule: &mut SiteRule<'_>) {
         if !states[root.state.index()].frame || decided[root.state.index()] {
             continue;
         }
-        let below = reachable(attractor, root.state);
+        let below = reachable(attractor.automaton(), root.state);
         let mut best = (f64::INFINITY, Choice::Centre);
         for choice in [Choice::Cover, Choice::Drawn, Choice::Centre] {
             let possible = |&state: &usize| match choice {
@@ -207,11 +207,12 @@ fn expected_sites(rule: &SiteRule<'_>, root: usize) -> f64 {
     total / f64::from(PATHS)
 }
 
-fn reachable(attractor: &Attractor, from: StateId) -> Vec<usize> {
+/// All states that paths from a state meet.
+pub(super) fn reachable(automaton: &Automaton, from: StateId) -> Vec<usize> {
     let mut seen = vec![from];
     let mut next = 0;
     while next < seen.len() {
-        for transition in &attractor.automaton().state(seen[next]).transitions {
+        for transition in &automaton.state(seen[next]).transitions {
             if !seen.contains(&transition.to) {
                 seen.push(transition.to);
             }
