@@ -85,7 +85,7 @@ impl<'a> SiteRule<'a> {
                 let cover = self.attractor.cover(cell.state)?;
                 let columns = frame_columns(points);
                 let from_centre = |point: &Point| times(&columns, &subtract(point, &cover.centre));
-                let square = cover.points.iter().map(|point| from_centre(point)).map(|x| dot(&x, &x)).fold(0.0, f64::max);
+                let square = cover.points.iter().map(from_centre).map(|x| dot(&x, &x)).fold(0.0, f64::max);
                 SiteError { inner_square: square, inner: cover.halo.image(&columns).radius(), outer: 0.0 }
             }
         };
