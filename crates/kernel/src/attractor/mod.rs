@@ -198,7 +198,8 @@ impl Attractor {
         let covers = cover::covers(&automaton, &bounds, &contraction);
         let connected = connected::connected(&automaton, &bounds, &contraction);
         let precisions = precision::precisions(&automaton, &bounds);
-        let attractor = Self { automaton, roots, solids, bounds, covers, connected, precisions, contraction, warnings, brep: None, seam_mm: 0.0 };
+        let attractor =
+            Self { automaton, roots, solids, bounds, covers, connected, precisions, contraction, warnings, brep: None, seam_mm: 0.0 };
         attractor.check_roots()?;
         Ok(attractor)
     }
