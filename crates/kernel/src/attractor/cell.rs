@@ -1,7 +1,7 @@
 //! Cells: instances of states. Their control points, their bounding ball, and what stands for them
 //! when they are small enough.
 
-use super::{Attractor, StateBound};
+use super::{Attractor, LinearPrecision, StateBound};
 use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator};
 use crate::measure::triangle::closest_on_triangle;
 
@@ -247,7 +247,7 @@ impl Attractor {
     pub(crate) fn leaf_error(&self, cell: &Cell, points: &[ControlPoint]) -> f64 {
         let rational = self.roots()[cell.root as usize].rational;
         match &self.automaton().state(cell.state).leaf {
-            LeafPrimitive::Centre => cell.ball.radius,
+            LeafPrimitive::Centre => self.needle(cell, points).map_or(cell.ball.radius, |needle| needle.error.min(cell.ball.radius)),
             LeafPrimitive::Simplex => 0.0,
             LeafPrimitive::Chord(ends) => {
                 // The curve lies within `off` of the chord because its hull does, the distance to a segment being
@@ -260,13 +260,23 @@ impl Attractor {
                 };
                 let chord = points.iter().map(off).fold(0.0, f64::max).sqrt();
                 let margin = self.bound(cell.state).margin();
-                if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord }
+                let first_order = if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord };
+                match self.precision(cell.state) {
+                    Some(precision) if !rational => first_order.min(chord_error(precision, margin, points, &start, &end)),
+                    _ => first_order,
+                }
             }
             // Points of the cell, and segments between them, are in the ball too.
             LeafPrimitive::Star(_) => 2.0 * cell.ball.radius,
             // Corners belong to the surface and every point of the polygon and of the cell is within the ball:
             // no two points of them are farther apart than its diameter.
-            LeafPrimitive::Polygon(_) => 2.0 * cell.ball.radius,
+            LeafPrimitive::Polygon(_) => {
+                let first_order = 2.0 * cell.ball.radius;
+                match self.precision(cell.state) {
+                    Some(precision) if !rational => first_order.min(polygon_error(precision, self.bound(cell.state).margin(), points)),
+                    _ => first_order,
+                }
+            }
             LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
         }
     }
@@ -277,7 +287,10 @@ impl Attractor {
         let rational = self.roots()[cell.root as usize].rational;
         let corner = |j: usize| project(&points[j], rational);
         match &self.automaton().state(cell.state).leaf {
-            LeafPrimitive::Centre => sink(Site::Point(cell.ball.centre)),
+            LeafPrimitive::Centre => match self.needle(cell, points) {
+                Some(needle) if needle.error < cell.ball.radius => sink(Site::Segment(needle.ends)),
+                _ => sink(Site::Point(cell.ball.centre)),
+            },
             LeafPrimitive::Simplex => match points.len() {
                 1 => sink(Site::Point(corner(0))),
                 2 => sink(Site::Segment([corner(0), corner(1)])),
@@ -333,6 +346,36 @@ impl Attractor {
     pub(crate) fn state_of(&self, cell: &Cell) -> &State {
         self.automaton().state(cell.state)
     }
+}
+
+/// eta for the affine map that takes a curve's parameters to its chord; see `precision`.
+#[inline]
+fn chord_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
+    let chord = subtract(end, start);
+    let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
+        let linear: Point = std::array::from_fn(|i| start[i] + parameter[0] * chord[i]);
+        distance_squared(&[point[0], point[1], point[2]], &linear)
+    };
+    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
+    (1.0 + 2.0 * margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
+}
+
+/// 2 eta for the affine map that fits a face's control points best; see `precision`.
+#[inline]
+fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint]) -> f64 {
+    let mut map = [[0.0; 3]; 3];
+    for (point, fit) in points.iter().zip(&precision.fit) {
+        for (column, weight) in map.iter_mut().zip(fit) {
+            (0..3).for_each(|i| column[i] += weight * point[i]);
+        }
+    }
+    let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
+        let linear: Point = std::array::from_fn(|i| map[0][i] + parameter[0] * map[1][i] + parameter[1] * map[2][i]);
+        distance_squared(&[point[0], point[1], point[2]], &linear)
+    };
+    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
+    let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
+    2.0 * (1.0 + 2.0 * margin) * largest + precision.residual * slope
 }
 
 /// The diagonal of the box of polynomial control points: at least their diameter.

@@ -4,9 +4,12 @@
 mod bound;
 pub mod cell;
 mod complex;
+mod connected;
 mod cover;
 mod defect;
 mod early;
+mod needle;
+mod precision;
 mod refine;
 pub(crate) mod sites;
 mod walk;
@@ -16,7 +19,8 @@ use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, St
 use crate::error::Kind;
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
-pub use cover::PointCover;
+pub use cover::{Halo, PointCover};
+pub use precision::LinearPrecision;
 pub use refine::{RefineError, Streamed, count_cells, refine, stream};
 use std::sync::Arc;
 
@@ -59,6 +63,9 @@ pub struct Attractor {
     solids: Vec<SolidSurface>,
     bounds: Vec<StateBound>,
     covers: Vec<Option<PointCover>>,
+    /// Widest gap of every frame state that is proven connected; see `connected`.
+    connected: Vec<Option<f64>>,
+    precisions: Vec<Option<LinearPrecision>>,
     contraction: Contraction,
     warnings: Vec<String>,
     /// The B-rep and where it begins, when the states have one.
@@ -191,7 +198,10 @@ impl Attractor {
         }
         defect::measure_drawings(&mut automaton, &bounds);
         let covers = cover::covers(&automaton, &bounds, &contraction);
-        let attractor = Self { automaton, roots, solids, bounds, covers, contraction, warnings, brep: None, seam_mm: 0.0 };
+        let connected = connected::connected(&automaton, &bounds, &contraction);
+        let precisions = precision::precisions(&automaton, &bounds);
+        let attractor =
+            Self { automaton, roots, solids, bounds, covers, connected, precisions, contraction, warnings, brep: None, seam_mm: 0.0 };
         attractor.check_roots()?;
         Ok(attractor)
     }
@@ -269,12 +279,16 @@ impl Attractor {
         self.covers[state.index()].as_ref()
     }
 
-    /// Radius of a frame state's ball, in the frame's unit.
-    pub(crate) fn ball_radius(&self, state: StateId) -> f64 {
-        match self.bound(state) {
-            StateBound::Frame { reach, .. } => cell::matrix_norm(reach),
-            StateBound::Hull { .. } => f64::INFINITY,
-        }
+    /// Parameters of a state's points, where its curves or faces are proven to have linear precision.
+    #[must_use]
+    pub fn precision(&self, state: StateId) -> Option<&LinearPrecision> {
+        self.precisions[state.index()].as_ref()
+    }
+
+    /// Whether cells of a state may be needles: it is proven connected, and its cells are of different proportions.
+    pub(crate) fn has_needles(&self, state: StateId) -> bool {
+        let varies = matches!(self.bound(state), StateBound::Frame { similar: false, .. });
+        varies && self.connected[state.index()].is_some() && self.cover(state).is_some()
     }
 
     /// The bound of a state.

@@ -47,6 +47,12 @@ impl Contraction {
         self.norms[state.index()].length(&difference)
     }
 
+    /// C y for a point y of an affine frame: coordinates in which the adapted norm is the Euclidean one.
+    pub(crate) fn rounded(&self, state: StateId, y: &[f64; 3]) -> [f64; 3] {
+        let factor = &self.norms[state.index()].factor;
+        std::array::from_fn(|row| (row..3).map(|column| factor.at(row, column) * y[column]).sum())
+    }
+
     /// Columns u_j of C^-1: the ellipsoid {sum_j u_j x_j, |x| <= 1} is the unit ball of the norm, in the
     /// coordinates of e_i - e_0.
     pub(crate) fn unit_ball(&self, state: StateId) -> Vec<Vec<f64>> {
