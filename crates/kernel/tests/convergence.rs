@@ -206,8 +206,9 @@ fn rectangular_operators_and_transient_states() {
 #[test]
 fn a_million_transitions_end() {
     let mut numbers = Numbers(3);
-    let mut operators =
-        |count: usize, scale: f64| -> Vec<(usize, Columns)> { (0..count).map(|_| (numbers.below(1000), numbers.signed(3, scale))).collect() };
+    let mut operators = |count: usize, scale: f64| -> Vec<(usize, Columns)> {
+        (0..count).map(|_| (numbers.below(1000), numbers.signed(3, scale))).collect()
+    };
     let contracting = automaton((0..1000).map(|_| (3, operators(100, 0.2))).collect());
     let found = contraction(&contracting);
     assert!(found.lower <= found.upper && found.upper < 1.0, "{} {}", found.lower, found.upper);
