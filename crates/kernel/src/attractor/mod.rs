@@ -1,20 +1,24 @@
 //! The limit set of an automaton and control points: bounded once per state, so that every cell is
 //! bounded by a few multiplications, whatever the signs of its operators.
 
+mod address;
 mod bound;
 pub mod cell;
 mod complex;
 mod cover;
 mod defect;
+mod near;
 mod refine;
 pub(crate) mod sites;
 
 use crate::automaton::topology::{Topology, TopologyError};
 use crate::automaton::{Automaton, AutomatonError, Contraction, StateId, convergence};
 use crate::error::Kind;
+pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::PointCover;
+pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use refine::{RefineError, count_cells, refine};
 use std::sync::Arc;
 
