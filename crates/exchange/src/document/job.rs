@@ -204,7 +204,7 @@ fn inputs(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Vec<InputDoc
 }
 
 /// Reports unless exactly one of the members is there.
-fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title: &str) -> Option<()> {
+pub(super) fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title: &str) -> Option<()> {
     let listed = || names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
     let mut stated = names.iter().filter(|name| members.has(name));
     let Some(first) = stated.next() else {
@@ -224,7 +224,7 @@ fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title:
 }
 
 /// The model, or the reference to it.
-fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<InputDocument> {
+pub(super) fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<InputDocument> {
     if let Some(place) = members.get("model") {
         let source = ModelSource::Inline(Box::new(model(walker, place, true)?));
         return Some(InputDocument { name: None, source, pointer: place.path.pointer() });

@@ -6,6 +6,7 @@
 //! the reading. After that nothing about the document needs to be looked at again, except what only the
 //! mathematics can tell: the kernel's business.
 
+mod address;
 mod bcifs;
 mod curve;
 mod grammar;
@@ -25,6 +26,7 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use address::{AddressQuestion, CELLS_LISTED, MOST_CELLS_LISTED, Sought};
 pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
 pub use schema::{job_schema, model_schema, schemas};
 pub use write::{write_job, write_model, write_model_indented};
@@ -76,6 +78,14 @@ pub fn read_model(bytes: &[u8], limits: &DocumentLimits) -> Result<Model, Vec<Di
 /// As [`read_model`], and what the kind of job needs or cannot have.
 pub fn read_job(bytes: &[u8], limits: &DocumentLimits) -> Result<JobDocument, Vec<Diagnostic>> {
     read(bytes, limits, job::job)
+}
+
+/// Reads a question about addresses.
+///
+/// # Errors
+/// As [`read_model`], and an address that cannot be read.
+pub fn read_address_question(bytes: &[u8], limits: &DocumentLimits) -> Result<AddressQuestion, Vec<Diagnostic>> {
+    read(bytes, limits, address::question)
 }
 
 fn read<T>(

@@ -21,6 +21,7 @@
 //! # Ok::<(), lacuna_exchange::format::FormatError>(())
 //! ```
 
+pub mod automaton;
 mod error;
 mod geometry;
 mod glb;
