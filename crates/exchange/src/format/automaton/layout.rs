@@ -2,6 +2,7 @@
 //! one kind stand on a circle, where no straight arrow meets a third.
 
 use super::{Bond, Diagram, Node};
+use lacuna_kernel::attractor::ranges;
 use lacuna_kernel::model::CellKind;
 
 /// Kinds of cells from above to below.
@@ -142,7 +143,9 @@ fn ring(diagram: &Diagram, members: &[usize], boxes: &mut [Box], top: f64) -> f6
     let widest = members.iter().map(|&index| boxes[index].rect.width).fold(0.0, f64::max);
     let highest = members.iter().map(|&index| boxes[index].rect.height).fold(0.0, f64::max);
     let loops = diagram.arrows.iter().any(|arrow| arrow.from == arrow.to && arrow.bond == Bond::Transition);
-    let space = if loops { 44.0 } else { 30.0 };
+    // Room for the longest label on the arrow between two neighbours, and for loops.
+    let longest = diagram.arrows.iter().map(|arrow| width_of(&ranges(&arrow.indices), TEXT_SIZE)).fold(0.0, f64::max);
+    let space = 40.0 + longest.min(90.0) + if loops { 14.0 } else { 0.0 };
     let turn = std::f64::consts::TAU / members.len() as f64;
     // Neighbours on the flat parts differ by their width, on the steep ones by their height.
     let chord = 2.0 * (0.5 * turn).sin();

@@ -26,7 +26,7 @@ const BENDS: [f64; 19] = [
 /// Places of a label along its arrow that are tried.
 const PLACES: [f64; 11] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82, 0.12, 0.88];
 /// Points of a curve that are looked at.
-const SAMPLES: usize = 48;
+const SAMPLES: usize = 32;
 
 /// A point of a Bezier curve of any degree.
 fn at(curve: &[Point], t: f64) -> Point {
@@ -37,8 +37,16 @@ fn at(curve: &[Point], t: f64) -> Point {
     points[0]
 }
 
-fn samples(curve: &[Point]) -> Vec<Point> {
+/// Points of a curve from its start to its end.
+pub(super) fn samples(curve: &[Point]) -> Vec<Point> {
     (0..=SAMPLES).map(|k| at(curve, k as f64 / SAMPLES as f64)).collect()
+}
+
+/// The box around points, of some size even if they stand in line.
+fn around(points: &[Point]) -> Rect {
+    let low = [0, 1].map(|axis| points.iter().map(|point| point[axis]).fold(f64::INFINITY, f64::min));
+    let high = [0, 1].map(|axis| points.iter().map(|point| point[axis]).fold(f64::NEG_INFINITY, f64::max));
+    Rect { left: low[0] - 0.5, top: low[1] - 0.5, width: high[0] - low[0] + 1.0, height: high[1] - low[1] + 1.0 }
 }
 
 /// The piece of a quadratic curve between two parameters.
@@ -56,7 +64,8 @@ struct Board<'a> {
     /// Loops, with their labels.
     loops: Vec<(usize, Rect)>,
     labels: Vec<Rect>,
-    curves: Vec<Vec<Point>>,
+    /// With the boxes around them.
+    curves: Vec<(Rect, Vec<Point>)>,
 }
 
 /// Draws all arrows between boxes, in the order of the diagram.
@@ -117,18 +126,22 @@ impl Board<'_> {
             self.clipped([start, control, end], from, to)
         };
         // Arrows with a partner leave the middle to nobody.
-        let cost =
-            |bend: f64| self.cost(&samples(&bent(bend)), from, to) + 0.06 * bend.abs() + if paired && bend == 0.0 { 6.0 } else { 0.0 };
-        let bends = BENDS.map(|bend| (cost(bend), bend));
-        let bend = bends.iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |best| best.1);
-        let curve = bent(bend);
+        let cost = |bend: f64, curve: &[Point]| {
+            self.cost(&samples(curve), from, to) + 0.06 * bend.abs() + if paired && bend == 0.0 { 6.0 } else { 0.0 }
+        };
         let width = width_of(label, TEXT_SIZE) + 6.0;
-        let places = PLACES.map(|t| {
-            let place = Rect::around(at(&curve, t), width, LINE);
-            (self.crowd(&place) + 2.0 * (t - 0.5).abs(), place)
+        let tried = BENDS.iter().flat_map(|&bend| {
+            let curve = bent(bend);
+            let cost = cost(bend, &curve);
+            PLACES.map(|t| {
+                let place = Rect::around(at(&curve, t), width, LINE);
+                (cost + self.crowd(&place) + 2.0 * (t - 0.5).abs(), curve, place)
+            })
         });
-        let place = places.iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Rect::around(end, width, LINE), |best| best.1);
-        self.curves.push(samples(&curve));
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (_, curve, place) = best.unwrap_or_else(|| (0.0, bent(0.0), Rect::around(end, width, LINE)));
+        let points = samples(&curve);
+        self.curves.push((around(&points), points));
         self.labels.push(place);
         Route { curve: curve.to_vec(), label: label.to_owned(), place, bond }
     }
@@ -152,9 +165,10 @@ impl Board<'_> {
             cost += 12.0 * self.loops.iter().filter(|(_, rect)| rect.holds(*point)).count() as f64;
             cost += 12.0 * self.labels.iter().filter(|label| label.grown(2.0).holds(*point)).count() as f64;
         }
+        // A crossing is near at a few points; what runs alongside is near at many. Boxes tell most curves apart.
+        let own = around(curve).grown(9.0);
         let near = |other: &[Point]| curve.iter().filter(|p| other.iter().any(|q| (p[0] - q[0]).hypot(p[1] - q[1]) < 9.0)).count();
-        // A crossing is near at a few points; what runs alongside is near at many.
-        cost + self.curves.iter().map(|other| near(other) as f64).sum::<f64>()
+        cost + self.curves.iter().filter(|(rect, _)| rect.meets(&own)).map(|(_, other)| near(other) as f64).sum::<f64>()
     }
 
     /// How much a label would hide.
@@ -162,7 +176,7 @@ impl Board<'_> {
         let boxes = self.boxes.iter().filter(|other| other.rect.meets(label)).count();
         let loops = self.loops.iter().filter(|(_, rect)| rect.meets(label)).count();
         let labels = self.labels.iter().filter(|other| other.grown(1.0).meets(label)).count();
-        let curves = self.curves.iter().filter(|curve| curve.iter().any(|point| label.holds(*point))).count();
-        30.0 * boxes as f64 + 8.0 * loops as f64 + 30.0 * labels as f64 + 4.0 * curves as f64
+        let curves = self.curves.iter().filter(|(rect, curve)| rect.meets(label) && curve.iter().any(|point| label.holds(*point))).count();
+        60.0 * boxes as f64 + 8.0 * loops as f64 + 60.0 * labels as f64 + 4.0 * curves as f64
     }
 }

@@ -1,7 +1,7 @@
 //! Diagrams as pictures.
 
 use super::layout::{Box, LINE, NAME_SIZE, Rect, TEXT_SIZE, place, shortened, width_of};
-use super::route::{Route, routes};
+use super::route::{Route, routes, samples};
 use super::{Bond, Diagram, Fault, Node};
 use crate::format::threemf::escape;
 use lacuna_kernel::attractor::ranges;
@@ -45,7 +45,7 @@ pub(super) fn text(diagram: &Diagram) -> String {
     boxes.iter().for_each(|one| frame.take(&one.rect));
     for route in &routes {
         frame.take(&route.place);
-        route.curve.iter().for_each(|point| frame.take(&Rect::around(*point, 0.0, 0.0)));
+        samples(&route.curve).iter().for_each(|point| frame.take(&Rect::around(*point, 4.0, 4.0)));
     }
     let title = diagram.title.as_deref().map(|title| shortened(title, 80));
     if let Some(title) = &title {
@@ -89,18 +89,10 @@ fn document(diagram: &Diagram, frame: &Frame, body: &str) -> String {
     let (width, height) = (frame.high[0] - left + MARGIN, frame.high[1] - top + MARGIN);
     let [left, top, width, height] = [left.floor(), top.floor(), width.ceil(), height.ceil()].map(number);
     let title = escaped(diagram.title.as_deref().unwrap_or("automaton"));
-    let head = |id: &str, colour: &str| {
-        format!(
-            "<marker id=\"{id}\" viewBox=\"0 0 10 10\" refX=\"9\" refY=\"5\" markerWidth=\"9\" markerHeight=\"9\" \
-             markerUnits=\"userSpaceOnUse\" orient=\"auto\"><path d=\"M0 1 L10 5 L0 9 z\" fill=\"{colour}\"/></marker>"
-        )
-    };
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"{left} {top} {width} {height}\" \
-         font-family=\"Helvetica, Arial, sans-serif\" role=\"img\">\n<title>{title}</title>\n<defs>{}{}</defs>\n\
-         <rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n{body}</svg>\n",
-        head("transition", INK),
-        head("boundary", DASHED)
+         font-family=\"Helvetica, Arial, sans-serif\" role=\"img\">\n<title>{title}</title>\n\
+         <rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n{body}</svg>\n"
     )
 }
 
@@ -109,23 +101,31 @@ fn write_text(body: &mut String, [x, y]: [f64; 2], text: &str, size: f64, colour
     let _ = writeln!(body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{colour}\" {more}>{}</text>", escaped(text));
 }
 
-fn stroke(bond: Bond) -> (&'static str, &'static str, &'static str) {
+fn stroke(bond: Bond) -> (&'static str, &'static str) {
     match bond {
-        Bond::Transition => (INK, "transition", ""),
-        Bond::Boundary => (DASHED, "boundary", " stroke-dasharray=\"5 4\""),
+        Bond::Transition => (INK, ""),
+        Bond::Boundary => (DASHED, " stroke-dasharray=\"5 4\""),
     }
 }
 
+/// A curve with its head: a triangle of its own, because programs disagree on the direction of SVG's markers.
 fn arrow(body: &mut String, route: &Route) {
-    let (colour, head, dashes) = stroke(route.bond);
-    let points: Vec<String> = route.curve.iter().map(|point| format!("{} {}", number(point[0]), number(point[1]))).collect();
+    let (colour, dashes) = stroke(route.bond);
+    let text = |point: &[f64; 2]| format!("{} {}", number(point[0]), number(point[1]));
+    let points: Vec<String> = route.curve.iter().map(text).collect();
     let letter = if points.len() == 4 { "C" } else { "Q" };
     let _ = writeln!(
         body,
-        "<path d=\"M{} {letter}{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.3\"{dashes} marker-end=\"url(#{head})\"/>",
+        "<path d=\"M{} {letter}{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.3\"{dashes}/>",
         points[0],
         points[1..].join(" ")
     );
+    let (tip, before) = (route.curve[points.len() - 1], route.curve[points.len() - 2]);
+    let along = [tip[0] - before[0], tip[1] - before[1]];
+    let length = along[0].hypot(along[1]).max(1e-9);
+    let [x, y] = along.map(|part| part / length);
+    let corner = |side: f64| text(&[tip[0] - 9.0 * x - side * y, tip[1] - 9.0 * y + side * x]);
+    let _ = writeln!(body, "<path d=\"M{} L{} L{} z\" fill=\"{colour}\"/>", text(&tip), corner(3.5), corner(-3.5));
 }
 
 /// A label on white, so that it can be read where it stands on a line.
