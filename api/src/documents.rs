@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 
 use lacuna_exchange::diagnostic::{Diagnostic, code};
-use lacuna_exchange::document::{self, DocumentLimits};
+use lacuna_exchange::document::{self, DocumentLimits, ModelSource, Sought};
+use lacuna_exchange::format::automaton::Diagram;
 use lacuna_exchange::format::{FORMATS, Format};
 use lacuna_fabrication::{Job, JobKind, SolutionSpace, Solved};
 use lacuna_kernel::budget::{Budget, Limits};
@@ -198,6 +199,34 @@ pub fn model_file(model: &Model) -> String {
     let mut text = document::write_model_indented(model);
     text.push('\n');
     text
+}
+
+/// Reads a question about addresses, and fetches the stored model that it may name.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_address_question(bytes: &[u8], find: ModelFinder<'_>) -> Result<(Model, Sought), Problem> {
+    let read = production::guarded(|| document::read_address_question(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    let model = match read.input.source {
+        ModelSource::Inline(model) => *model,
+        ModelSource::Stored(id) => {
+            let bytes = find(&id).ok_or_else(|| {
+                let message = format!("no model is stored as {id:?}; store it first, or send it as \"model\"");
+                one_finding(&read.input.pointer, code::UNKNOWN_MODEL, &message)
+            })?;
+            read_model(&bytes)?
+        }
+    };
+    Ok((model, read.sought))
+}
+
+/// The automaton of a model, to be drawn, whether or not the model can be evaluated.
+///
+/// # Errors
+/// When the document is not legal, or the kernel has a defect.
+pub fn read_diagram(bytes: &[u8]) -> Result<Diagram, Problem> {
+    let model = read_model(bytes)?;
+    production::guarded(|| Diagram::of(&model))
 }
 
 /// Reads and examines a model; the budget bounds the search for degrees of freedom.

@@ -15,6 +15,10 @@ pub struct Model {}
 #[derive(ToSchema)]
 pub struct SolveRequest {}
 
+/// Stands for a question about addresses: its schema is the exchange crate's.
+#[derive(ToSchema)]
+pub struct AddressQuestion {}
+
 /// The description as indented JSON, with a line end: what is committed.
 #[must_use]
 pub fn text() -> String {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use lacuna_exchange::document::MOST_CELLS_LISTED;
 
 /// Fabrication-oriented geometry: fractals, curves and meshes to certified, printable solids.
 ///
@@ -59,9 +60,14 @@ pub(super) enum Command {
     Validate {
         /// The model document.
         model: PathBuf,
+        /// Draw the automaton, valid or not: `.svg`, or `.dot` for Graphviz.
+        #[arg(long, value_name = "FILE")]
+        draw: Option<PathBuf>,
     },
     /// Solve the unknown entries of a model; all solutions as JSON on stdout.
     Solve(SolveArgs),
+    /// Tell where an address leads, or which addresses lead near a point; JSON on stdout.
+    Address(AddressArgs),
     /// Predict what a job costs; JSON on stdout.
     Plan {
         /// The job document.
@@ -191,6 +197,28 @@ pub(super) struct SolveArgs {
 }
 
 #[derive(Debug, Args)]
+#[group(skip)]
+pub(super) struct AddressArgs {
+    /// The model document.
+    pub(super) model: PathBuf,
+    /// An address: root cell, transitions, and in parentheses those that repeat without end, for example "0: 1 2 (0 3)".
+    #[arg(long, value_name = "ADDRESS", required_unless_present = "near", conflicts_with_all = ["near", "within", "tolerance", "most"])]
+    pub(super) at: Option<lacuna_kernel::attractor::Address>,
+    /// A point in mm.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    pub(super) near: Option<[f64; 3]>,
+    /// List cells as far as this, in mm; those that may hold the closest point of the shape when absent.
+    #[arg(long, value_name = "MM", value_parser = distance)]
+    pub(super) within: Option<f64>,
+    /// Radius to which cells are refined, in mm; a thousandth of the shape's when absent.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: Option<f64>,
+    /// Cells to list at most.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..=MOST_CELLS_LISTED as u64))]
+    pub(super) most: Option<u64>,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct RunArgs {
     /// The job document.
     pub(super) job: PathBuf,
@@ -251,6 +279,18 @@ fn named_value(text: &str) -> Result<(String, f64), String> {
     }
 }
 
+fn distance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("a distance of zero or more is expected".to_owned()),
+    }
+}
+
+fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+}
+
 fn bytes(text: &str) -> Result<u64, String> {
     let (digits, shift) = match text.trim_end_matches(['b', 'B', 'i']) {
         text if text.ends_with(['k', 'K']) => (&text[..text.len() - 1], 10),
@@ -287,6 +327,8 @@ mod tests {
         assert_eq!(bytes("512MiB"), Ok(512 << 20));
         assert_eq!(bytes("7"), Ok(7));
         assert!(bytes("-1").is_err() && bytes("99999999999999G").is_err());
+        assert_eq!(point("1.5, -2,0"), Ok([1.5, -2.0, 0.0]));
+        assert!(point("1,2").is_err() && point("1,2,nan").is_err() && distance("-1").is_err() && distance("0").is_ok());
         assert!(positive("0").is_err() && positive("nan").is_err() && positive("inf").is_err());
     }
 }

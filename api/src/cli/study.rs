@@ -5,11 +5,13 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use lacuna_exchange::document::{CELLS_LISTED, Sought};
 use lacuna_fabrication::SolutionSpace;
 use lacuna_kernel::budget::Limits;
 
-use super::args::{SolveArgs, VerifyArgs};
+use super::args::{AddressArgs, SolveArgs, VerifyArgs};
 use super::{DOCUMENT_BYTES, print, print_json, read_input, stop};
+use crate::addresses;
 use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Engine, SolveProblem};
@@ -20,7 +22,8 @@ use crate::{files, verify};
 const PLAN_TIME: Duration = Duration::from_secs(300);
 
 /// `lacuna validate`.
-pub(super) fn validate(model: &Path) -> Result<(), Problem> {
+pub(super) fn validate(model: &Path, draw: Option<&Path>) -> Result<(), Problem> {
+    let drawing = draw.map(Drawing::of).transpose()?;
     let bytes = read_input(model, DOCUMENT_BYTES)?;
     let report = match studies::watched(PLAN_TIME, |budget| documents::validate(&bytes, budget)) {
         // What is no JSON is an invalid model as well, to whoever reads the report.
@@ -28,11 +31,57 @@ pub(super) fn validate(model: &Path) -> Result<(), Problem> {
         other => other?,
     };
     print_json(&report)?;
+    // Only a legal document has states to draw.
+    let drawn = drawing.filter(|_| report.states.is_some());
+    if let Some(drawing) = drawn {
+        drawing.write(&bytes)?;
+    }
     if report.valid {
         return Ok(());
     }
     let errors = report.diagnostics.iter().filter(|remark| remark.severity == Severity::Error).count();
-    Err(Problem::new(ProblemKind::InvalidModel, format!("{} is not a valid model: {errors} errors, listed on stdout", model.display())))
+    let count = if errors == 1 { "1 error, told".to_owned() } else { format!("{errors} errors, listed") };
+    let left_out = if draw.is_some() && drawn.is_none() { "; nothing is drawn of a document that cannot be read" } else { "" };
+    Err(Problem::new(ProblemKind::InvalidModel, format!("{} is not a valid model: {count} on stdout{left_out}", model.display())))
+}
+
+/// A drawing to be made.
+#[derive(Clone, Copy)]
+struct Drawing<'a> {
+    path: &'a Path,
+    dot: bool,
+}
+
+impl<'a> Drawing<'a> {
+    fn of(path: &'a Path) -> Result<Self, Problem> {
+        match path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("svg") => Ok(Self { path, dot: false }),
+            Some("dot" | "gv") => Ok(Self { path, dot: true }),
+            _ => Err(Problem::new(ProblemKind::Usage, format!("{} is to be drawn, and ends with neither .svg nor .dot", path.display()))),
+        }
+    }
+
+    fn write(self, document: &[u8]) -> Result<(), Problem> {
+        let diagram = documents::read_diagram(document)?;
+        let text = if self.dot { diagram.dot() } else { diagram.svg() };
+        files::write_whole(self.path, text.as_bytes()).map_err(|error| Problem::io(self.path.display(), &error))
+    }
+}
+
+/// `lacuna address`.
+pub(super) fn address(args: &AddressArgs) -> Result<(), Problem> {
+    let model = documents::read_model(&read_input(&args.model, DOCUMENT_BYTES)?)?;
+    let sought = match (&args.at, args.near) {
+        (Some(address), _) => Sought::At(address.clone()),
+        (None, Some(point_mm)) => Sought::Near {
+            point_mm,
+            within_mm: args.within,
+            tolerance_mm: args.tolerance,
+            most: args.most.and_then(|most| usize::try_from(most).ok()).unwrap_or(CELLS_LISTED),
+        },
+        (None, None) => return Err(Problem::new(ProblemKind::Usage, "say what to tell: --at ADDRESS or --near X,Y,Z")),
+    };
+    print_json(&addresses::answer(&model, &sought, PLAN_TIME)?)
 }
 
 fn unreadable(problem: &Problem) -> ValidationReport {

@@ -24,6 +24,8 @@ fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
         .routes(routes!(studies::validate))
         .routes(routes!(studies::plan))
         .routes(routes!(studies::solve))
+        .routes(routes!(studies::automaton))
+        .routes(routes!(studies::address))
         .routes(routes!(jobs::submit, jobs::list))
         .routes(routes!(jobs::show, jobs::forget))
         .routes(routes!(jobs::cancel))

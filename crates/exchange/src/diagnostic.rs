@@ -114,6 +114,8 @@ codes! {
     MORE_DIAGNOSTICS = "document.more-diagnostics";
     /// A state's name is not that of a state of the model.
     UNKNOWN_STATE = "automaton.unknown-state";
+    /// The text is no address of a cell or point.
+    BAD_ADDRESS = "address.syntax";
     /// A job refers to a model that is not stored.
     UNKNOWN_MODEL = "job.unknown-model";
     /// A limit that a job asks for is above what the service allows.

@@ -110,7 +110,8 @@ impl JobError {
     }
 
     /// The first error speaks for all; every finding is listed.
-    pub(crate) fn model(findings: Vec<Finding>) -> Self {
+    #[must_use]
+    pub fn model(findings: Vec<Finding>) -> Self {
         let first = findings.iter().find(|finding| !finding.warning).cloned();
         let (code, message) = first.map_or(("invalid-model", String::new()), |finding| (finding.code, finding.message));
         let kind = if code == "automaton.convergence-undecided" { Kind::Unreachable } else { Kind::Invalid };

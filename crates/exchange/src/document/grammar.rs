@@ -3,6 +3,7 @@
 
 use serde_json::{Value, json};
 
+use super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
 use crate::format::FORMATS;
 
 /// A kind of object.
@@ -492,5 +493,32 @@ pub(super) const JOB_LIMITS: Object = Object {
         optional("cells", "Leaf cells that the evaluation may produce.", count),
         optional("memory_bytes", "Accounted memory in bytes.", count),
         optional("depth", "Length of the longest address.", || json!({ "type": "integer", "minimum": 1, "maximum": u32::MAX })),
+    ],
+};
+
+pub(super) const ADDRESS_QUESTION: Object = Object {
+    title: "a question about addresses",
+    about: "Where an address leads (at), or which addresses lead near a point (near). Exactly one of model and model_ref is given, and exactly one of at and near.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "at",
+            "An address: the root cell, a colon, the indices of transitions, and in parentheses those that repeat without end, for example `0: 1 2 (0 3)`.",
+            || json!({ "type": "string" }),
+        ),
+        optional("near", "A point, in mm whatever the unit of the model.", vector),
+        optional(
+            "within_mm",
+            "With `near`: cells as far as this are listed; those that may hold the closest point of the shape when absent.",
+            || json!({ "type": "number", "minimum": 0 }),
+        ),
+        optional("tolerance_mm", "With `near`: radius to which cells are refined; a thousandth of the shape's when absent.", positive),
+        optional(
+            "most",
+            "With `near`: cells to list at most.",
+            || json!({ "type": "integer", "minimum": 1, "maximum": MOST_CELLS_LISTED, "default": CELLS_LISTED }),
+        ),
     ],
 };

@@ -6,6 +6,7 @@
 //! the reading. After that nothing about the document needs to be looked at again, except what only the
 //! mathematics can tell: the kernel's business.
 
+mod address;
 mod bcifs;
 mod constraint;
 mod curve;
@@ -27,6 +28,7 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use address::{AddressQuestion, CELLS_LISTED, MOST_CELLS_LISTED, Sought};
 pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
 pub use schema::{job_schema, model_schema, schemas};
 pub use solve::SolveDocument;
@@ -87,6 +89,14 @@ pub fn read_job(bytes: &[u8], limits: &DocumentLimits) -> Result<JobDocument, Ve
 /// As [`read_model`].
 pub fn read_solve(bytes: &[u8], limits: &DocumentLimits) -> Result<SolveDocument, Vec<Diagnostic>> {
     read(bytes, limits, solve::solve)
+}
+
+/// Reads a question about addresses.
+///
+/// # Errors
+/// As [`read_model`], and an address that cannot be read.
+pub fn read_address_question(bytes: &[u8], limits: &DocumentLimits) -> Result<AddressQuestion, Vec<Diagnostic>> {
+    read(bytes, limits, address::question)
 }
 
 fn read<T>(

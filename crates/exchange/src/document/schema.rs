@@ -7,9 +7,9 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
-    Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema,
-    matrix_schema, reference,
+    ADDRESS_QUESTION, ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP,
+    MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP,
+    control_point_schema, matrix_schema, reference,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -77,6 +77,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Primitive".into(), primitive()));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
     schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
+    schemas.push(("AddressQuestion".into(), address_question()));
     schemas.push(("Job".into(), job()));
     schemas.sort_by(|(one, _), (other, _)| one.cmp(other));
     schemas
@@ -118,6 +119,18 @@ fn exactly_one(mut schema: Value, names: &[&str]) -> Value {
 fn primitive() -> Value {
     let mut schema = exactly_one(object(&PRIMITIVE, &[]), &["points", "polyline", "mesh", "solid"]);
     schema["dependentRequired"] = json!({ "closed": ["polyline"] });
+    schema
+}
+
+fn address_question() -> Value {
+    let mut schema = object(&ADDRESS_QUESTION, &[]);
+    schema["allOf"] = json!([
+        exactly_one(json!({}), &["model", "model_ref"]),
+        exactly_one(json!({}), &["at", "near"]),
+        { "if": { "required": ["at"] }, "then": { "not": { "anyOf": [
+            { "required": ["within_mm"] }, { "required": ["tolerance_mm"] }, { "required": ["most"] }
+        ] } } },
+    ]);
     schema
 }
 

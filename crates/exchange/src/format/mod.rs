@@ -22,6 +22,7 @@
 //! ```
 
 mod addresses;
+pub mod automaton;
 mod error;
 mod geometry;
 mod glb;

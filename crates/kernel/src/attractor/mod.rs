@@ -1,6 +1,7 @@
 //! The limit set of an automaton and control points: bounded once per state, so that every cell is
 //! bounded by a few multiplications, whatever the signs of its operators.
 
+mod address;
 mod bound;
 pub mod cell;
 mod complex;
@@ -8,6 +9,7 @@ mod connected;
 mod cover;
 mod defect;
 mod early;
+mod near;
 mod needle;
 mod precision;
 mod refine;
@@ -17,9 +19,11 @@ mod walk;
 use crate::automaton::topology::{Topology, TopologyError};
 use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, StateId, convergence};
 use crate::error::Kind;
+pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
+pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use precision::LinearPrecision;
 pub use refine::{RefineError, Streamed, count_cells, refine, stream};
 use std::sync::Arc;
