@@ -3,7 +3,7 @@
 
 use glam::{DVec3, DVec4};
 use lacuna_kernel::attractor::{Attractor, refine};
-use lacuna_kernel::budget::Budget;
+use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{
     Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, CornerCutting, Entry, Glue, Matrix, Model, RootCell, Shape, TransitionSpec,
 };
@@ -268,4 +268,24 @@ fn a_boundary_seen_backwards_must_be_alike_backwards() {
     bcifs.glue.push(Glue { between: [(0, 0), (1, 0)], reversed: true, permutation: None });
     let findings = Model { name: None, shape: Shape::Bcifs(bcifs) }.lower().expect_err("the edge is not symmetric");
     assert!(findings.iter().any(|finding| finding.code == "automaton.asymmetric-boundary"), "{findings:?}");
+}
+
+#[test]
+fn memory_beyond_the_limit_is_refused_with_a_tolerance_that_passes() {
+    let attractor = attractor(torus(false, true));
+    let limits = Limits { memory_bytes: 4 << 20, ..Limits::default() };
+    let budget = Budget { limits, ..Budget::default() };
+    let error = refine(&attractor, Tolerance::new(1e-5).expect("positive"), &budget).expect_err("too fine");
+    assert_eq!(error.code(), "limit-memory");
+    let (_, remedy) = error.limit().and_then(|facts| facts.remedy).expect("a way out");
+    assert!(remedy > 1e-5);
+    assert!(refine(&attractor, Tolerance::new(0.5).expect("positive"), &budget).is_ok());
+}
+
+#[test]
+fn boundaries_are_of_lower_dimension() {
+    let mut bcifs = biquadratic(false, vec![patch(|_, _| 0.0)]);
+    bcifs.states[1].boundaries.push(BoundarySpec { state: "edge".into(), incidence: matrix(&identity(6)) });
+    let findings = Model { name: None, shape: Shape::Bcifs(bcifs) }.lower().expect_err("an edge bounds itself");
+    assert!(findings.iter().any(|finding| finding.code == "automaton.boundary-dimension"), "{findings:?}");
 }

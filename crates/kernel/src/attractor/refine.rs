@@ -24,6 +24,18 @@ pub enum RefineError {
         /// A tolerance that would pass, as far as the cells refined so far tell.
         reachable_mm: f64,
     },
+    /// More memory than allowed.
+    #[error("the tolerance of {tolerance_mm} mm needs more than {allowed_bytes} bytes for its {leaf_cells} cells and more")]
+    Memory {
+        /// The limit.
+        allowed_bytes: u64,
+        /// What was asked.
+        tolerance_mm: f64,
+        /// Leaf cells that filled it.
+        leaf_cells: u64,
+        /// A tolerance that would pass, as far as the cells refined so far tell.
+        reachable_mm: f64,
+    },
     /// An address longer than allowed.
     #[error("the tolerance of {tolerance_mm} mm needs addresses longer than {allowed}; cells of that depth reach {reached_mm} mm")]
     Depth {
@@ -42,7 +54,7 @@ impl RefineError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
-            Self::Cells { .. } | Self::Depth { .. } => Kind::Limit,
+            Self::Cells { .. } | Self::Memory { .. } | Self::Depth { .. } => Kind::Limit,
         }
     }
 
@@ -52,6 +64,7 @@ impl RefineError {
         match self {
             Self::Stopped(stopped) => stopped.code(),
             Self::Cells { .. } => "limit-cells",
+            Self::Memory { .. } => "limit-memory",
             Self::Depth { .. } => "limit-depth",
         }
     }
@@ -65,6 +78,12 @@ impl RefineError {
                 limit: "cells",
                 asked: *allowed as f64 + 1.0,
                 allowed: *allowed as f64,
+                remedy: Some(("tolerance_mm", *reachable_mm)),
+            }),
+            Self::Memory { allowed_bytes, reachable_mm, .. } => Some(LimitFacts {
+                limit: "memory_bytes",
+                asked: *allowed_bytes as f64 + 1.0,
+                allowed: *allowed_bytes as f64,
                 remedy: Some(("tolerance_mm", *reachable_mm)),
             }),
             Self::Depth { allowed, reached_mm, .. } => Some(LimitFacts {
@@ -90,7 +109,7 @@ pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> R
     let before = Extent { leaf_cells: whole.tessellation.leaf_cells, deviation_mm: whole.tessellation.deviation_mm };
     let extent = walk(attractor, &without, before, tolerance, budget, &mut |part: Part| -> Result<(), RefineError> {
         whole.append(part);
-        Ok(())
+        whole.check_memory(tolerance, budget)
     })?;
     whole.tessellation.leaf_cells = extent.leaf_cells;
     whole.tessellation.deviation_mm = extent.deviation_mm + rounding_mm(largest_coordinate(&whole.tessellation.vertices));
@@ -223,6 +242,18 @@ impl Part {
                 self.open_end = None;
             }
         }
+    }
+
+    /// Vectors grow to twice what they hold.
+    fn check_memory(&self, tolerance: Tolerance, budget: &Budget) -> Result<(), RefineError> {
+        let Tessellation { vertices, points, segments, triangles, .. } = &self.tessellation;
+        let bytes = 2 * (24 * vertices.len() + 4 * points.len() + 8 * segments.len() + 12 * triangles.len()) as u64;
+        let allowed_bytes = budget.limits.memory_bytes;
+        if bytes <= allowed_bytes {
+            return Ok(());
+        }
+        let leaf_cells = (points.len() + segments.len() + triangles.len()) as u64;
+        Err(RefineError::Memory { allowed_bytes, tolerance_mm: tolerance.mm(), leaf_cells, reachable_mm: 2.0 * tolerance.mm() })
     }
 
     fn append(&mut self, other: Part) {
