@@ -312,7 +312,7 @@ fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -
     for _ in 0..200 {
         match count_cells(attractor, Tolerance::new(coarse)?, &counted) {
             Ok(count) => known.push((coarse, count as f64)),
-            Err(RefineError::Cells { .. } | RefineError::Depth { .. }) => {}
+            Err(RefineError::Cells { .. } | RefineError::Memory { .. } | RefineError::Depth { .. }) => {}
             Err(stopped @ RefineError::Stopped(_)) => return Err(stopped.into()),
         }
         match known.as_slice() {
