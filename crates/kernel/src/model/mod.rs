@@ -5,6 +5,7 @@ mod bcifs;
 mod bezier;
 mod corner_cutting;
 mod group;
+mod half_edge;
 mod ifs;
 mod lower;
 mod mesh;
@@ -16,6 +17,7 @@ pub use bcifs::{
 pub use bezier::BezierCurve;
 pub use corner_cutting::CornerCutting;
 pub use group::{Group, Part};
+pub use half_edge::{HalfEdge, HalfEdgeMesh, MeshFault};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
