@@ -64,6 +64,10 @@ fn text() -> Value {
     json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f]*$" })
 }
 
+fn file_name() -> Value {
+    json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f\\\\:]*$" })
+}
+
 fn list(items: Value, least: usize) -> Value {
     json!({ "type": "array", "items": items, "minItems": least })
 }
@@ -366,8 +370,13 @@ pub(super) const MESH: Object = Object {
     about: "A polygon mesh: faces of one corner are points, of two segments, of three and more polygons.",
     members: &[
         family!("mesh"),
-        required("vertices", "The corner points.", || points(1)),
-        required("faces", "The corner indices of each face, counter-clockwise seen from outside.", || faces(1)),
+        optional("vertices", "The corner points; unless there is a file.", || points(1)),
+        optional("faces", "The corner indices of each face, counter-clockwise seen from outside; unless there is a file.", || faces(1)),
+        optional(
+            "file",
+            "Instead of vertices and faces: an STL, 3MF, OBJ, PLY, OFF or VRML file, by its path in the document's folder. Polygons stay polygons; lengths are in the file's unit, or in the document's if the file names none. Only for documents that are read from a folder.",
+            file_name,
+        ),
         optional(
             "interior",
             "Whether the mesh stands for the solid that it bounds or for its surface; `auto`: the solid if it is closed.",
