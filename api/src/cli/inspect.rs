@@ -50,7 +50,7 @@ fn report(file: &MeshFile, bytes: usize, topology: &Topology) -> Value {
         "unit": facts.unit.map_or("none, taken for mm", unit_word),
         "objects": facts.object_names,
         "polygons_fanned": file.fans.len(),
-        "left_out": facts.left_out.iter().map(|(word, count)| (*word, json!(count))).collect::<serde_json::Map<_, _>>(),
+        "left_out": facts.left_out.iter().map(|(word, count)| ((*word).to_owned(), json!(count))).collect::<serde_json::Map<_, _>>(),
         "cage": cage(file),
         "vertices": mesh.vertices.len(),
         "triangles": mesh.triangles.len(),

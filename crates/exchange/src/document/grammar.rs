@@ -385,6 +385,25 @@ pub(super) const MESH: Object = Object {
     ],
 };
 
+pub(super) const TERRAIN: Object = Object {
+    title: "a terrain",
+    about: "A surface of random midpoint displacement (Fournier, Fussell, Carpenter): triangles are cut in four `levels` times, and every new midpoint moves along z.",
+    members: &[
+        family!("terrain"),
+        optional("triangle", "The three corners to start from; or a grid.", || tuple(vector(), 3)),
+        optional("grid", "Rows of points to start from, two or more of two or more; or a triangle.", || list(points(2), 2)),
+        required(
+            "roughness",
+            "r: a midpoint that is new at level k moves by at most half the longest given edge times r^k. 0 is flat; 1/2 halves with the edges; below 1.",
+            || json!({ "type": "number", "minimum": 0, "exclusiveMaximum": 1 }),
+        ),
+        required("levels", "How often triangles are cut in four.", index),
+        optional("random_seed", "Which of the terrains; 0 when absent. The same seed gives the same terrain.", || {
+            json!({ "type": "integer", "minimum": 0, "maximum": 9_007_199_254_740_991_u64, "default": 0 })
+        }),
+    ],
+};
+
 pub(super) const GROUP: Object = Object {
     title: "a group",
     about: "The union of several shapes.",
@@ -404,17 +423,18 @@ pub(super) const PART: Object = Object {
 };
 
 /// The families that can be evaluated, with the schema's name.
-pub(super) const FAMILIES: [(&str, &str, &Object); 6] = [
+pub(super) const FAMILIES: [(&str, &str, &Object); 7] = [
     ("ifs", "IfsShape", &IFS),
     ("bcifs", "BcifsShape", &BCIFS),
     ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
     ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
     ("mesh", "MeshShape", &MESH),
+    ("terrain", "TerrainShape", &TERRAIN),
     ("group", "GroupShape", &GROUP),
 ];
 
 /// Families of the grammar that cannot be evaluated yet.
-pub(super) const LATER_FAMILIES: [&str; 12] = [
+pub(super) const LATER_FAMILIES: [&str; 11] = [
     "bezier_surface",
     "nurbs_curve",
     "nurbs_surface",
@@ -424,7 +444,6 @@ pub(super) const LATER_FAMILIES: [&str; 12] = [
     "four_point",
     "subdivision",
     "interpolation",
-    "terrain",
     "tensor",
     "sum",
 ];

@@ -20,6 +20,7 @@ mod parse;
 mod report;
 mod schema;
 mod solve;
+mod terrain;
 mod transform;
 mod units;
 mod walk;

@@ -9,6 +9,7 @@ mod half_edge;
 mod ifs;
 mod lower;
 mod mesh;
+mod terrain;
 pub mod solve;
 
 pub use bcifs::{
@@ -21,6 +22,7 @@ pub use half_edge::{HalfEdge, HalfEdgeMesh, MeshFault};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
+pub use terrain::{Terrain, TerrainBase};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
@@ -47,6 +49,8 @@ pub enum Shape {
     CornerCutting(CornerCutting),
     /// A polygon mesh.
     Mesh(PolygonMesh),
+    /// A surface of random midpoint displacement.
+    Terrain(Terrain),
     /// Several shapes.
     Group(Group),
 }
