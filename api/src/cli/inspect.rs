@@ -90,7 +90,8 @@ fn cage(file: &MeshFile) -> Value {
             })
         }
         Err(faults) => {
-            let faults = faults.iter().map(|fault| json!({ "pointer": fault.pointer(), "code": fault.code(), "message": fault.to_string() }));
+            let faults =
+                faults.iter().map(|fault| json!({ "pointer": fault.pointer(), "code": fault.code(), "message": fault.to_string() }));
             json!({ "manifold": false, "faces": faces.len(), "faults": faults.collect::<Vec<_>>() })
         }
     }

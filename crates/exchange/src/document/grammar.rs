@@ -398,9 +398,11 @@ pub(super) const TERRAIN: Object = Object {
             || json!({ "type": "number", "minimum": 0, "exclusiveMaximum": 1 }),
         ),
         required("levels", "How often triangles are cut in four.", index),
-        optional("random_seed", "Which of the terrains; 0 when absent. The same seed gives the same terrain.", || {
-            json!({ "type": "integer", "minimum": 0, "maximum": 9_007_199_254_740_991_u64, "default": 0 })
-        }),
+        optional(
+            "random_seed",
+            "Which of the terrains; 0 when absent. The same seed gives the same terrain.",
+            || json!({ "type": "integer", "minimum": 0, "maximum": 9_007_199_254_740_991_u64, "default": 0 }),
+        ),
     ],
 };
 

@@ -166,7 +166,10 @@ fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axi
             // The proof of the margin holds in every coordinate: x lies within margin times their spread of the control
             // points' interval. Flat shapes are exact at once here too.
             if !attractor.roots()[cell.root as usize].rational {
-                let (least, most) = points.iter().map(|point| sign * point[axis]).fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
+                let (least, most) = points
+                    .iter()
+                    .map(|point| sign * point[axis])
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
                 floor = floor.max(least - margin * (most - least));
                 ceiling = ceiling.min(most + margin * (most - least));
             }

@@ -9,8 +9,8 @@ mod half_edge;
 mod ifs;
 mod lower;
 mod mesh;
-mod terrain;
 pub mod solve;
+mod terrain;
 
 pub use bcifs::{
     Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, Relation, RootCell, Side, TransitionSpec,

@@ -66,7 +66,11 @@ impl Terrain {
             draft.error(&format!("/{member}{place}"), "model.not-finite", format!("the point is {point}, and must be finite"));
         }
         if !(0.0..1.0).contains(&self.roughness) {
-            draft.error("/roughness", "terrain.roughness", format!("the roughness is {}, and must be at least 0 and below 1", self.roughness));
+            draft.error(
+                "/roughness",
+                "terrain.roughness",
+                format!("the roughness is {}, and must be at least 0 and below 1", self.roughness),
+            );
         }
         let coarse = if matches!(self.base, TerrainBase::Triangle(_)) {
             1
@@ -92,7 +96,8 @@ impl TerrainBase {
             Self::Triangle(corners) => (corners, &[]),
             Self::Grid(rows) => (&[], rows),
         };
-        let of_rows = rows.iter().enumerate().flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &point)| (format!("/{i}/{j}"), point)));
+        let of_rows =
+            rows.iter().enumerate().flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &point)| (format!("/{i}/{j}"), point)));
         corners.iter().enumerate().map(|(index, &point)| (format!("/{index}"), point)).chain(of_rows)
     }
 }

@@ -52,7 +52,9 @@ fn assert_fault(members: &str, code: &str, pointer: &str) {
 
 #[test]
 fn paths_out_of_the_folder_and_folders_that_are_not_there_are_refused() {
-    for path in ["../quads.obj", "parts/../quads.obj", "/etc/passwd", "parts//quads.obj", "./quads.obj", "C:quads.obj", r"..\\quads.obj", "parts/"] {
+    for path in
+        ["../quads.obj", "parts/../quads.obj", "/etc/passwd", "parts//quads.obj", "./quads.obj", "C:quads.obj", r"..\\quads.obj", "parts/"]
+    {
         assert_fault(&format!(r#""file": "{path}""#), code::FILE_OUTSIDE, "/shape/file");
     }
     assert_fault(r#""file": "none.obj""#, code::FILE_NOT_READ, "/shape/file");

@@ -162,9 +162,8 @@ fn terrain() -> impl Strategy<Value = Shape> {
     let triangle = [point(), point(), point()].prop_map(TerrainBase::Triangle);
     let grid = (2..4_usize).prop_flat_map(|columns| vec(vec(point(), columns), 2..4)).prop_map(TerrainBase::Grid);
     let base = prop_oneof![triangle, grid];
-    (base, number(), 0..12_u32, 0..1_u64 << 53).prop_map(|(base, roughness, levels, random_seed)| {
-        Shape::Terrain(Terrain { base, roughness, levels, random_seed })
-    })
+    (base, number(), 0..12_u32, 0..1_u64 << 53)
+        .prop_map(|(base, roughness, levels, random_seed)| Shape::Terrain(Terrain { base, roughness, levels, random_seed }))
 }
 
 fn shape() -> impl Strategy<Value = Shape> {
