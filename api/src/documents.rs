@@ -2,11 +2,14 @@
 //! what was meant.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
 use lacuna_exchange::diagnostic::{Diagnostic, code};
-use lacuna_exchange::document::{self, DocumentLimits, ModelSource, Sought};
+use lacuna_exchange::document::{self, DocumentLimits, JobDocument, ModelSource, Sought};
 use lacuna_exchange::format::automaton::Diagram;
-use lacuna_exchange::format::{FORMATS, Format};
+use lacuna_exchange::format::{FORMATS, Format, MeshFile, ReadLimits, read as read_mesh};
 use lacuna_fabrication::{Job, JobKind, SolutionSpace, Solved};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::Model;
@@ -88,12 +91,56 @@ pub fn read_model(bytes: &[u8]) -> Result<Model, Problem> {
     production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))?.map_err(refused)
 }
 
+/// Reads a model document that may name mesh files of its folder.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_model_in(bytes: &[u8], folder: Option<&Path>) -> Result<Model, Problem> {
+    model_in(bytes, folder)?.map_err(refused)
+}
+
+fn model_in(bytes: &[u8], folder: Option<&Path>) -> Result<Result<Model, Vec<Diagnostic>>, Problem> {
+    let Some(folder) = folder else { return production::guarded(|| document::read_model(bytes, &DocumentLimits::default())) };
+    production::guarded(|| document::read_model_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name)))
+}
+
+/// Reads a mesh file below a folder. Neither its name nor a link leads out of the folder.
+fn mesh_in(folder: &Path, name: &str) -> Result<MeshFile, String> {
+    let failed = |error: std::io::Error| error.to_string();
+    let inside = folder.canonicalize().map_err(failed)?;
+    let path = inside.join(name).canonicalize().map_err(failed)?;
+    if !path.starts_with(&inside) {
+        return Err("it lies outside of the document's folder".to_owned());
+    }
+    // A pipe or a device may never end.
+    if !path.is_file() {
+        return Err("it is no file".to_owned());
+    }
+    let limits = ReadLimits::default();
+    let mut bytes = Vec::new();
+    File::open(&path).and_then(|file| file.take(limits.file_bytes + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    read_mesh(&bytes, None, &limits).map_err(|error| error.to_string())
+}
+
 /// Reads a job document, fetches the stored models that it names, and completes its limits.
 ///
 /// # Errors
 /// All findings, as one problem.
 pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
-    let read = production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    complete(production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?, most, find)
+}
+
+/// Reads a job document that may name mesh files of its folder, and no stored models.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_job_in(bytes: &[u8], most: &Limits, folder: Option<&Path>) -> Result<Job, Problem> {
+    let Some(folder) = folder else { return read_job(bytes, most, &|_| None) };
+    let read = || document::read_job_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name));
+    complete(production::guarded(read)?.map_err(refused)?, most, &|_| None)
+}
+
+fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
     let model = |id: &str| find(id).and_then(|bytes| read_model(&bytes).ok());
     let mut job = read.resolve(&within(&Limits::default(), most), most, model).map_err(refused)?;
     if job.outputs.is_empty() {
@@ -234,7 +281,15 @@ pub fn read_diagram(bytes: &[u8]) -> Result<Diagram, Problem> {
 /// # Errors
 /// When the bytes are not a JSON text at all, or the kernel has a defect.
 pub fn validate(bytes: &[u8], budget: &Budget) -> Result<ValidationReport, Problem> {
-    let model = match production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))? {
+    validate_in(bytes, None, budget)
+}
+
+/// Reads and examines a model that may name mesh files of its folder.
+///
+/// # Errors
+/// As [`validate`].
+pub fn validate_in(bytes: &[u8], folder: Option<&Path>, budget: &Budget) -> Result<ValidationReport, Problem> {
+    let model = match model_in(bytes, folder)? {
         Ok(model) => model,
         Err(diagnostics) if diagnostics.iter().any(is_about_the_text) => return Err(refused(diagnostics)),
         Err(diagnostics) => {

@@ -77,9 +77,14 @@ pub(super) enum Command {
     Run(RunArgs),
     /// Tell what a mesh file contains; JSON on stdout.
     Inspect {
-        /// An STL, 3MF, OBJ, PLY or OFF file.
+        /// An STL, 3MF, OBJ, PLY, OFF or VRML file.
         file: PathBuf,
     },
+    /// Write a mesh file in other formats. Polygons stay polygons where the format has them; coordinates are rounded to
+    /// single precision.
+    Convert(ConvertArgs),
+    /// List the classics of the library as JSON, or give the model document of one.
+    Library(LibraryArgs),
     /// Do the cases below a folder and compare with what they expect; exit code 1 when one fails.
     Verify(VerifyArgs),
     /// Serve HTTP.
@@ -227,6 +232,27 @@ pub(super) struct RunArgs {
     pub(super) folder: PathBuf,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ConvertArgs {
+    /// An STL, 3MF, OBJ, PLY, OFF or VRML file; what it is, is found in it. `-` is stdin.
+    pub(super) file: PathBuf,
+    /// Files to write, each in the format of its ending. `-` is stdout.
+    #[arg(value_name = "OUT", required = true)]
+    pub(super) outputs: Vec<PathBuf>,
+    /// Format of what goes to stdout.
+    #[arg(long, value_name = "FORMAT")]
+    pub(super) format: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct LibraryArgs {
+    /// The classic; all are listed when absent.
+    pub(super) name: Option<String>,
+    /// The document to write; stdout when absent.
+    #[arg(short, long = "output", value_name = "MODEL", requires = "name")]
+    pub(super) output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -126,12 +126,12 @@ fn check_stop(budget: &Budget) -> Result<(), Problem> {
 }
 
 /// What goes to stdout is written to a file first: formats seek, and a pipe gets everything or nothing.
-fn start(path: &Path) -> Result<PendingFile, Problem> {
+pub(super) fn start(path: &Path) -> Result<PendingFile, Problem> {
     let file = if path == Path::new("-") { PendingFile::create_in(&std::env::temp_dir()) } else { PendingFile::create_beside(path) };
     file.map_err(|error| Problem::io(path.display(), &error))
 }
 
-fn finish(mut file: PendingFile, path: &Path) -> Result<(), Problem> {
+pub(super) fn finish(mut file: PendingFile, path: &Path) -> Result<(), Problem> {
     let failed = |error| Problem::io(path.display(), &error);
     if path != Path::new("-") {
         return file.commit(path).map_err(failed);

@@ -10,7 +10,7 @@ use lacuna_fabrication::SolutionSpace;
 use lacuna_kernel::budget::Limits;
 
 use super::args::{AddressArgs, SolveArgs, VerifyArgs};
-use super::{DOCUMENT_BYTES, print, print_json, read_input, stop};
+use super::{DOCUMENT_BYTES, folder_of, print, print_json, read_input, stop};
 use crate::addresses;
 use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
 use crate::problem::{Problem, ProblemKind};
@@ -25,7 +25,7 @@ const PLAN_TIME: Duration = Duration::from_secs(300);
 pub(super) fn validate(model: &Path, draw: Option<&Path>) -> Result<(), Problem> {
     let drawing = draw.map(Drawing::of).transpose()?;
     let bytes = read_input(model, DOCUMENT_BYTES)?;
-    let report = match studies::watched(PLAN_TIME, |budget| documents::validate(&bytes, budget)) {
+    let report = match studies::watched(PLAN_TIME, |budget| documents::validate_in(&bytes, folder_of(model), budget)) {
         // What is no JSON is an invalid model as well, to whoever reads the report.
         Err(problem) if problem.kind == ProblemKind::MalformedJson => unreadable(&problem),
         other => other?,
@@ -70,7 +70,7 @@ impl<'a> Drawing<'a> {
 
 /// `lacuna address`.
 pub(super) fn address(args: &AddressArgs) -> Result<(), Problem> {
-    let model = documents::read_model(&read_input(&args.model, DOCUMENT_BYTES)?)?;
+    let model = documents::read_model_in(&read_input(&args.model, DOCUMENT_BYTES)?, folder_of(&args.model))?;
     let sought = match (&args.at, args.near) {
         (Some(address), _) => Sought::At(address.clone()),
         (None, Some(point_mm)) => Sought::Near {
@@ -116,7 +116,7 @@ pub(super) fn solve(args: &SolveArgs, quiet: bool) -> Result<(), Problem> {
             return Err(usage(format!("--set gives two values to {name:?}")));
         }
     }
-    let model = documents::read_model(&read_input(&args.model, DOCUMENT_BYTES)?)?;
+    let model = documents::read_model_in(&read_input(&args.model, DOCUMENT_BYTES)?, folder_of(&args.model))?;
     let time = Duration::try_from_secs_f64(args.limit_seconds).unwrap_or(Duration::MAX);
     let solved = studies::watched(time, |budget| {
         stop::on_signals(&budget.cancel)?;
@@ -157,7 +157,7 @@ fn sum_up(space: &SolutionSpace) {
 pub(super) fn plan(job: &Path) -> Result<(), Problem> {
     let bytes = read_input(job, DOCUMENT_BYTES)?;
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
-    let job = documents::read_job(&bytes, &most, &|_| None)?;
+    let job = documents::read_job_in(&bytes, &most, folder_of(job))?;
     print_json(&studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
 }
 

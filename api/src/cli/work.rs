@@ -8,7 +8,7 @@ use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 use super::args::{EvaluateArgs, LimitArgs, MeasureArgs, OutputArgs, ProgressMode, RunArgs, SolidifyArgs};
 use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
-use super::{DOCUMENT_BYTES, print_json, read_input, stop};
+use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::{documents, files, production};
@@ -45,7 +45,7 @@ pub(super) fn run(args: &RunArgs, manner: Manner) -> Result<(), Problem> {
     let bytes = read_input(&args.job, DOCUMENT_BYTES)?;
     // Whoever sits at the machine may ask for as much of it as there is.
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
-    let mut job = documents::read_job(&bytes, &most, &|_| None)?;
+    let mut job = documents::read_job_in(&bytes, &most, folder_of(&args.job))?;
     job.limits = limits(job.limits, &args.limits);
     std::fs::create_dir_all(&args.folder).map_err(|error| Problem::io(args.folder.display(), &error))?;
     let title = job.inputs.first().map(|input| input.name.clone());
@@ -98,7 +98,7 @@ fn check_distinct(targets: &[Target], output: &OutputArgs) -> Result<(), Problem
 }
 
 fn job_of(kind: JobKind, model: &Path, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Result<Job, Problem> {
-    let model = documents::read_model(&read_input(model, DOCUMENT_BYTES)?)?;
+    let model = documents::read_model_in(&read_input(model, DOCUMENT_BYTES)?, folder_of(model))?;
     let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
     let mut names: Vec<String> = Vec::new();
     for output in outputs {

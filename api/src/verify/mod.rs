@@ -79,7 +79,7 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
         Err(error) => return vec![Row::failure("model.json", "a readable file", &error.to_string())],
     };
     let Some(kind) = manifest.kind.job() else { return solve::rows(&document, manifest) };
-    let result = perform(&document, kind, manifest);
+    let result = perform(folder, &document, kind, manifest);
     match (&manifest.refused, result) {
         (Some(refused), result) => vec![compare_refusal(refused, result)],
         (None, Ok(certificate)) => compare::rows(manifest, &certificate),
@@ -88,8 +88,8 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
 }
 
 /// Does the case as any door would, and gives its certificate as JSON.
-fn perform(document: &[u8], kind: JobKind, manifest: &Manifest) -> Result<serde_json::Value, Problem> {
-    let model = documents::read_model(document)?;
+fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -> Result<serde_json::Value, Problem> {
+    let model = documents::read_model_in(document, Some(folder))?;
     let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
     let job = Job {
         kind,

@@ -106,6 +106,12 @@ codes! {
     FAMILY_NOT_AVAILABLE = "document.family-not-available";
     /// The kind of job belongs to the grammar and cannot be done yet.
     KIND_NOT_AVAILABLE = "document.kind-not-available";
+    /// A document names a file, and it comes without a folder, as over HTTP.
+    FILE_NOT_AVAILABLE = "document.file-not-available";
+    /// A document names a file outside of its folder.
+    FILE_OUTSIDE = "document.file-outside";
+    /// A file that a document names is not there, or holds no mesh.
+    FILE_NOT_READ = "document.file-not-read";
     /// The model has more states than the limit.
     TOO_MANY_STATES = "document.too-many-states";
     /// The model has more transitions than the limit.

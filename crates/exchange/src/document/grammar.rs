@@ -64,6 +64,10 @@ fn text() -> Value {
     json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f]*$" })
 }
 
+fn file_name() -> Value {
+    json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f\\\\:]*$" })
+}
+
 fn list(items: Value, least: usize) -> Value {
     json!({ "type": "array", "items": items, "minItems": least })
 }
@@ -366,12 +370,38 @@ pub(super) const MESH: Object = Object {
     about: "A polygon mesh: faces of one corner are points, of two segments, of three and more polygons.",
     members: &[
         family!("mesh"),
-        required("vertices", "The corner points.", || points(1)),
-        required("faces", "The corner indices of each face, counter-clockwise seen from outside.", || faces(1)),
+        optional("vertices", "The corner points; unless there is a file.", || points(1)),
+        optional("faces", "The corner indices of each face, counter-clockwise seen from outside; unless there is a file.", || faces(1)),
+        optional(
+            "file",
+            "Instead of vertices and faces: an STL, 3MF, OBJ, PLY, OFF or VRML file, by its path in the document's folder. Polygons stay polygons; lengths are in the file's unit, or in the document's if the file names none. Only for documents that are read from a folder.",
+            file_name,
+        ),
         optional(
             "interior",
             "Whether the mesh stands for the solid that it bounds or for its surface; `auto`: the solid if it is closed.",
             || json!({ "type": "string", "enum": ["auto", "solid", "surface"], "default": "auto" }),
+        ),
+    ],
+};
+
+pub(super) const TERRAIN: Object = Object {
+    title: "a terrain",
+    about: "A surface of random midpoint displacement (Fournier, Fussell, Carpenter): triangles are cut in four `levels` times, and every new midpoint moves along z.",
+    members: &[
+        family!("terrain"),
+        optional("triangle", "The three corners to start from; or a grid.", || tuple(vector(), 3)),
+        optional("grid", "Rows of points to start from, two or more of two or more; or a triangle.", || list(points(2), 2)),
+        required(
+            "roughness",
+            "r: a midpoint that is new at level k moves by at most half the longest given edge times r^k. 0 is flat; 1/2 halves with the edges; below 1.",
+            || json!({ "type": "number", "minimum": 0, "exclusiveMaximum": 1 }),
+        ),
+        required("levels", "How often triangles are cut in four.", index),
+        optional(
+            "random_seed",
+            "Which of the terrains; 0 when absent. The same seed gives the same terrain.",
+            || json!({ "type": "integer", "minimum": 0, "maximum": 9_007_199_254_740_991_u64, "default": 0 }),
         ),
     ],
 };
@@ -395,17 +425,18 @@ pub(super) const PART: Object = Object {
 };
 
 /// The families that can be evaluated, with the schema's name.
-pub(super) const FAMILIES: [(&str, &str, &Object); 6] = [
+pub(super) const FAMILIES: [(&str, &str, &Object); 7] = [
     ("ifs", "IfsShape", &IFS),
     ("bcifs", "BcifsShape", &BCIFS),
     ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
     ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
     ("mesh", "MeshShape", &MESH),
+    ("terrain", "TerrainShape", &TERRAIN),
     ("group", "GroupShape", &GROUP),
 ];
 
 /// Families of the grammar that cannot be evaluated yet.
-pub(super) const LATER_FAMILIES: [&str; 12] = [
+pub(super) const LATER_FAMILIES: [&str; 11] = [
     "bezier_surface",
     "nurbs_curve",
     "nurbs_surface",
@@ -415,7 +446,6 @@ pub(super) const LATER_FAMILIES: [&str; 12] = [
     "four_point",
     "subdivision",
     "interpolation",
-    "terrain",
     "tensor",
     "sum",
 ];

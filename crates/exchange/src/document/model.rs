@@ -8,6 +8,7 @@ use super::grammar::{EMBEDDED_MODEL, FAMILIES, GROUP, LATER_FAMILIES, MODEL, Mem
 use super::ifs::ifs;
 use super::mesh::mesh;
 use super::node::{Place, Value, number_text, quoted};
+use super::terrain::terrain;
 use super::transform::affine_map;
 use super::units::{UNITS, Unit};
 use super::walk::{Walker, suggestion};
@@ -64,6 +65,7 @@ fn shape(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<
         "bezier_curve" => bezier_curve(walker, place, added).map(Shape::BezierCurve),
         "corner_cutting" => corner_cutting(walker, place, added).map(Shape::CornerCutting),
         "mesh" => mesh(walker, place, added).map(Shape::Mesh),
+        "terrain" => terrain(walker, place, added).map(Shape::Terrain),
         "group" => group(walker, place, added).map(Shape::Group),
         later if LATER_FAMILIES.contains(&later) => {
             walker.fault(&family_place, code::FAMILY_NOT_AVAILABLE, || {

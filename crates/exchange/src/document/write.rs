@@ -9,7 +9,7 @@ use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
-    Model, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side,
+    Model, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Terrain, TerrainBase,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -200,6 +200,17 @@ object! {
             Interior::Solid => Some(&"solid"),
             Interior::Surface => Some(&"surface"),
         })?;
+    Terrain: |terrain, members| {
+        members.put("family", &"terrain")?;
+        match &terrain.base {
+            TerrainBase::Triangle(corners) => members.put("triangle", &list(corners))?,
+            TerrainBase::Grid(rows) => members.put("grid", &rows.iter().map(|row| list(row)).collect::<Vec<_>>())?,
+        };
+        members
+            .put("roughness", &Number(terrain.roughness))?
+            .put("levels", &terrain.levels)?
+            .put_if(terrain.random_seed != 0, "random_seed", &terrain.random_seed)?
+    };
     Group: |group, members| members.put("family", &"group")?.put("parts", &list(&group.parts))?;
 }
 
@@ -211,6 +222,7 @@ impl Serialize for Wire<'_, Shape> {
             Shape::BezierCurve(curve) => Wire(curve).serialize(serializer),
             Shape::CornerCutting(curve) => Wire(curve).serialize(serializer),
             Shape::Mesh(mesh) => Wire(mesh).serialize(serializer),
+            Shape::Terrain(terrain) => Wire(terrain).serialize(serializer),
             Shape::Group(group) => Wire(group).serialize(serializer),
         }
     }

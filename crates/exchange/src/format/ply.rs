@@ -23,6 +23,7 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     if counts.vertices > most {
         return Err(FormatError::limit(Place::File, "vertices", counts.vertices, most));
     }
+    let wide = counts_are_wide(pieces);
     let mut bytes = Vec::with_capacity(CHUNK_BYTES + 4096);
     bytes.extend_from_slice(header(pieces, metadata).as_bytes());
     for vertex in pieces.iter().flat_map(|piece| piece.vertices) {
@@ -33,10 +34,18 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     }
     let mut before = 0;
     for piece in pieces {
-        for triangle in piece.triangles {
-            bytes.extend_from_slice(&face(triangle, before));
-            flush_full(&mut bytes, sink)?;
-        }
+        piece.each_face(|corners| {
+            if let Ok(triangle) = <&[u32; 3]>::try_from(corners)
+                && !wide
+            {
+                bytes.extend_from_slice(&face(triangle, before));
+            } else {
+                let count = (corners.len() as u32).to_le_bytes();
+                bytes.extend_from_slice(if wide { &count } else { &count[..1] });
+                corners.iter().for_each(|index| bytes.extend_from_slice(&(before + index).to_le_bytes()));
+            }
+            flush_full(&mut bytes, sink)
+        })?;
         before += piece.vertices.len() as u32;
     }
     let mut before = 0;
@@ -106,26 +115,32 @@ impl<'a, W: Write + Seek> PointFile<'a, W> {
 
 /// The header of a file of points, with a comment of as many blanks as the number leaves of twenty digits.
 fn point_header(count: u64, metadata: &Metadata<'_>) -> String {
-    let header = header_of([count, 0, 0], metadata);
+    let header = header_of([count, 0, 0], false, metadata);
     let blanks = " ".repeat(20 - count.to_string().len());
     // Titles may hold any words, but are before the elements.
     let (comments, elements) = header.split_at(header.rfind("element vertex").unwrap_or(header.len()));
     format!("{comments}comment{blanks}\n{elements}")
 }
 
-fn header(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> String {
-    let counts = counts(pieces);
-    header_of([counts.vertices, counts.triangles, counts.segments], metadata)
+/// Whether a face has more corners than one byte counts.
+fn counts_are_wide(pieces: &[Piece<'_>]) -> bool {
+    pieces.iter().any(|piece| piece.most_corners() > 255)
 }
 
-fn header_of([vertices, triangles, segments]: [u64; 3], metadata: &Metadata<'_>) -> String {
+fn header(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> String {
+    let counts = counts(pieces);
+    header_of([counts.vertices, counts.faces, counts.segments], counts_are_wide(pieces), metadata)
+}
+
+fn header_of([vertices, faces, segments]: [u64; 3], wide: bool, metadata: &Metadata<'_>) -> String {
     let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment {} units mm\n", one_line(metadata.application));
     if let Some(title) = metadata.title {
         header.push_str(&format!("comment {}\n", one_line(title)));
     }
     header.push_str(&format!("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", vertices));
-    if triangles > 0 {
-        header.push_str(&format!("element face {}\nproperty list uchar int vertex_indices\n", triangles));
+    if faces > 0 {
+        let count = if wide { "uint" } else { "uchar" };
+        header.push_str(&format!("element face {}\nproperty list {count} int vertex_indices\n", faces));
     }
     if segments > 0 {
         header.push_str(&format!("element edge {}\nproperty int vertex1\nproperty int vertex2\n", segments));

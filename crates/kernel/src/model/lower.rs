@@ -116,6 +116,7 @@ impl Draft {
             Shape::BezierCurve(curve) => curve.lower(self),
             Shape::CornerCutting(curve) => curve.lower(self),
             Shape::Mesh(mesh) => mesh.lower(self),
+            Shape::Terrain(terrain) => terrain.lower(self),
             Shape::Group(group) => self.group(group),
         }
     }

@@ -5,10 +5,12 @@ mod bcifs;
 mod bezier;
 mod corner_cutting;
 mod group;
+mod half_edge;
 mod ifs;
 mod lower;
 mod mesh;
 pub mod solve;
+mod terrain;
 
 pub use bcifs::{
     Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, Relation, RootCell, Side, TransitionSpec,
@@ -16,9 +18,11 @@ pub use bcifs::{
 pub use bezier::BezierCurve;
 pub use corner_cutting::CornerCutting;
 pub use group::{Group, Part};
+pub use half_edge::{HalfEdge, HalfEdgeMesh, MeshFault};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
+pub use terrain::{Terrain, TerrainBase};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
@@ -45,6 +49,8 @@ pub enum Shape {
     CornerCutting(CornerCutting),
     /// A polygon mesh.
     Mesh(PolygonMesh),
+    /// A surface of random midpoint displacement.
+    Terrain(Terrain),
     /// Several shapes.
     Group(Group),
 }

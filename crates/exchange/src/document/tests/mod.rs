@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod cases;
+mod files;
 mod properties;
 mod reading;

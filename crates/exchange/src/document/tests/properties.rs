@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundarySpec, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence,
-    Interior, Matrix, Model, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side, TransitionSpec,
+    Interior, Matrix, Model, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Terrain, TerrainBase, TransitionSpec,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -158,12 +158,20 @@ fn bezier() -> impl Strategy<Value = Shape> {
     })
 }
 
+fn terrain() -> impl Strategy<Value = Shape> {
+    let triangle = [point(), point(), point()].prop_map(TerrainBase::Triangle);
+    let grid = (2..4_usize).prop_flat_map(|columns| vec(vec(point(), columns), 2..4)).prop_map(TerrainBase::Grid);
+    let base = prop_oneof![triangle, grid];
+    (base, number(), 0..12_u32, 0..1_u64 << 53)
+        .prop_map(|(base, roughness, levels, random_seed)| Shape::Terrain(Terrain { base, roughness, levels, random_seed }))
+}
+
 fn shape() -> impl Strategy<Value = Shape> {
     let corner_cutting = (vec(point(), 3..6), number(), number(), any::<bool>())
         .prop_map(|(control_points, a, b, closed)| Shape::CornerCutting(CornerCutting { control_points, a, b, closed }));
     let interior = proptest::sample::select(vec![Interior::Auto, Interior::Solid, Interior::Surface]);
     let mesh = (mesh_data(), interior).prop_map(|((vertices, faces), interior)| Shape::Mesh(PolygonMesh { vertices, faces, interior }));
-    prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, mesh].prop_recursive(3, 8, 3, |shape| {
+    prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, mesh, terrain()].prop_recursive(3, 8, 3, |shape| {
         let part = (option::of(name()), option::of(map()), shape).prop_map(|(name, transform, shape)| Part { name, transform, shape });
         vec(part, 1..4).prop_map(|parts| Shape::Group(Group { parts }))
     })

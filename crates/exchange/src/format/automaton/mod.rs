@@ -153,6 +153,7 @@ impl Diagram {
             Shape::BezierCurve(curve) => self.alone("bezier curve", curve.control_points.len(), place, findings, told),
             Shape::CornerCutting(_) => self.alone("corner cutting", 3, place, findings, told),
             Shape::Mesh(_) => self.alone("mesh", 3, place, findings, told),
+            Shape::Terrain(_) => self.alone("terrain", 3, place, findings, told),
         }
     }
 
