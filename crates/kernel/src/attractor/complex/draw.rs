@@ -12,6 +12,9 @@ impl Builder<'_> {
     /// a curve.
     fn leaf_edges(&self, edge: u32, backwards: bool, out: &mut Vec<(u32, bool)>) {
         let own = &self.edges[edge as usize];
+        if own.collapsed {
+            return;
+        }
         if own.pieces == NONE {
             out.push((edge, backwards));
             return;
