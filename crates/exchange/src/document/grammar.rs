@@ -365,6 +365,249 @@ pub(super) const CORNER_CUTTING: Object = Object {
     ],
 };
 
+fn degree() -> Value {
+    json!({ "type": "integer", "minimum": 1, "maximum": 9 })
+}
+
+fn degrees(directions: usize) -> Value {
+    json!({ "anyOf": [degree(), tuple(degree(), directions)] })
+}
+
+fn knots() -> Value {
+    list(number(), 4)
+}
+
+/// Lists of lists, one level per direction.
+fn nested(item: fn() -> Value, directions: usize) -> Value {
+    (0..directions).fold(item(), |inner, _| list(inner, 1))
+}
+
+fn net_point() -> Value {
+    reference("ControlPoint")
+}
+
+fn curve_scheme() -> Value {
+    reference("CurveScheme")
+}
+
+fn curve_shape() -> Value {
+    reference("CurveShape")
+}
+
+fn factors() -> Value {
+    list(json!({ "type": "number", "exclusiveMinimum": -1, "exclusiveMaximum": 1 }), 1)
+}
+
+const WEIGHTS: Member =
+    optional("weights", "One positive weight per control point, unless the points carry theirs.", || list(positive(), 1));
+const POLYGON: Member = required("control_points", "The control polygon.", || points(3));
+const CLOSED: Member = optional("closed", "Whether the polygon is closed.", flag);
+
+pub(super) const BEZIER_SCHEME: Object = Object {
+    title: "a bezier_curve without control points",
+    about: "A Bezier curve of as many points as the net has in this direction.",
+    members: &[family!("bezier_curve")],
+};
+
+pub(super) const NURBS_SCHEME: Object = Object {
+    title: "a nurbs_curve without control points",
+    about: "A spline of any degree on any knots.",
+    members: &[
+        family!("nurbs_curve"),
+        required("degree", "The degree d, from 1 to 9.", degree),
+        required(
+            "knots",
+            "The full knot vector: as many as control points, plus d + 1; not decreasing, multiplicities up to d + 1. The curve is defined from knot d to knot n, n being the number of control points.",
+            knots,
+        ),
+    ],
+};
+
+pub(super) const NURBS_CURVE: Object = Object {
+    title: "a nurbs_curve",
+    about: "A polynomial or rational spline of any degree from 1 to 9 on any knots: clamped, periodic, with multiple knots.",
+    members: &[
+        NURBS_SCHEME.members[0],
+        NURBS_SCHEME.members[1],
+        NURBS_SCHEME.members[2],
+        required("control_points", "The control points, in order.", || rational_points(2)),
+        WEIGHTS,
+    ],
+};
+
+pub(super) const NURBS_SURFACE: Object = Object {
+    title: "a nurbs_surface",
+    about: "A polynomial or rational spline surface. Directions whose ends meet are closed; sides that are single points are poles.",
+    members: &[
+        family!("nurbs_surface"),
+        required("degree", "The degree, from 1 to 9, or one for each direction.", || degrees(2)),
+        required("knots", "A full knot vector for each direction.", || tuple(knots(), 2)),
+        required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
+        optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+    ],
+};
+
+pub(super) const NURBS_VOLUME: Object = Object {
+    title: "a nurbs_volume",
+    about: "A polynomial or rational spline volume.",
+    members: &[
+        family!("nurbs_volume"),
+        required("degree", "The degree, from 1 to 9, or one for each direction.", || degrees(3)),
+        required("knots", "A full knot vector for each direction.", || tuple(knots(), 3)),
+        required("control_points", "control_points[i][j][k], i along the first direction.", || nested(net_point, 3)),
+        optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 3)),
+    ],
+};
+
+pub(super) const BEZIER_SURFACE: Object = Object {
+    title: "a bezier_surface",
+    about: "A polynomial or rational Bezier patch.",
+    members: &[
+        family!("bezier_surface"),
+        required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
+        optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+    ],
+};
+
+pub(super) const CATMULL_ROM_SCHEME: Object = Object {
+    title: "a catmull_rom without control points",
+    about: "A Catmull-Rom spline.",
+    members: &[
+        family!("catmull_rom"),
+        optional(
+            "parametrization",
+            "Intervals of the parameter: all equal, or as the square roots of the distances of the points, or as the distances.",
+            || json!({ "type": "string", "enum": ["uniform", "centripetal", "chordal"], "default": "uniform" }),
+        ),
+        CLOSED,
+    ],
+};
+
+pub(super) const CATMULL_ROM: Object = Object {
+    title: "a catmull_rom",
+    about: "A Catmull-Rom spline. Four points make the span between the second and the third, which it interpolates: an open one goes from the second point to the last but one.",
+    members: &[CATMULL_ROM_SCHEME.members[0], POLYGON, CATMULL_ROM_SCHEME.members[1], CLOSED],
+};
+
+pub(super) const BETA_SPLINE_SCHEME: Object = Object {
+    title: "a beta_spline without control points",
+    about: "A uniformly shaped beta-spline.",
+    members: &[
+        family!("beta_spline"),
+        optional(
+            "beta1",
+            "Bias, above zero; 1, no bias, when absent.",
+            || json!({ "type": "number", "exclusiveMinimum": 0, "default": 1 }),
+        ),
+        optional("beta2", "Tension; 0, none, when absent.", || json!({ "type": "number", "default": 0 })),
+        CLOSED,
+    ],
+};
+
+pub(super) const BETA_SPLINE: Object = Object {
+    title: "a beta_spline",
+    about: "A uniformly shaped cubic beta-spline (Barsky); beta1 = 1 and beta2 = 0 make the uniform B-spline.",
+    members: &[BETA_SPLINE_SCHEME.members[0], POLYGON, BETA_SPLINE_SCHEME.members[1], BETA_SPLINE_SCHEME.members[2], CLOSED],
+};
+
+pub(super) const CORNER_CUTTING_SCHEME: Object = Object {
+    title: "a corner_cutting without control points",
+    about: "The corner-cutting scheme (a, b).",
+    members: &[CORNER_CUTTING.members[0], CORNER_CUTTING.members[2], CORNER_CUTTING.members[3], CLOSED],
+};
+
+pub(super) const FOUR_POINT_SCHEME: Object = Object {
+    title: "a four_point without control points",
+    about: "The four-point scheme.",
+    members: &[
+        family!("four_point"),
+        optional(
+            "w",
+            "Tension; 1/16, which reproduces cubics, when absent; 0 gives the polygon.",
+            || json!({ "type": "number", "default": 0.0625 }),
+        ),
+        CLOSED,
+    ],
+};
+
+pub(super) const FOUR_POINT: Object = Object {
+    title: "a four_point",
+    about: "The interpolating four-point scheme. Six points make the span between the third and the fourth: an open one goes from the third point to the last but two.",
+    members: &[FOUR_POINT_SCHEME.members[0], POLYGON, FOUR_POINT_SCHEME.members[1], CLOSED],
+};
+
+pub(super) const INTERPOLATION_SCHEME: Object = Object {
+    title: "an interpolation without points",
+    about: "A fractal interpolation function at equal distances.",
+    members: &[family!("interpolation"), required("vertical_scaling", "One factor per interval, between -1 and 1.", factors)],
+};
+
+pub(super) const INTERPOLATION: Object = Object {
+    title: "an interpolation",
+    about: "The graph of a fractal interpolation function: exactly one of vertical_scaling and maps.",
+    members: &[
+        INTERPOLATION_SCHEME.members[0],
+        required("points", "The points that the graph goes through, x increasing; in any order with maps.", || points(3)),
+        optional(
+            "vertical_scaling",
+            "One factor per interval, between -1 and 1: over the interval stands the whole graph, scaled by it, plus what is linear along x.",
+            factors,
+        ),
+        optional("maps", "One affine map per interval: it takes the first and the last point to the interval's.", || {
+            list(reference("AffineMap"), 2)
+        }),
+    ],
+};
+
+pub(super) const TENSOR: Object = Object {
+    title: "a tensor",
+    about: "The tensor product of two or three curve schemes on a net of control points.",
+    members: &[
+        family!("tensor"),
+        required("u", "The first direction: a curve shape without control points.", curve_scheme),
+        required("v", "The second direction.", curve_scheme),
+        optional("w", "The third direction, of a volume.", curve_scheme),
+        required(
+            "control_points",
+            "control_points[i][j], or [i][j][k] with w; i along u.",
+            || json!({ "anyOf": [nested(net_point, 2), nested(net_point, 3)] }),
+        ),
+        optional(
+            "weights",
+            "Positive weights of the same shape, unless the points carry theirs.",
+            || json!({ "anyOf": [nested(positive, 2), nested(positive, 3)] }),
+        ),
+    ],
+};
+
+pub(super) const SUM: Object = Object {
+    title: "a sum",
+    about: "The surface u(s) + v(t): one curve moved along another. Its quadrilateral cells are parallelograms.",
+    members: &[family!("sum"), required("u", "A curve in space.", curve_shape), required("v", "A curve in space.", curve_shape)],
+};
+
+/// Curve schemes that products are made of, with the schema's name.
+pub(super) const SCHEMES: [(&str, &str, &Object); 7] = [
+    ("bezier_curve", "BezierScheme", &BEZIER_SCHEME),
+    ("nurbs_curve", "NurbsScheme", &NURBS_SCHEME),
+    ("catmull_rom", "CatmullRomScheme", &CATMULL_ROM_SCHEME),
+    ("beta_spline", "BetaSplineScheme", &BETA_SPLINE_SCHEME),
+    ("corner_cutting", "CornerCuttingScheme", &CORNER_CUTTING_SCHEME),
+    ("four_point", "FourPointScheme", &FOUR_POINT_SCHEME),
+    ("interpolation", "InterpolationScheme", &INTERPOLATION_SCHEME),
+];
+
+/// Curves that sums are made of, with the schema's name.
+pub(super) const CURVES: [(&str, &str, &Object); 7] = [
+    ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
+    ("nurbs_curve", "NurbsCurveShape", &NURBS_CURVE),
+    ("catmull_rom", "CatmullRomShape", &CATMULL_ROM),
+    ("beta_spline", "BetaSplineShape", &BETA_SPLINE),
+    ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
+    ("four_point", "FourPointShape", &FOUR_POINT),
+    ("interpolation", "InterpolationShape", &INTERPOLATION),
+];
+
 pub(super) const MESH: Object = Object {
     title: "a mesh",
     about: "A polygon mesh: faces of one corner are points, of two segments, of three and more polygons.",
@@ -425,30 +668,28 @@ pub(super) const PART: Object = Object {
 };
 
 /// The families that can be evaluated, with the schema's name.
-pub(super) const FAMILIES: [(&str, &str, &Object); 7] = [
+pub(super) const FAMILIES: [(&str, &str, &Object); 17] = [
     ("ifs", "IfsShape", &IFS),
     ("bcifs", "BcifsShape", &BCIFS),
     ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
     ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
+    ("bezier_surface", "BezierSurfaceShape", &BEZIER_SURFACE),
+    ("nurbs_curve", "NurbsCurveShape", &NURBS_CURVE),
+    ("nurbs_surface", "NurbsSurfaceShape", &NURBS_SURFACE),
+    ("nurbs_volume", "NurbsVolumeShape", &NURBS_VOLUME),
+    ("catmull_rom", "CatmullRomShape", &CATMULL_ROM),
+    ("beta_spline", "BetaSplineShape", &BETA_SPLINE),
+    ("four_point", "FourPointShape", &FOUR_POINT),
+    ("interpolation", "InterpolationShape", &INTERPOLATION),
+    ("tensor", "TensorShape", &TENSOR),
+    ("sum", "SumShape", &SUM),
     ("mesh", "MeshShape", &MESH),
     ("terrain", "TerrainShape", &TERRAIN),
     ("group", "GroupShape", &GROUP),
 ];
 
 /// Families of the grammar that cannot be evaluated yet.
-pub(super) const LATER_FAMILIES: [&str; 11] = [
-    "bezier_surface",
-    "nurbs_curve",
-    "nurbs_surface",
-    "nurbs_volume",
-    "catmull_rom",
-    "beta_spline",
-    "four_point",
-    "subdivision",
-    "interpolation",
-    "tensor",
-    "sum",
-];
+pub(super) const LATER_FAMILIES: [&str; 1] = ["subdivision"];
 
 /// Kinds of jobs of the grammar that cannot be done yet.
 pub(super) const LATER_KINDS: [&str; 7] = ["intersect", "check", "slice", "sla", "cast", "panels", "convert"];

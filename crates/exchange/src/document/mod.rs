@@ -19,6 +19,7 @@ mod node;
 mod parse;
 mod report;
 mod schema;
+mod scheme;
 mod solve;
 mod terrain;
 mod transform;

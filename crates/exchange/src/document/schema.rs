@@ -7,9 +7,9 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADDRESS_QUESTION, ADJACENCY, BOUNDARY, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP,
-    MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP,
-    control_point_schema, matrix_schema, reference,
+    ADDRESS_QUESTION, ADJACENCY, BOUNDARY, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS,
+    LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE,
+    TRANSITION, TURNED_MAP, control_point_schema, matrix_schema, reference,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -64,6 +64,10 @@ fn named_schemas() -> Vec<(String, Value)> {
     let mut schemas: Vec<(String, Value)> = PLAIN.iter().map(|(name, grammar)| ((*name).into(), object(grammar, &[]))).collect();
     schemas.extend(FAMILIES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
     schemas.push(("Shape".into(), any_of("A shape of one of the families.", FAMILIES.iter().map(|(_, name, _)| reference(name)))));
+    schemas.extend(SCHEMES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
+    let schemes = any_of("A curve shape without control points.", SCHEMES.iter().map(|(_, name, _)| reference(name)));
+    schemas.push(("CurveScheme".into(), schemes));
+    schemas.push(("CurveShape".into(), any_of("A curve.", CURVES.iter().map(|(_, name, _)| reference(name)))));
     let placed = FAMILIES.iter().map(|(_, _, grammar)| object(grammar, PART_MEMBERS));
     let parts = std::iter::once(object(&PART, &[])).chain(placed);
     schemas.push((

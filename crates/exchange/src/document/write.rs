@@ -8,8 +8,9 @@ use glam::{DMat3, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, CornerCutting, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
-    Model, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Terrain, TerrainBase,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, CellKind, ControlNet, CornerCutting, Curve, CurveScheme, Entry, Glue, Group, Ifs,
+    Incidence, Interior, Matrix, Model, Parametrization, Part, PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Sum, TensorProduct,
+    Terrain, TerrainBase,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -82,6 +83,88 @@ impl<M: SerializeMap> Members<M> {
             Some(value) => self.put(name, value),
             None => Ok(self),
         }
+    }
+}
+
+impl<M: SerializeMap> Members<M> {
+    /// The members of a curve scheme in the grammar's order, the points among them where there are any.
+    fn scheme(&mut self, scheme: &CurveScheme, net: Option<&ControlNet>) -> Result<&mut Self, M::Error> {
+        let family = match scheme {
+            CurveScheme::Bezier => "bezier_curve",
+            CurveScheme::Nurbs { .. } => "nurbs_curve",
+            CurveScheme::CornerCutting { .. } => "corner_cutting",
+            CurveScheme::CatmullRom { .. } => "catmull_rom",
+            CurveScheme::BetaSpline { .. } => "beta_spline",
+            CurveScheme::FourPoint { .. } => "four_point",
+            CurveScheme::Interpolation { .. } | CurveScheme::AffineInterpolation { .. } => "interpolation",
+        };
+        self.put("family", &family)?;
+        if let CurveScheme::Nurbs { degree, knots } = scheme {
+            self.put("degree", degree)?.put("knots", &numbers(knots))?;
+        }
+        let name = if family == "interpolation" { "points" } else { "control_points" };
+        self.put_some(name, net.map(points_of).as_ref())?;
+        match scheme {
+            CurveScheme::Bezier | CurveScheme::Nurbs { .. } => Ok(self),
+            CurveScheme::CornerCutting { a, b, closed } => {
+                self.put("a", &Number(*a))?.put("b", &Number(*b))?.put_if(*closed, "closed", &true)
+            }
+            CurveScheme::CatmullRom { parametrization, closed } => {
+                let word = match parametrization {
+                    Parametrization::Uniform => None,
+                    Parametrization::Centripetal => Some(&"centripetal"),
+                    Parametrization::Chordal => Some(&"chordal"),
+                };
+                self.put_some("parametrization", word)?.put_if(*closed, "closed", &true)
+            }
+            CurveScheme::BetaSpline { beta1, beta2, closed } => {
+                self.put("beta1", &Number(*beta1))?.put("beta2", &Number(*beta2))?.put_if(*closed, "closed", &true)
+            }
+            CurveScheme::FourPoint { tension, closed } => self.put("w", &Number(*tension))?.put_if(*closed, "closed", &true),
+            CurveScheme::Interpolation { vertical_scaling } => self.put("vertical_scaling", &numbers(vertical_scaling)),
+            CurveScheme::AffineInterpolation { maps } => self.put("maps", &list(maps)),
+        }
+    }
+
+    fn weights(&mut self, net: &ControlNet) -> Result<&mut Self, M::Error> {
+        let nested = net.weights.as_ref().map(|weights| Nested { size: &net.size, items: numbers(weights) });
+        self.put_some("weights", nested.as_ref())
+    }
+}
+
+fn numbers(values: &[f64]) -> Vec<Number> {
+    values.iter().map(|&value| Number(value)).collect()
+}
+
+/// The points of a net as nested lists.
+fn points_of(net: &ControlNet) -> Nested<'_, Wire<'_, DVec3>> {
+    Nested { size: &net.size, items: list(&net.points) }
+}
+
+/// A list, or a list of lists and so on: as many levels as sizes, the last index fastest.
+struct Nested<'m, T> {
+    size: &'m [usize],
+    items: Vec<T>,
+}
+
+impl<T: Serialize> Serialize for Nested<'_, T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Level { size: self.size, items: &self.items }.serialize(serializer)
+    }
+}
+
+struct Level<'m, T> {
+    size: &'m [usize],
+    items: &'m [T],
+}
+
+impl<T: Serialize> Serialize for Level<'_, T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Some((_, inner)) = self.size.split_first().filter(|(_, inner)| !inner.is_empty()) else {
+            return serializer.collect_seq(self.items);
+        };
+        let each = inner.iter().product::<usize>().max(1);
+        serializer.collect_seq(self.items.chunks(each).map(|items| Level { size: inner, items }))
     }
 }
 
@@ -191,6 +274,35 @@ object! {
         .put("a", &Number(curve.a))?
         .put("b", &Number(curve.b))?
         .put_if(curve.closed, "closed", &true)?;
+    Curve: |curve, members| {
+        members.scheme(&curve.scheme, Some(&curve.control_points))?;
+        members.weights(&curve.control_points)?
+    };
+    TensorProduct: |product, members| {
+        match product.schemes.as_slice() {
+            schemes if product.separate => {
+                members.put("family", &"tensor")?;
+                for (name, scheme) in ["u", "v", "w"].into_iter().zip(schemes) {
+                    members.put(name, &Wire(scheme))?;
+                }
+            }
+            [CurveScheme::Bezier, ..] => {
+                members.put("family", &"bezier_surface")?;
+            }
+            schemes => {
+                let nurbs = |scheme: &CurveScheme| match scheme {
+                    CurveScheme::Nurbs { degree, knots } => Some((*degree, numbers(knots))),
+                    _ => None,
+                };
+                let (degrees, knots): (Vec<usize>, Vec<Vec<Number>>) = schemes.iter().filter_map(nurbs).unzip();
+                let family = if schemes.len() == 2 { "nurbs_surface" } else { "nurbs_volume" };
+                members.put("family", &family)?.put("degree", &degrees)?.put("knots", &knots)?;
+            }
+        }
+        members.put("control_points", &points_of(&product.control_points))?.weights(&product.control_points)?
+    };
+    Sum: |sum, members| members.put("family", &"sum")?.put("u", &Wire(&sum.u))?.put("v", &Wire(&sum.v))?;
+    CurveScheme: |scheme, members| members.scheme(scheme, None)?;
     PolygonMesh: |mesh, members| members
         .put("family", &"mesh")?
         .put("vertices", &list(&mesh.vertices))?
@@ -221,6 +333,9 @@ impl Serialize for Wire<'_, Shape> {
             Shape::Bcifs(bcifs) => Wire(bcifs).serialize(serializer),
             Shape::BezierCurve(curve) => Wire(curve).serialize(serializer),
             Shape::CornerCutting(curve) => Wire(curve).serialize(serializer),
+            Shape::Curve(curve) => Wire(curve).serialize(serializer),
+            Shape::TensorProduct(product) => Wire(product).serialize(serializer),
+            Shape::Sum(sum) => Wire(sum).serialize(serializer),
             Shape::Mesh(mesh) => Wire(mesh).serialize(serializer),
             Shape::Terrain(terrain) => Wire(terrain).serialize(serializer),
             Shape::Group(group) => Wire(group).serialize(serializer),

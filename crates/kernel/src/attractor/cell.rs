@@ -2,7 +2,7 @@
 //! when they are small enough.
 
 use super::{Attractor, LinearPrecision, StateBound};
-use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator};
+use crate::automaton::{Ends, LeafPrimitive, State, StateId, SubdivisionOperator};
 use crate::measure::triangle::closest_on_triangle;
 
 /// A point or vector of space in mm.
@@ -262,8 +262,9 @@ impl Attractor {
                 let margin = self.bound(cell.state).margin();
                 let first_order = if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord };
                 match self.precision(cell.state) {
-                    Some(precision) if !rational => first_order.min(chord_error(precision, margin, points, &start, &end)),
-                    _ => first_order,
+                    Some(precision) if rational => first_order.min(rational_chord_error(precision, points, ends)),
+                    Some(precision) => first_order.min(chord_error(precision, margin, points, &start, &end)),
+                    None => first_order,
                 }
             }
             // Points of the cell, and segments between them, are in the ball too.
@@ -273,8 +274,9 @@ impl Attractor {
             LeafPrimitive::Polygon(_) => {
                 let first_order = 2.0 * cell.ball.radius;
                 match self.precision(cell.state) {
-                    Some(precision) if !rational => first_order.min(polygon_error(precision, self.bound(cell.state).margin(), points)),
-                    _ => first_order,
+                    Some(precision) if rational => first_order.min(rational_polygon_error(precision, points)),
+                    Some(precision) => first_order.min(polygon_error(precision, self.bound(cell.state).margin(), points)),
+                    None => first_order,
                 }
             }
             LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
@@ -376,6 +378,57 @@ fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoin
     let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
     let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
     2.0 * (1.0 + 2.0 * margin) * largest + precision.residual * slope
+}
+
+/// As [`chord_error`] for weights; see [`homogeneous_error`].
+fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], ends: &Ends) -> f64 {
+    let place = |weights: &[f64]| -> ControlPoint { std::array::from_fn(|i| points.iter().zip(weights).map(|(p, w)| w * p[i]).sum()) };
+    let (start, end) = (place(&ends.start), place(&ends.end));
+    let linear: [ControlPoint; 3] = [start, std::array::from_fn(|i| end[i] - start[i]), [0.0; 4]];
+    homogeneous_error(precision, points, &linear)
+}
+
+/// As [`polygon_error`] for weights; see [`homogeneous_error`].
+fn rational_polygon_error(precision: &LinearPrecision, points: &[ControlPoint]) -> f64 {
+    let mut linear = [[0.0; 4]; 3];
+    for (point, fit) in points.iter().zip(&precision.fit) {
+        for (column, weight) in linear.iter_mut().zip(fit) {
+            (0..4).for_each(|i| column[i] += weight * point[i]);
+        }
+    }
+    2.0 * homogeneous_error(precision, points, &linear)
+}
+
+/// eta for rational cells, whose operators are non-negative: let L map parameters to homogeneous points, with positive
+/// weights over the domain D. For x in the attractor, Q x = L(G x) + r with r in the hull of the r_k. Let c be the
+/// projection of L(G x), (n, d) the parts of r as seen from a point o, and W the weight of Q x, at least the least w_k.
+/// Then the projection of Q x is c + (n - (c - o) d) / W, so eta = (max |n_k| + max |c - o| max |d_k|) / min w_k; the
+/// largest |c - o| is at a corner of D. Projection with positive weights takes hulls to hulls, so that the rest of the
+/// argument in `precision` holds as it stands.
+fn homogeneous_error(precision: &LinearPrecision, points: &[ControlPoint], linear: &[ControlPoint; 3]) -> f64 {
+    let at = |p: &[f64; 2]| -> ControlPoint { std::array::from_fn(|i| linear[0][i] + p[0] * linear[1][i] + p[1] * linear[2][i]) };
+    let corners = precision.domain.iter().map(at);
+    if corners.clone().any(|corner| corner[3] <= 0.0) {
+        return f64::INFINITY;
+    }
+    let origin = project(&linear[0], true);
+    let reach = corners.map(|corner| distance_squared(&project(&corner, true), &origin)).fold(0.0, f64::max).sqrt();
+    let size = |v: &ControlPoint| {
+        let seen: Point = std::array::from_fn(|i| v[i] - origin[i] * v[3]);
+        (dot(&seen, &seen).sqrt(), v[3].abs())
+    };
+    let (mut off, mut skew, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
+    for (point, parameter) in points.iter().zip(&precision.parameters) {
+        let linear = at(parameter);
+        let (n, d) = size(&std::array::from_fn(|i| point[i] - linear[i]));
+        (off, skew, least) = (off.max(n), skew.max(d), least.min(point[3]));
+    }
+    // Parameters may miss the domain by the residual.
+    for column in &linear[1..] {
+        let (n, d) = size(column);
+        (off, skew) = (off + precision.residual * n, skew + precision.residual * d);
+    }
+    (off + reach * skew) / least
 }
 
 /// The diagonal of the box of polynomial control points: at least their diameter.

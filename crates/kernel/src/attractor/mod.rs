@@ -210,13 +210,20 @@ impl Attractor {
         Ok(attractor)
     }
 
-    /// Gives the attractor its B-rep: the topology of its states, and which boundaries of roots are one. `seam_mm`
-    /// bounds the distance between control points that gluing takes for equal.
+    /// Gives the attractor its B-rep: the topology of its states, which boundaries of roots are one, and which edges
+    /// among them (root, boundary) are single points in space. `seam_mm` bounds the distance between control points
+    /// that gluing takes for equal.
     ///
     /// # Errors
     /// [`TopologyError`] when a gluing contradicts the boundaries' subdivision.
-    pub fn with_topology(mut self, mut topology: Topology, gluings: &[Gluing], seam_mm: f64) -> Result<Self, TopologyError> {
-        let start = complex::Start::new(&mut topology, &self.automaton, &self.roots, gluings)?;
+    pub fn with_topology(
+        mut self,
+        mut topology: Topology,
+        gluings: &[Gluing],
+        collapsed: &[(usize, usize)],
+        seam_mm: f64,
+    ) -> Result<Self, TopologyError> {
+        let start = complex::Start::new(&mut topology, &self.automaton, &self.roots, gluings, collapsed)?;
         self.brep = Some((Arc::new(topology), start));
         self.seam_mm = seam_mm;
         Ok(self)

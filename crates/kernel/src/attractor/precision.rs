@@ -62,8 +62,11 @@ type Solution = Vec<Vec<f64>>;
 /// The precision of every state that has it: curves with proven ends, and faces with corners.
 pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
     let states = automaton.states();
-    let mut result = vec![None; states.len()];
+    let mut result = claimed(automaton, bounds);
     for component in components(automaton) {
+        if component.iter().all(|&index| result[index].is_some()) {
+            continue;
+        }
         let drawn = |&index: &usize| matches!(states[index].leaf, LeafPrimitive::Chord(_) | LeafPrimitive::Polygon(_));
         if component.iter().any(|&index| states[index].frame) || !component.iter().any(drawn) {
             continue;
@@ -86,6 +89,49 @@ pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Op
         }
     }
     result
+}
+
+/// The precision of states whose model claims parameters, where the claims hold for them and all their descendants.
+fn claimed(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
+    const RATIO: f64 = 0.5;
+    let (states, claims) = (automaton.states(), automaton.claimed_parameters());
+    let claim = |index: usize| claims.get(&StateId::new(index));
+    let domain = |index: usize| -> Option<Vec<[f64; 2]>> {
+        let parameters = claim(index)?;
+        Some(corners(&states[index].leaf)?.iter().map(|corner| evaluate(parameters, corner)).collect())
+    };
+    let domains: Vec<Option<Vec<[f64; 2]>>> = (0..states.len()).map(domain).collect();
+    let mut misses = vec![None; states.len()];
+    for index in (0..states.len()).filter(|&index| domains[index].is_some()) {
+        let own = claim(index).map_or(&[][..], Vec::as_slice);
+        let (mut miss, mut children) = (0.0_f64, Vec::new());
+        for transition in &states[index].transitions {
+            let (Some(child), Some(corners)) = (claim(transition.to.index()), corners(&states[transition.to.index()].leaf)) else { break };
+            miss = miss.max(missed(own, child, &transition.operator, RATIO));
+            children.push(corners.iter().map(|corner| evaluate(own, &transition.operator.apply(corner))).collect::<Vec<_>>());
+        }
+        let complete = children.len() == states[index].transitions.len() && !children.is_empty();
+        if complete && miss <= MISS && domains[index].as_ref().is_some_and(|domain| fills(domain, &children)) {
+            misses[index] = Some(miss);
+        }
+    }
+    // What leads to a state without precision has none.
+    while let Some(broken) = (0..states.len()).find(|&index| {
+        misses[index].is_some() && states[index].transitions.iter().any(|transition| misses[transition.to.index()].is_none())
+    }) {
+        misses[broken] = None;
+    }
+    let holds = |index: &usize| misses[*index].is_some();
+    let miss = misses.iter().flatten().copied().fold(0.0, f64::max);
+    let margin = (0..states.len()).filter(holds).map(|index| bounds[index].margin()).fold(0.0, f64::max);
+    let precision = |index: usize| {
+        let domain = domains[index].as_ref().filter(|_| holds(&index))?;
+        let hidden = if domain.len() == 2 { SAME } else { SAME.sqrt() };
+        let mut precision = scaled(claim(index)?, domain, (1.0 + 2.0 * margin) * (miss + 1e-15) / (1.0 - RATIO))?;
+        precision.residual += 4.0 * hidden / (1.0 - RATIO);
+        Some(precision)
+    };
+    (0..states.len()).map(precision).collect()
 }
 
 /// States joined by transitions.

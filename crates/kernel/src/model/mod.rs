@@ -9,6 +9,7 @@ mod half_edge;
 mod ifs;
 mod lower;
 mod mesh;
+mod scheme;
 pub mod solve;
 mod terrain;
 
@@ -23,6 +24,7 @@ pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
 pub use terrain::{Terrain, TerrainBase};
+pub use scheme::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
@@ -47,6 +49,12 @@ pub enum Shape {
     BezierCurve(BezierCurve),
     /// The curve of a corner-cutting scheme.
     CornerCutting(CornerCutting),
+    /// A curve of one of the schemes.
+    Curve(Curve),
+    /// A product of two or three schemes.
+    TensorProduct(TensorProduct),
+    /// The sum of two curves.
+    Sum(Sum),
     /// A polygon mesh.
     Mesh(PolygonMesh),
     /// A surface of random midpoint displacement.

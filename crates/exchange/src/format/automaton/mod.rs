@@ -152,6 +152,12 @@ impl Diagram {
             }
             Shape::BezierCurve(curve) => self.alone("bezier curve", curve.control_points.len(), place, findings, told),
             Shape::CornerCutting(_) => self.alone("corner cutting", 3, place, findings, told),
+            Shape::Curve(curve) => self.alone("curve", curve.control_points.points.len(), place, findings, told),
+            Shape::TensorProduct(product) => self.alone("tensor product", product.control_points.points.len(), place, findings, told),
+            Shape::Sum(sum) => {
+                let points = sum.u.control_points.points.len() * sum.v.control_points.points.len();
+                self.alone("sum", points, place, findings, told);
+            }
             Shape::Mesh(_) => self.alone("mesh", 3, place, findings, told),
             Shape::Terrain(_) => self.alone("terrain", 3, place, findings, told),
         }

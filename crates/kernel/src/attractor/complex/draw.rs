@@ -8,9 +8,12 @@ use glam::DVec3;
 use std::sync::Arc;
 
 impl Builder<'_> {
-    /// The leaf edges of an edge: in order from its start to its end when it is a curve.
+    /// The leaf edges of an edge that is no single point: in order from its start to its end when it is a curve.
     fn leaf_edges(&self, side: Side, out: &mut Vec<Side>) {
         let own = &self.edges[side.edge()];
+        if own.collapsed {
+            return;
+        }
         if own.pieces == NONE {
             out.push(side);
             return;

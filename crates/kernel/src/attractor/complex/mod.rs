@@ -45,6 +45,8 @@ struct Edge {
     vertices: u32,
     /// Where its pieces begin: children (edges), then fresh vertices. [`NONE`] while it is whole.
     pieces: u32,
+    /// Whether it is a single point in space, and all its vertices one: then it is no side of a face.
+    collapsed: bool,
 }
 
 /// An edge walked along, forwards or backwards.
@@ -81,15 +83,18 @@ pub(crate) struct Start {
     roots: Vec<Vec<Seen>>,
     /// The first root and closure cell that show each cell.
     cells: Vec<(usize, usize)>,
+    /// Of every cell, whether it is an edge that is a single point in space.
+    collapsed: Vec<bool>,
 }
 
 impl Start {
-    /// Glues roots along the given boundaries, and tabulates the topology's views.
+    /// Glues roots along the given boundaries, makes the ends of collapsed edges one, and tabulates the topology's views.
     pub(super) fn new(
         topology: &mut Topology,
         automaton: &Automaton,
         roots: &[super::Root],
         gluings: &[Gluing],
+        collapsed: &[(usize, usize)],
     ) -> Result<Self, TopologyError> {
         let mut union = Union::new(topology, automaton);
         let mut first = Vec::with_capacity(roots.len());
@@ -123,6 +128,18 @@ impl Start {
                 }
             })?;
         }
+        let mut points = Vec::new();
+        for &(root, boundary) in collapsed {
+            let Some(&(cell, _)) = union.topology.state(roots[root].state).closure.boundaries.get(boundary) else { continue };
+            let edge = first[root] + cell;
+            points.push(edge);
+            // All vertices are of the state of single points, which has one view.
+            let ends: Vec<usize> = union.list[edge].cells.iter().map(|&(end, _)| end).collect();
+            for pair in ends.windows(2) {
+                let united = union.unite((pair[0], View::SAME), (pair[1], View::SAME));
+                debug_assert!(united.is_ok(), "single points are never twisted");
+            }
+        }
         let mut whole = Self::default();
         let mut index = vec![NONE; union.list.len()];
         let mut next = 0;
@@ -139,6 +156,11 @@ impl Start {
                 seen.push(Seen { id: index[top], view });
             }
             whole.roots.push(seen);
+        }
+        whole.collapsed = vec![false; whole.cells.len()];
+        for edge in points {
+            let (top, _) = union.find(edge)?;
+            whole.collapsed[index[top] as usize] = true;
         }
         topology.tabulate(automaton)?;
         Ok(whole)
@@ -259,7 +281,9 @@ impl<'a> Builder<'a> {
                         // The cell itself is what its first sighting shows.
                         let first = self.edge_vertices.len();
                         self.edge_vertices.extend(sub.cells.iter().map(|&(inner, _)| made[start.roots[root][inner].id as usize]));
-                        self.edge(sub.state, first, origin)
+                        let edge = self.edge(sub.state, first, origin);
+                        self.edges[edge as usize].collapsed = start.collapsed[seen.id as usize];
+                        edge
                     };
                 }
             }
@@ -292,7 +316,7 @@ impl<'a> Builder<'a> {
 
     /// An edge whose vertices were put down from `first` on.
     fn edge(&mut self, state: StateId, first: usize, origin: Origin) -> u32 {
-        self.edges.push(Edge { state, vertices: first as u32, pieces: NONE });
+        self.edges.push(Edge { state, vertices: first as u32, pieces: NONE, collapsed: false });
         self.edge_origins.push(origin);
         self.edges.len() as u32 - 1
     }
@@ -439,7 +463,7 @@ impl<'a> Builder<'a> {
         if self.edges[id as usize].pieces != NONE {
             return;
         }
-        let state = self.edges[id as usize].state;
+        let Edge { state, collapsed, .. } = self.edges[id as usize];
         let split = &self.topology.state(state).split;
         let (children, start) = (split.children.len(), self.pieces.len());
         if children == 0 {
@@ -449,6 +473,10 @@ impl<'a> Builder<'a> {
         self.edges[id as usize].pieces = start as u32;
         for (position, place) in places.iter().enumerate().filter(|(_, place)| !place.is_empty()) {
             let (actual, _) = self.topology.piece_seen(state, view, position);
+            if collapsed {
+                self.pieces[start + actual] = self.edge_vertices[self.edges[id as usize].vertices as usize];
+                continue;
+            }
             let origin = Origin::Edge { edge: id, piece: actual as u32 };
             let point = self.place(points, place, root);
             self.pieces[start + actual] = self.vertex(point, origin);
@@ -463,7 +491,9 @@ impl<'a> Builder<'a> {
                 };
                 self.edge_vertices.push(vertex);
             }
-            self.pieces[start + child] = self.edge(split.pieces[child].state, first, Origin::Edge { edge: id, piece: child as u32 });
+            let edge = self.edge(split.pieces[child].state, first, Origin::Edge { edge: id, piece: child as u32 });
+            self.edges[edge as usize].collapsed = collapsed;
+            self.pieces[start + child] = edge;
         }
     }
 
