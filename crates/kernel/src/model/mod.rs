@@ -23,8 +23,8 @@ pub use half_edge::{HalfEdge, HalfEdgeMesh, MeshFault};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
-pub use terrain::{Terrain, TerrainBase};
 pub use scheme::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct};
+pub use terrain::{Terrain, TerrainBase};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
