@@ -126,6 +126,7 @@ fn the_doors_that_were_promised_are_there() {
         "get /v1/models/{id}",
         "post /v1/validate",
         "post /v1/plan",
+        "post /v1/solve",
         "get /v1/capabilities",
         "get /v1/openapi.json",
     ] {

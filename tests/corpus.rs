@@ -2,11 +2,12 @@
 
 use std::fs;
 
-use lacuna_tests::support::binary::run;
+use lacuna_tests::support::binary::{run, succeed};
 use lacuna_tests::support::cases;
 use lacuna_tests::support::python::system_python;
 use lacuna_tests::support::root;
 use lacuna_tests::support::scratch::Scratch;
+use serde_json::{Value, json};
 
 #[test]
 fn every_case_holds() {
@@ -75,6 +76,17 @@ fn a_member_that_no_certificate_has_fails() {
 }
 
 #[test]
+fn a_wrong_solution_is_noticed() {
+    let corner_cutting = "bcifs/free_corner_cutting";
+    assert_fails(&altered(corner_cutting, "degrees_of_freedom = 2", "degrees_of_freedom = 3"), "degrees_of_freedom");
+    assert_fails(&altered(corner_cutting, "value = 0.625", "value = 0.626"), "operator/0/0");
+    assert_fails(&altered(corner_cutting, "constant = \"1\"", "constant = \"2\""), "constant");
+    assert_fails(&altered(corner_cutting, "{a = \"-1\"}", "{a = \"-1\", b = \"1\"}"), "coefficients");
+    assert_fails(&altered(corner_cutting, "a = 0.375", "c = 0.375"), "solve.unknown-name");
+    assert_fails(&altered("bcifs/free_contradiction", ", \"/shape/relations/1\"", ""), "refused.pointers");
+}
+
+#[test]
 fn an_expectation_that_cannot_be_read_fails() {
     assert_fails(&altered("meshes/point", "genus = 0", "genus = "), "case");
     assert_fails(&altered("meshes/point", "[exact]", "[exactly]"), "exactly");
@@ -115,14 +127,74 @@ fn every_expectation_has_a_source() {
         assert!(expected.about.len() > 10, "{}", case.name);
         let sources = expected.scalar.values().flat_map(|s| [&s.source, &s.reason]);
         let sources = sources.chain(expected.exact_box.iter().flat_map(|b| [&b.source, &b.reason]));
-        for words in sources {
+        for words in sources.chain(expected.entry.values().map(|entry| &entry.source)) {
             assert!(words.len() >= 5, "{}: {words:?} is no source", case.name);
         }
         if !expected.exact.is_empty() {
             let source = expected.exact.get("source").and_then(toml::Value::as_str).unwrap_or("");
             assert!(source.len() >= 5, "{}: [exact] has no source", case.name);
         }
-        let stated = !expected.exact.is_empty() || !expected.scalar.is_empty() || expected.exact_box.is_some();
+        let stated =
+            !expected.exact.is_empty() || !expected.scalar.is_empty() || expected.exact_box.is_some() || !expected.entry.is_empty();
         assert_ne!(stated, expected.refused.is_some(), "{} states a result or a refusal", case.name);
+    }
+}
+
+/// The words and the exit code of a command that refuses.
+fn refusal(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = run(arguments);
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn the_solve_command_writes_models_that_validate() {
+    let scratch = Scratch::new();
+    let model = cases::named("bcifs/free_corner_cutting").model();
+    let (model, filled) = (model.to_str().unwrap(), scratch.join("filled.json"));
+    let space: Value = serde_json::from_slice(&succeed(["solve", model, "--set", "a=0.375", "-o", filled.to_str().unwrap()])).unwrap();
+    assert_eq!((&space["degrees_of_freedom"], &space["parameters"][0]["name"]), (&json!(2), &json!("a")));
+    assert!(space.get("model").is_none());
+    let report: Value = serde_json::from_slice(&succeed(["validate".as_ref(), filled.as_os_str()])).unwrap();
+    assert_eq!((&report["valid"], &report["degrees_of_freedom"]), (&json!(true), &json!(0)));
+    // on stdout the model stands alone, for the next command
+    let piped = succeed(["--quiet", "solve", model, "--set", "a=0.375", "-o", "-"]);
+    assert_eq!(piped, fs::read(&filled).unwrap());
+    let whole: Value = serde_json::from_slice(&succeed(["solve", model, "--set", "a=0.375", "--json"])).unwrap();
+    assert_eq!(whole["model"], serde_json::from_slice::<Value>(&piped).unwrap());
+}
+
+#[test]
+fn the_solve_command_says_what_is_wrong() {
+    let path = |name: &str| cases::named(name).model().to_str().unwrap().to_owned();
+    let corner_cutting = path("bcifs/free_corner_cutting");
+    for (arguments, code, word) in [
+        (vec!["--set", "c=1"], 2, "solve.unknown-name"),
+        (vec!["--set", "a=NaN"], 2, "not a finite number"),
+        (vec!["--set", "a"], 2, "NAME=VALUE"),
+        (vec!["--set", "a=1", "--set", "a=2"], 2, "two values"),
+        (vec!["--json", "-o", "-"], 2, "--json"),
+        (vec!["--set", "a=0.25", "--set", "curve.0[0][0]=0.3"], 3, "'a' is chosen to be 0.25"),
+    ] {
+        let (exit, words) = refusal(&[&["solve", &corner_cutting], arguments.as_slice()].concat());
+        assert!(exit == Some(code) && words.contains(word), "{arguments:?}: {exit:?} {words}");
+    }
+    let (exit, words) = refusal(&["solve", &path("bcifs/free_contradiction")]);
+    assert!(exit == Some(3) && words.contains("/shape/relations/1") && words.contains("automaton.contradiction"), "{words}");
+}
+
+#[test]
+fn validate_counts_the_degrees_of_freedom_of_what_is_unknown() {
+    for (name, valid, degrees, word) in [
+        ("bcifs/free_curve_3_1", false, json!(6), "6 degrees of freedom"),
+        ("bcifs/free_catmull_clark", false, json!(4), "4 degrees of freedom"),
+        ("bcifs/free_doo_sabin", true, json!(0), ""),
+        ("bcifs/free_contradiction", false, Value::Null, "contradict each other"),
+        ("bcifs/parabola", true, json!(0), ""),
+    ] {
+        let output = run(["validate".as_ref(), cases::named(name).model().as_os_str()]);
+        assert_eq!(output.status.code(), Some(if valid { 0 } else { 3 }), "{name}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((&report["valid"], report.get("degrees_of_freedom").unwrap_or(&Value::Null)), (&json!(valid), &degrees), "{report}");
+        assert!(report["diagnostics"].to_string().contains(word), "{report}");
     }
 }

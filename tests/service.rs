@@ -359,6 +359,71 @@ fn fifty_orders_at_once_all_end() {
 }
 
 #[test]
+fn unknown_operators_are_solved_over_http() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let solve = |body: Value| service.post("/v1/solve", &body);
+    let answer = solve(json!({ "model": model("bcifs/free_corner_cutting"), "values": { "a": 0.375, "b": 0.125 } }));
+    assert_eq!(answer.status, 200, "{}", answer.json());
+    let space = answer.json();
+    assert_eq!((&space["degrees_of_freedom"], &space["method"]), (&json!(2), &json!("exact")));
+    let entry = space["entries"].as_array().unwrap().iter().find(|e| e["pointer"] == "/shape/states/0/transitions/0/operator/1/1").unwrap();
+    assert_eq!(entry["constant"], json!({ "exact": "1", "value": 1.0 }));
+    assert_eq!(entry["coefficients"], json!({ "b": { "exact": "-1", "value": -1.0 } }));
+    assert_eq!(entry["value"], 0.875);
+    // what comes out is a model: nothing is unknown, and it can be evaluated
+    let report = service.post("/v1/validate", &space["model"]).json();
+    assert_eq!((&report["valid"], &report["degrees_of_freedom"]), (&json!(true), &json!(0)), "{report}");
+    let evaluated = service.done(&json!({ "lacuna": 1, "kind": "evaluate", "model": space["model"], "params": { "tolerance_mm": 0.1 } }));
+    assert_eq!(evaluated["state"], "succeeded");
+    // the same of a stored model
+    let id = service.post("/v1/models", &model("bcifs/free_corner_cutting")).json()["id"].clone();
+    assert_eq!(solve(json!({ "model_ref": id })).json()["degrees_of_freedom"], 2);
+}
+
+#[test]
+fn what_cannot_be_solved_is_a_problem_that_names_it() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let refused = |body: Value, status: u16, code: &str, pointers: &[&str]| {
+        let answer = service.post("/v1/solve", &body);
+        assert_problem(&service, &answer, &[status], code);
+        let found: Vec<String> =
+            answer.json()["errors"].as_array().into_iter().flatten().map(|e| e["pointer"].as_str().unwrap().to_owned()).collect();
+        assert_eq!(found, pointers, "{}", answer.json());
+    };
+    let corner_cutting = || model("bcifs/free_corner_cutting");
+    let conflict = ["/model/shape/adjacencies/0", "/model/shape/relations/0", "/model/shape/relations/1"];
+    refused(json!({ "model": model("bcifs/free_contradiction") }), 422, "automaton.contradiction", &conflict);
+    refused(json!({ "model": corner_cutting(), "values": { "a/b": 1.0 } }), 422, "solve.unknown-name", &["/values/a~1b"]);
+    refused(json!({ "model": corner_cutting(), "values": { "a": "0.5" } }), 422, "document.number-as-string", &["/values/a"]);
+    refused(json!({ "model": corner_cutting(), "values": null }), 422, "document.wrong-type", &["/values"]);
+    refused(json!({ "model": corner_cutting(), "value": {} }), 422, "document.unknown-member", &["/value"]);
+    refused(json!({ "values": {} }), 422, "document.missing-member", &[""]);
+    refused(json!({ "model_ref": "none" }), 422, "job.unknown-model", &["/model_ref"]);
+    refused(json!({ "model": model("meshes/segment") }), 422, "solve.no-operators", &[]);
+    let text = json!({ "model": corner_cutting() }).to_string().replacen("null", "NaN", 1);
+    assert_problem(&service, &service.post_with("/v1/solve", &[], text.as_bytes()), &[400, 422], "document.");
+}
+
+#[test]
+fn a_hundred_thousand_unknowns_are_refused_at_once() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let rows = vec![vec![Value::Null; 317]; 317];
+    let points: Vec<Value> = (0..317).map(|k| json!([k, 0, 0])).collect();
+    let shape = json!({ "family": "bcifs", "cells": [{ "state": "s", "control_points": points }],
+        "states": [{ "name": "s", "cell": "edge", "dimension": 317, "transitions": [{ "to": "s", "operator": rows }] }] });
+    let start = Instant::now();
+    let answer = service.post("/v1/solve", &json!({ "model": { "lacuna": 1, "shape": shape } }));
+    assert_problem(&service, &answer, &[422], "limit-solve");
+    assert_eq!(answer.json()["asked"], 317.0 * 317.0);
+    let report = service.post("/v1/validate", &json!({ "lacuna": 1, "shape": shape }));
+    assert_eq!((report.status, &report.json()["valid"]), (200, &json!(false)));
+    assert!(start.elapsed() < Duration::from_secs(20), "{:?}", start.elapsed());
+}
+
+#[test]
 fn every_malformed_document_is_refused_over_http() {
     let folder = cases::folder().join("malformed");
     if !folder.is_dir() {

@@ -1,13 +1,19 @@
 //! Documents at the doors: bytes to typed models and jobs, all findings as one problem, and the digest of
 //! what was meant.
 
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
 use lacuna_exchange::diagnostic::{Diagnostic, code};
-use lacuna_exchange::document::{self, DocumentLimits};
-use lacuna_exchange::format::{FORMATS, Format};
-use lacuna_fabrication::{Job, JobKind};
-use lacuna_kernel::budget::Limits;
+use lacuna_exchange::document::{self, DocumentLimits, JobDocument, ModelSource, Sought};
+use lacuna_exchange::format::automaton::Diagram;
+use lacuna_exchange::format::{FORMATS, Format, MeshFile, ReadLimits, read as read_mesh};
+use lacuna_fabrication::{Job, JobKind, SolutionSpace, Solved};
+use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::Model;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use utoipa::ToSchema;
 
 use crate::digest::Digest;
@@ -27,7 +33,7 @@ pub struct ValidationReport {
     /// Number of states of the automaton, once the document is legal.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub states: Option<u64>,
-    /// Degrees of freedom of the unknown operators; 0 when none is unknown.
+    /// Degrees of freedom of the unknown operators: 0 when none is unknown, absent when they could not be found.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub degrees_of_freedom: Option<u64>,
     /// Largest violation of a constraint.
@@ -85,12 +91,56 @@ pub fn read_model(bytes: &[u8]) -> Result<Model, Problem> {
     production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))?.map_err(refused)
 }
 
+/// Reads a model document that may name mesh files of its folder.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_model_in(bytes: &[u8], folder: Option<&Path>) -> Result<Model, Problem> {
+    model_in(bytes, folder)?.map_err(refused)
+}
+
+fn model_in(bytes: &[u8], folder: Option<&Path>) -> Result<Result<Model, Vec<Diagnostic>>, Problem> {
+    let Some(folder) = folder else { return production::guarded(|| document::read_model(bytes, &DocumentLimits::default())) };
+    production::guarded(|| document::read_model_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name)))
+}
+
+/// Reads a mesh file below a folder. Neither its name nor a link leads out of the folder.
+fn mesh_in(folder: &Path, name: &str) -> Result<MeshFile, String> {
+    let failed = |error: std::io::Error| error.to_string();
+    let inside = folder.canonicalize().map_err(failed)?;
+    let path = inside.join(name).canonicalize().map_err(failed)?;
+    if !path.starts_with(&inside) {
+        return Err("it lies outside of the document's folder".to_owned());
+    }
+    // A pipe or a device may never end.
+    if !path.is_file() {
+        return Err("it is no file".to_owned());
+    }
+    let limits = ReadLimits::default();
+    let mut bytes = Vec::new();
+    File::open(&path).and_then(|file| file.take(limits.file_bytes + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    read_mesh(&bytes, None, &limits).map_err(|error| error.to_string())
+}
+
 /// Reads a job document, fetches the stored models that it names, and completes its limits.
 ///
 /// # Errors
 /// All findings, as one problem.
 pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
-    let read = production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    complete(production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?, most, find)
+}
+
+/// Reads a job document that may name mesh files of its folder, and no stored models.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_job_in(bytes: &[u8], most: &Limits, folder: Option<&Path>) -> Result<Job, Problem> {
+    let Some(folder) = folder else { return read_job(bytes, most, &|_| None) };
+    let read = || document::read_job_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name));
+    complete(production::guarded(read)?.map_err(refused)?, most, &|_| None)
+}
+
+fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
     let model = |id: &str| find(id).and_then(|bytes| read_model(&bytes).ok());
     let mut job = read.resolve(&within(&Limits::default(), most), most, model).map_err(refused)?;
     if job.outputs.is_empty() {
@@ -104,6 +154,50 @@ pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Jo
         format(name).map_err(|problem| one_finding(&format!("/outputs/{index}"), &problem.code, &problem.detail))?;
     }
     Ok(job)
+}
+
+/// Reads a request to solve a model, and fetches the model if it is stored.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_solve(bytes: &[u8], find: ModelFinder<'_>) -> Result<(Model, BTreeMap<String, f64>), Problem> {
+    let read = production::guarded(|| document::read_solve(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    let model = read.input.resolve(|id| find(id).and_then(|bytes| read_model(&bytes).ok()));
+    Ok((model.map_err(|diagnostic| refused(vec![diagnostic]))?, read.values))
+}
+
+/// A solved model: the solution space, and the model document for the chosen values.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct SolveReport {
+    /// All solutions.
+    #[serde(flatten)]
+    pub space: SolutionSpace,
+    /// The model for the chosen values, without unknowns, lengths in mm.
+    #[schema(value_type = crate::openapi::Model)]
+    #[serde(serialize_with = "as_document")]
+    pub model: Model,
+}
+
+fn as_document<S: Serializer>(model: &Model, serializer: S) -> Result<S::Ok, S::Error> {
+    document::model_value(model).serialize(serializer)
+}
+
+impl SolveReport {
+    /// What is told of a solved model.
+    ///
+    /// # Errors
+    /// When a number in it is not finite, which JSON cannot carry.
+    pub fn of(solved: Solved) -> Result<Self, Problem> {
+        let Solved { space, model } = solved;
+        match space.entries.iter().find(|entry| !entry.value.is_finite()) {
+            None if space.residual.is_finite() => Ok(Self { space, model }),
+            None => Err(Problem::internal("the residual of a solution is not finite")),
+            Some(entry) => {
+                let detail = format!("the entry {} has no finite value for the chosen parameters; choose smaller ones", entry.name);
+                Err(one_finding(&entry.pointer, "solve.not-finite", &detail))
+            }
+        }
+    }
 }
 
 /// What a job makes when it asks for no format: what printers read, and what carries wires.
@@ -146,12 +240,56 @@ pub fn model_document(model: &Model) -> String {
     document::write_model(model)
 }
 
-/// Reads and examines a model.
+/// The canonical document of a model for people: indented, with a line end.
+#[must_use]
+pub fn model_file(model: &Model) -> String {
+    let mut text = document::write_model_indented(model);
+    text.push('\n');
+    text
+}
+
+/// Reads a question about addresses, and fetches the stored model that it may name.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_address_question(bytes: &[u8], find: ModelFinder<'_>) -> Result<(Model, Sought), Problem> {
+    let read = production::guarded(|| document::read_address_question(bytes, &DocumentLimits::default()))?.map_err(refused)?;
+    let model = match read.input.source {
+        ModelSource::Inline(model) => *model,
+        ModelSource::Stored(id) => {
+            let bytes = find(&id).ok_or_else(|| {
+                let message = format!("no model is stored as {id:?}; store it first, or send it as \"model\"");
+                one_finding(&read.input.pointer, code::UNKNOWN_MODEL, &message)
+            })?;
+            read_model(&bytes)?
+        }
+    };
+    Ok((model, read.sought))
+}
+
+/// The automaton of a model, to be drawn, whether or not the model can be evaluated.
+///
+/// # Errors
+/// When the document is not legal, or the kernel has a defect.
+pub fn read_diagram(bytes: &[u8]) -> Result<Diagram, Problem> {
+    let model = read_model(bytes)?;
+    production::guarded(|| Diagram::of(&model))
+}
+
+/// Reads and examines a model; the budget bounds the search for degrees of freedom.
 ///
 /// # Errors
 /// When the bytes are not a JSON text at all, or the kernel has a defect.
-pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
-    let model = match production::guarded(|| document::read_model(bytes, &DocumentLimits::default()))? {
+pub fn validate(bytes: &[u8], budget: &Budget) -> Result<ValidationReport, Problem> {
+    validate_in(bytes, None, budget)
+}
+
+/// Reads and examines a model that may name mesh files of its folder.
+///
+/// # Errors
+/// As [`validate`].
+pub fn validate_in(bytes: &[u8], folder: Option<&Path>, budget: &Budget) -> Result<ValidationReport, Problem> {
+    let model = match model_in(bytes, folder)? {
         Ok(model) => model,
         Err(diagnostics) if diagnostics.iter().any(is_about_the_text) => return Err(refused(diagnostics)),
         Err(diagnostics) => {
@@ -161,7 +299,7 @@ pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
             return Ok(ValidationReport { valid: false, diagnostics, states, degrees_of_freedom, constraint_residual, spectral_radius });
         }
     };
-    let found = production::validate(&model)?;
+    let found = production::validate(&model, budget)?;
     let diagnostics = found.diagnostics.into_iter().map(|d| Remark {
         pointer: format!("/shape{}", d.pointer),
         code: d.code.to_owned(),
@@ -174,7 +312,7 @@ pub fn validate(bytes: &[u8]) -> Result<ValidationReport, Problem> {
         valid: found.valid,
         diagnostics: diagnostics.collect(),
         states: Some(found.states),
-        degrees_of_freedom: Some(found.degrees_of_freedom),
+        degrees_of_freedom: found.degrees_of_freedom,
         constraint_residual: Some(found.constraint_residual),
         spectral_radius: found.spectral_radius.map(|bounds| bounds.map(|bound| bound.is_finite().then_some(bound))),
     })

@@ -6,6 +6,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+pub mod addresses;
 pub mod cli;
 pub mod clock;
 pub mod config;

@@ -11,6 +11,14 @@ pub struct Job {}
 #[derive(ToSchema)]
 pub struct Model {}
 
+/// Stands for a request to solve a model: its schema is the exchange crate's.
+#[derive(ToSchema)]
+pub struct SolveRequest {}
+
+/// Stands for a question about addresses: its schema is the exchange crate's.
+#[derive(ToSchema)]
+pub struct AddressQuestion {}
+
 /// The description as indented JSON, with a line end: what is committed.
 #[must_use]
 pub fn text() -> String {

@@ -292,6 +292,15 @@ impl Problem {
         matches!(self.kind, ProblemKind::Internal | ProblemKind::InputOutput)
     }
 
+    /// With the model's place in a document where it stands as the member `model`: what is found in its shape gets it.
+    #[must_use]
+    pub fn under_model(mut self) -> Self {
+        for finding in self.errors.iter_mut().filter(|finding| finding.pointer.starts_with("/shape")) {
+            finding.pointer.insert_str(0, "/model");
+        }
+        self
+    }
+
     /// With the place at which the model stands in the caller's document put before every pointer.
     #[must_use]
     pub fn under(mut self, prefix: &str) -> Self {

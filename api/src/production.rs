@@ -1,10 +1,11 @@
 //! From a legal job to finished files: what the service's workers and the command line share.
 
+use std::collections::BTreeMap;
 use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use lacuna_exchange::format::{self, Format, FormatError, Metadata};
-use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, Validation};
+use lacuna_exchange::format::{self, Format, FormatError, Metadata, PointFile};
+use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::model::Model;
@@ -67,8 +68,42 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, Problem> {
 ///
 /// # Errors
 /// When the kernel has a defect.
-pub fn validate(model: &Model) -> Result<Validation, Problem> {
-    guarded(|| lacuna_fabrication::validate(model))
+pub fn validate(model: &Model, budget: &Budget) -> Result<Validation, Problem> {
+    guarded(|| lacuna_fabrication::validate(model, budget))
+}
+
+/// Solves the unknown entries of a model for chosen values.
+///
+/// # Errors
+/// The kernel's refusal, with pointers into the model document, or into the request for a chosen value.
+pub fn solve(model: &Model, values: &BTreeMap<String, f64>, budget: &Budget) -> Result<Solved, SolveProblem> {
+    let solved = guarded(|| lacuna_fabrication::solve(model, values, budget))?;
+    solved.map_err(|refusal| match refusal {
+        SolveRefusal::Model(error) => SolveProblem::Model(why_stopped(budget).unwrap_or_else(|| error.into())),
+        SolveRefusal::Value { name, code, message } => SolveProblem::Value { name, code, message },
+    })
+}
+
+/// Why a model is not solved: which of the two that were sent is at fault.
+#[derive(Debug)]
+pub enum SolveProblem {
+    /// The model, with pointers into its document; or neither.
+    Model(Problem),
+    /// The value that was chosen under a name.
+    Value {
+        /// The name.
+        name: String,
+        /// Stable code.
+        code: &'static str,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+impl From<Problem> for SolveProblem {
+    fn from(problem: Problem) -> Self {
+        Self::Model(problem)
+    }
 }
 
 /// Why the budget's token was fired, if it was.
@@ -124,6 +159,37 @@ pub fn write_file(
         guarded(|| format::verify_written(format, &mut source, solid))?.map_err(|error| format_problem(&error))?;
     }
     Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)
+}
+
+/// Evaluates a shape that is drawn as points straight into a PLY file, whatever their number; for every other shape
+/// there is no answer, and what the file holds is of no use. The geometry of the outcome is in the file alone.
+///
+/// # Errors
+/// As [`compute`] and [`write_file`].
+pub fn stream_file(
+    job: &Job,
+    title: Option<&str>,
+    pending: &mut PendingFile,
+    budget: &Budget,
+) -> Result<Option<(Outcome, Digest, u64)>, Problem> {
+    let metadata = Metadata { title, ..Metadata::default() };
+    let failed = |error| Problem::io("the file could not be written", &error);
+    let sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: &mut *pending, token: &budget.cancel });
+    let streamed = guarded(|| {
+        let mut file = PointFile::start(sink, &metadata).map_err(StreamError::Sink)?;
+        let certificate = lacuna_fabrication::stream_points(job, budget, &mut |piece| file.push(&piece.vertices))?;
+        file.finish().map_err(StreamError::Sink)?;
+        Ok(certificate)
+    })?;
+    let certificate = match streamed {
+        Ok(certificate) => certificate,
+        Err(StreamError::NotPoints) => return Ok(None),
+        Err(StreamError::Job(error)) => return Err(error.into()),
+        Err(StreamError::Sink(error)) => return Err(format_problem(&error)),
+    };
+    check_certificate(&certificate)?;
+    let (digest, bytes) = Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)?;
+    Ok(Some((Outcome { geometry: Geometry::None, certificate }, digest, bytes)))
 }
 
 /// A picture of a result as PNG.

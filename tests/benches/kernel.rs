@@ -1,8 +1,14 @@
-//! Speed of the kernel: dilation of the Sierpinski tetrahedron, and evaluation of millions of leaves.
+//! Speed of the kernel: dilation of the Sierpinski tetrahedron, evaluation of millions of leaves, also beside the same
+//! loop by hand, and proofs of convergence.
 //!
 //! `cargo bench --package lacuna-tests --bench kernel`
 
 #![allow(clippy::unwrap_used, missing_docs)]
+
+#[path = "../../crates/kernel/tests/automata/mod.rs"]
+mod automata;
+mod shapes;
+mod unrolled;
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -10,8 +16,11 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DMat3, DVec3};
 use lacuna_fabrication::{Input, Job, JobKind, Outcome, Params, run};
+use lacuna_kernel::attractor::count_cells;
+use lacuna_kernel::automaton::convergence::contraction;
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Model, Shape};
+use lacuna_kernel::tolerance::Tolerance;
 
 /// Homotheties of a ratio towards points.
 fn towards(ratio: f64, points: &[DVec3]) -> Shape {
@@ -62,5 +71,44 @@ fn evaluation(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, dilation, evaluation);
+/// On one thread: both sides of the comparison are the work of one core.
+fn leaves(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("leaf cells of one state, by its dimension");
+    group.sample_size(10).measurement_time(Duration::from_secs(10));
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for pair in shapes::pairs() {
+        let tolerance = Tolerance::new(pair.tolerance).unwrap();
+        let count = || one.install(|| count_cells(&pair.attractor, tolerance, &Budget::default()).unwrap());
+        assert_eq!(count(), (pair.by_hand)(pair.tolerance), "{}: the same leaves", pair.name);
+        group.throughput(Throughput::Elements(count()));
+        group.bench_function(format!("{}, kernel", pair.name), |bencher| bencher.iter(|| black_box(count())));
+        group.bench_function(format!("{}, by hand", pair.name), |bencher| bencher.iter(|| black_box((pair.by_hand)(pair.tolerance))));
+    }
+    group.finish();
+}
+
+fn convergence(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("bounds of the joint spectral radius");
+    group.sample_size(10);
+    let mut numbers = automata::Numbers(5);
+    let mut signed = |maps: usize, scale: f64| automata::iterated((0..maps).map(|_| numbers.signed(16, scale)).collect());
+    let line = [vec![vec![1.0, 0.0], vec![0.2, 0.8]], vec![vec![0.2, 0.8], vec![0.0, 1.0]]];
+    let automata = [
+        ("bicubic face", automata::iterated(automata::tensor(&automata::cubic(), &automata::cubic()))),
+        ("fractal times spline", automata::iterated(automata::tensor(&line, &automata::cubic()))),
+        ("Catmull-Clark face, valence 5", automata::catmull_clark(5)),
+        ("Catmull-Clark face, valence 12", automata::catmull_clark(12)),
+        ("bicubic NURBS, 64 states", automata::nurbs([1.0, 2.0, 1.0, 3.0, 0.5])),
+        ("random, 50 states", automata::fifty_states(1)),
+        ("random signed, 4 maps", signed(4, 0.7)),
+        ("random signed, 8 maps", signed(8, 0.7)),
+        ("corner cutting that diverges", automata::iterated(automata::corner_cutting(0.9, -0.85))),
+    ];
+    for (name, automaton) in &automata {
+        group.bench_function(*name, |bencher| bencher.iter(|| black_box(contraction(automaton))));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, dilation, evaluation, leaves, convergence);
 criterion_main!(benches);

@@ -55,6 +55,22 @@ pub struct Refused {
     pub code: String,
     /// Place in the document.
     pub pointer: Option<String>,
+    /// The places of all findings of a `solve`.
+    pub pointers: Option<Vec<String>>,
+}
+
+/// An entry of a solution.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Its value.
+    pub value: f64,
+    /// Where all parameters are 0, as a fraction.
+    pub constant: Option<String>,
+    /// Fractions by the name of the parameter.
+    pub coefficients: Option<BTreeMap<String, String>>,
+    /// Where they come from.
+    pub source: String,
 }
 
 /// `expected.toml`.
@@ -63,9 +79,10 @@ pub struct Refused {
 pub struct Expected {
     /// What the case guards.
     pub about: String,
-    /// `evaluate`, `solidify` or `measure`.
+    /// `evaluate`, `solidify`, `measure` or `solve`.
     pub kind: String,
-    /// The tolerance.
+    /// The tolerance; 0 for `solve`, which has none.
+    #[serde(default)]
     pub tolerance_mm: f64,
     /// The radius.
     pub radius_mm: Option<f64>,
@@ -80,6 +97,12 @@ pub struct Expected {
     pub exact_box: Option<ExactBox>,
     /// The refusal instead.
     pub refused: Option<Refused>,
+    /// Values chosen for free parameters.
+    #[serde(default)]
+    pub values: BTreeMap<String, f64>,
+    /// Entries of the solution by their place.
+    #[serde(default)]
+    pub entry: BTreeMap<String, Entry>,
 }
 
 impl Expected {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use lacuna_exchange::document::MOST_CELLS_LISTED;
 
 /// Fabrication-oriented geometry: fractals, curves and meshes to certified, printable solids.
 ///
@@ -59,7 +60,14 @@ pub(super) enum Command {
     Validate {
         /// The model document.
         model: PathBuf,
+        /// Draw the automaton, valid or not: `.svg`, or `.dot` for Graphviz.
+        #[arg(long, value_name = "FILE")]
+        draw: Option<PathBuf>,
     },
+    /// Solve the unknown entries of a model; all solutions as JSON on stdout.
+    Solve(SolveArgs),
+    /// Tell where an address leads, or which addresses lead near a point; JSON on stdout.
+    Address(AddressArgs),
     /// Predict what a job costs; JSON on stdout.
     Plan {
         /// The job document.
@@ -69,9 +77,14 @@ pub(super) enum Command {
     Run(RunArgs),
     /// Tell what a mesh file contains; JSON on stdout.
     Inspect {
-        /// An STL, 3MF, OBJ, PLY or OFF file.
+        /// An STL, 3MF, OBJ, PLY, OFF or VRML file.
         file: PathBuf,
     },
+    /// Write a mesh file in other formats. Polygons stay polygons where the format has them; coordinates are rounded to
+    /// single precision.
+    Convert(ConvertArgs),
+    /// List the classics of the library as JSON, or give the model document of one.
+    Library(LibraryArgs),
     /// Do the cases below a folder and compare with what they expect; exit code 1 when one fails.
     Verify(VerifyArgs),
     /// Serve HTTP.
@@ -171,6 +184,46 @@ pub(super) struct MeasureArgs {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct SolveArgs {
+    /// The model document, in which `null` is unknown.
+    pub(super) model: PathBuf,
+    /// File for the model without unknowns. `-` is stdout, and the solutions are then summed up on stderr.
+    #[arg(short, long = "output", value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Value of a free parameter; may be given several times.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = named_value)]
+    pub(super) values: Vec<(String, f64)>,
+    /// Print one JSON object with the solutions and the model, as `POST /v1/solve` answers.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Most time, in seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 300.0, help_heading = "Limits")]
+    pub(super) limit_seconds: f64,
+}
+
+#[derive(Debug, Args)]
+#[group(skip)]
+pub(super) struct AddressArgs {
+    /// The model document.
+    pub(super) model: PathBuf,
+    /// An address: root cell, transitions, and in parentheses those that repeat without end, for example "0: 1 2 (0 3)".
+    #[arg(long, value_name = "ADDRESS", required_unless_present = "near", conflicts_with_all = ["near", "within", "tolerance", "most"])]
+    pub(super) at: Option<lacuna_kernel::attractor::Address>,
+    /// A point in mm.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    pub(super) near: Option<[f64; 3]>,
+    /// List cells as far as this, in mm; those that may hold the closest point of the shape when absent.
+    #[arg(long, value_name = "MM", value_parser = distance)]
+    pub(super) within: Option<f64>,
+    /// Radius to which cells are refined, in mm; a thousandth of the shape's when absent.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: Option<f64>,
+    /// Cells to list at most.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..=MOST_CELLS_LISTED as u64))]
+    pub(super) most: Option<u64>,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct RunArgs {
     /// The job document.
     pub(super) job: PathBuf,
@@ -179,6 +232,27 @@ pub(super) struct RunArgs {
     pub(super) folder: PathBuf,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ConvertArgs {
+    /// An STL, 3MF, OBJ, PLY, OFF or VRML file; what it is, is found in it. `-` is stdin.
+    pub(super) file: PathBuf,
+    /// Files to write, each in the format of its ending. `-` is stdout.
+    #[arg(value_name = "OUT", required = true)]
+    pub(super) outputs: Vec<PathBuf>,
+    /// Format of what goes to stdout.
+    #[arg(long, value_name = "FORMAT")]
+    pub(super) format: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct LibraryArgs {
+    /// The classic; all are listed when absent.
+    pub(super) name: Option<String>,
+    /// The document to write; stdout when absent.
+    #[arg(short, long = "output", value_name = "MODEL", requires = "name")]
+    pub(super) output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -222,6 +296,27 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The value stands behind the last `=`: names may have one.
+fn named_value(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.rsplit_once('=').filter(|(name, _)| !name.is_empty()).ok_or("NAME=VALUE is expected, for example a=0.25")?;
+    match value.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok((name.to_owned(), value)),
+        _ => Err(format!("{value:?} is not a finite number")),
+    }
+}
+
+fn distance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("a distance of zero or more is expected".to_owned()),
+    }
+}
+
+fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+}
+
 fn bytes(text: &str) -> Result<u64, String> {
     let (digits, shift) = match text.trim_end_matches(['b', 'B', 'i']) {
         text if text.ends_with(['k', 'K']) => (&text[..text.len() - 1], 10),
@@ -244,11 +339,22 @@ mod tests {
     }
 
     #[test]
+    fn named_values() {
+        assert_eq!(named_value("a=-0.25"), Ok(("a".to_owned(), -0.25)));
+        assert_eq!(named_value("b=c.0[1][2]=1e-3"), Ok(("b=c.0[1][2]".to_owned(), 1e-3)));
+        for bad in ["a", "=1", "a=", "a=nan", "a=inf", "a=1e999", "a=1/4", "a=0,25"] {
+            assert!(named_value(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
     fn sizes_and_lengths() {
         assert_eq!(bytes("4G"), Ok(4 << 30));
         assert_eq!(bytes("512MiB"), Ok(512 << 20));
         assert_eq!(bytes("7"), Ok(7));
         assert!(bytes("-1").is_err() && bytes("99999999999999G").is_err());
+        assert_eq!(point("1.5, -2,0"), Ok([1.5, -2.0, 0.0]));
+        assert!(point("1,2").is_err() && point("1,2,nan").is_err() && distance("-1").is_err() && distance("0").is_ok());
         assert!(positive("0").is_err() && positive("nan").is_err() && positive("inf").is_err());
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use lacuna_exchange::format::{self, MeshFile, ReadLimits, Unit};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::measure::mass;
+use lacuna_kernel::model::HalfEdgeMesh;
 use lacuna_kernel::solid::{Topology, TriMesh};
 use serde_json::{Value, json};
 
@@ -21,13 +22,22 @@ const MANY_TRIANGLES: usize = 1_000_000;
 
 /// Reads a mesh file and tells what is in it as JSON.
 pub(super) fn inspect(path: &Path) -> Result<(), Problem> {
+    let (file, bytes) = mesh_file(path)?;
+    print_json(&report(&file, bytes, &topology(path, &file)?))
+}
+
+/// Reads a mesh file; gives its length too.
+pub(super) fn mesh_file(path: &Path) -> Result<(MeshFile, usize), Problem> {
     let limits = ReadLimits::default();
     let bytes = read_input(path, limits.file_bytes)?;
     let file = production::guarded(|| format::read(&bytes, None, &limits))?.map_err(|error| format_problem(&error))?;
+    Ok((file, bytes.len()))
+}
+
+/// What can be counted in a mesh file.
+pub(super) fn topology(path: &Path, file: &MeshFile) -> Result<Topology, Problem> {
     let topology = production::guarded(|| Topology::of(&file.mesh, &Budget::default()))?;
-    let topology = topology
-        .map_err(|error| Problem::new(ProblemKind::InvalidFile, format!("{}: {error}", path.display())).code("inspect.topology"))?;
-    print_json(&report(&file, bytes.len(), &topology))
+    topology.map_err(|error| Problem::new(ProblemKind::InvalidFile, format!("{}: {error}", path.display())).code("inspect.topology"))
 }
 
 fn report(file: &MeshFile, bytes: usize, topology: &Topology) -> Value {
@@ -39,7 +49,9 @@ fn report(file: &MeshFile, bytes: usize, topology: &Topology) -> Value {
         "bytes": bytes,
         "unit": facts.unit.map_or("none, taken for mm", unit_word),
         "objects": facts.object_names,
-        "polygons_fanned": facts.polygons_fanned,
+        "polygons_fanned": file.fans.len(),
+        "left_out": facts.left_out.iter().map(|(word, count)| ((*word).to_owned(), json!(count))).collect::<serde_json::Map<_, _>>(),
+        "cage": cage(file),
         "vertices": mesh.vertices.len(),
         "triangles": mesh.triangles.len(),
         "edges": topology.edges,
@@ -59,6 +71,30 @@ fn report(file: &MeshFile, bytes: usize, topology: &Topology) -> Value {
         "area_mm2": area,
         "prompts": prompts(file, volume, topology),
     })
+}
+
+/// The faces as a cage for subdivision: a 2-manifold with boundary, or the first reasons why it is none.
+fn cage(file: &MeshFile) -> Value {
+    let faces = file.faces();
+    match HalfEdgeMesh::new(file.mesh.vertices.len(), &faces) {
+        Ok(mesh) => {
+            let mut sizes = std::collections::BTreeMap::<usize, u64>::new();
+            faces.iter().for_each(|face| *sizes.entry(face.len()).or_default() += 1);
+            json!({
+                "manifold": true,
+                "faces": mesh.face_count(),
+                "faces_by_corners": sizes.iter().map(|(corners, count)| (corners.to_string(), json!(count))).collect::<serde_json::Map<_, _>>(),
+                "edges": mesh.edge_count(),
+                "euler": mesh.euler(),
+                "boundary_loops": mesh.boundary_loops().len(),
+            })
+        }
+        Err(faults) => {
+            let faults =
+                faults.iter().map(|fault| json!({ "pointer": fault.pointer(), "code": fault.code(), "message": fault.to_string() }));
+            json!({ "manifold": false, "faces": faces.len(), "faults": faults.collect::<Vec<_>>() })
+        }
+    }
 }
 
 fn unit_word(unit: Unit) -> &'static str {
@@ -96,6 +132,9 @@ fn prompts(file: &MeshFile, volume: f64, topology: &Topology) -> Vec<Value> {
     }
     if file.facts.unit.is_none() {
         prompt("file.no-unit", "the file names no unit; programs take its numbers for mm".to_owned());
+    }
+    for (word, count) in &file.facts.left_out {
+        prompt("file.left-out", format!("{count} shapes of the kind {word} hold no polygons and were left out"));
     }
     if !topology.is_closed_manifold() {
         prompt("mesh.not-manifold", "the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing".to_owned());

@@ -1,7 +1,9 @@
 //! The `lacuna` command. stdout carries data only; everything said goes to stderr.
 
 mod args;
+mod convert;
 mod inspect;
+mod library;
 mod operate;
 mod output;
 mod progress;
@@ -42,9 +44,13 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Evaluate(args) => work::evaluate(&args, manner),
         Command::Measure(args) => work::measure(&args, manner),
         Command::Run(args) => work::run(&args, manner),
-        Command::Validate { model } => study::validate(&model),
+        Command::Validate { model, draw } => study::validate(&model, draw.as_deref()),
+        Command::Solve(args) => study::solve(&args, cli.quiet),
+        Command::Address(args) => study::address(&args),
         Command::Plan { job } => study::plan(&job),
         Command::Inspect { file } => inspect::inspect(&file),
+        Command::Convert(args) => convert::convert(&args),
+        Command::Library(args) => library::library(&args),
         Command::Verify(args) => study::verify(&args, cli.quiet),
         Command::Serve(args) => operate::serve(args),
         Command::Healthcheck { url } => operate::healthcheck(url.as_deref()),
@@ -84,6 +90,15 @@ fn read_input(path: &Path, most: u64) -> Result<Vec<u8>, Problem> {
         return Err(Problem::new(ProblemKind::BodyTooLarge, detail));
     }
     Ok(bytes)
+}
+
+/// The folder in which a document's files are looked for; none for stdin.
+fn folder_of(document: &Path) -> Option<&Path> {
+    if document == Path::new("-") {
+        return None;
+    }
+    let folder = document.parent().unwrap_or(Path::new(""));
+    Some(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
 }
 
 /// Documents are longer on the command line than over HTTP, but not endless.

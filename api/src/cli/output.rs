@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use lacuna_exchange::format::Format;
-use lacuna_fabrication::{Geometry, Outcome};
+use lacuna_fabrication::{Geometry, Job, JobKind, Outcome};
 use lacuna_kernel::budget::Budget;
 
 use crate::digest::Digest;
@@ -69,6 +69,38 @@ pub(super) fn deliver(
         pending.push((file, target.path.clone()));
         written.push(Written { file: target.path.clone(), bytes, digest });
     }
+    complete(outcome, targets, certificate, pending, written, budget)
+}
+
+/// Evaluates points straight into the one file that is wanted, if it is a PLY file and the shape is points.
+pub(super) fn deliver_streamed(
+    job: &Job,
+    title: Option<&str>,
+    targets: &[Target],
+    certificate: Option<&Path>,
+    budget: &Budget,
+) -> Result<Option<(Outcome, Vec<Written>)>, Problem> {
+    let [target] = targets else { return Ok(None) };
+    if job.kind != JobKind::Evaluate || target.format != Format::Ply {
+        return Ok(None);
+    }
+    let mut file = start(&target.path)?;
+    let Some((mut outcome, digest, bytes)) = production::stream_file(job, title, &mut file, budget)? else { return Ok(None) };
+    outcome.certificate.input_digest = documents::job_digest(job).to_string();
+    let written = vec![Written { file: target.path.clone(), bytes, digest }];
+    let written = complete(&mut outcome, targets, certificate, vec![(file, target.path.clone())], written, budget)?;
+    Ok(Some((outcome, written)))
+}
+
+/// Completes the certificate with the digests, and puts everything in place.
+fn complete(
+    outcome: &mut Outcome,
+    targets: &[Target],
+    certificate: Option<&Path>,
+    mut pending: Vec<(PendingFile, PathBuf)>,
+    mut written: Vec<Written>,
+    budget: &Budget,
+) -> Result<Vec<Written>, Problem> {
     for (target, written) in targets.iter().zip(&written) {
         if let Some(name) = target.name {
             outcome.certificate.output_digests.insert(name.to_owned(), written.digest.to_string());
@@ -94,12 +126,12 @@ fn check_stop(budget: &Budget) -> Result<(), Problem> {
 }
 
 /// What goes to stdout is written to a file first: formats seek, and a pipe gets everything or nothing.
-fn start(path: &Path) -> Result<PendingFile, Problem> {
+pub(super) fn start(path: &Path) -> Result<PendingFile, Problem> {
     let file = if path == Path::new("-") { PendingFile::create_in(&std::env::temp_dir()) } else { PendingFile::create_beside(path) };
     file.map_err(|error| Problem::io(path.display(), &error))
 }
 
-fn finish(mut file: PendingFile, path: &Path) -> Result<(), Problem> {
+pub(super) fn finish(mut file: PendingFile, path: &Path) -> Result<(), Problem> {
     let failed = |error| Problem::io(path.display(), &error);
     if path != Path::new("-") {
         return file.commit(path).map_err(failed);

@@ -1,35 +1,87 @@
 //! Commands that say something about a document, a job or a set of cases.
 
+use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use lacuna_exchange::document::{CELLS_LISTED, Sought};
+use lacuna_fabrication::SolutionSpace;
 use lacuna_kernel::budget::Limits;
 
-use super::args::VerifyArgs;
-use super::{DOCUMENT_BYTES, print, print_json, read_input};
-use crate::documents::{self, Remark, Severity, ValidationReport};
-use crate::files;
+use super::args::{AddressArgs, SolveArgs, VerifyArgs};
+use super::{DOCUMENT_BYTES, folder_of, print, print_json, read_input, stop};
+use crate::addresses;
+use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
 use crate::problem::{Problem, ProblemKind};
-use crate::production::Engine;
-use crate::verify;
+use crate::production::{self, Engine, SolveProblem};
+use crate::routes::studies;
+use crate::{files, verify};
 
 /// Longest time for a prediction on the command line, where nobody else waits for it.
 const PLAN_TIME: Duration = Duration::from_secs(300);
 
 /// `lacuna validate`.
-pub(super) fn validate(model: &Path) -> Result<(), Problem> {
+pub(super) fn validate(model: &Path, draw: Option<&Path>) -> Result<(), Problem> {
+    let drawing = draw.map(Drawing::of).transpose()?;
     let bytes = read_input(model, DOCUMENT_BYTES)?;
-    let report = match documents::validate(&bytes) {
+    let report = match studies::watched(PLAN_TIME, |budget| documents::validate_in(&bytes, folder_of(model), budget)) {
         // What is no JSON is an invalid model as well, to whoever reads the report.
         Err(problem) if problem.kind == ProblemKind::MalformedJson => unreadable(&problem),
         other => other?,
     };
     print_json(&report)?;
+    // Only a legal document has states to draw.
+    let drawn = drawing.filter(|_| report.states.is_some());
+    if let Some(drawing) = drawn {
+        drawing.write(&bytes)?;
+    }
     if report.valid {
         return Ok(());
     }
     let errors = report.diagnostics.iter().filter(|remark| remark.severity == Severity::Error).count();
-    Err(Problem::new(ProblemKind::InvalidModel, format!("{} is not a valid model: {errors} errors, listed on stdout", model.display())))
+    let count = if errors == 1 { "1 error, told".to_owned() } else { format!("{errors} errors, listed") };
+    let left_out = if draw.is_some() && drawn.is_none() { "; nothing is drawn of a document that cannot be read" } else { "" };
+    Err(Problem::new(ProblemKind::InvalidModel, format!("{} is not a valid model: {count} on stdout{left_out}", model.display())))
+}
+
+/// A drawing to be made.
+#[derive(Clone, Copy)]
+struct Drawing<'a> {
+    path: &'a Path,
+    dot: bool,
+}
+
+impl<'a> Drawing<'a> {
+    fn of(path: &'a Path) -> Result<Self, Problem> {
+        match path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("svg") => Ok(Self { path, dot: false }),
+            Some("dot" | "gv") => Ok(Self { path, dot: true }),
+            _ => Err(Problem::new(ProblemKind::Usage, format!("{} is to be drawn, and ends with neither .svg nor .dot", path.display()))),
+        }
+    }
+
+    fn write(self, document: &[u8]) -> Result<(), Problem> {
+        let diagram = documents::read_diagram(document)?;
+        let text = if self.dot { diagram.dot() } else { diagram.svg() };
+        files::write_whole(self.path, text.as_bytes()).map_err(|error| Problem::io(self.path.display(), &error))
+    }
+}
+
+/// `lacuna address`.
+pub(super) fn address(args: &AddressArgs) -> Result<(), Problem> {
+    let model = documents::read_model_in(&read_input(&args.model, DOCUMENT_BYTES)?, folder_of(&args.model))?;
+    let sought = match (&args.at, args.near) {
+        (Some(address), _) => Sought::At(address.clone()),
+        (None, Some(point_mm)) => Sought::Near {
+            point_mm,
+            within_mm: args.within,
+            tolerance_mm: args.tolerance,
+            most: args.most.and_then(|most| usize::try_from(most).ok()).unwrap_or(CELLS_LISTED),
+        },
+        (None, None) => return Err(Problem::new(ProblemKind::Usage, "say what to tell: --at ADDRESS or --near X,Y,Z")),
+    };
+    print_json(&addresses::answer(&model, &sought, PLAN_TIME)?)
 }
 
 fn unreadable(problem: &Problem) -> ValidationReport {
@@ -51,12 +103,62 @@ fn unreadable(problem: &Problem) -> ValidationReport {
     }
 }
 
+/// `lacuna solve`.
+pub(super) fn solve(args: &SolveArgs, quiet: bool) -> Result<(), Problem> {
+    let usage = |detail: String| Problem::new(ProblemKind::Usage, detail);
+    let to_stdout = args.output.as_deref() == Some(Path::new("-"));
+    if to_stdout && args.json {
+        return Err(usage("--json prints the model too; name a file with -o, or leave one of them out".into()));
+    }
+    let mut values = BTreeMap::new();
+    for (name, value) in &args.values {
+        if values.insert(name.clone(), *value).is_some() {
+            return Err(usage(format!("--set gives two values to {name:?}")));
+        }
+    }
+    let model = documents::read_model_in(&read_input(&args.model, DOCUMENT_BYTES)?, folder_of(&args.model))?;
+    let time = Duration::try_from_secs_f64(args.limit_seconds).unwrap_or(Duration::MAX);
+    let solved = studies::watched(time, |budget| {
+        stop::on_signals(&budget.cancel)?;
+        production::solve(&model, &values, budget)
+    });
+    let solved = solved.map_err(|problem| match problem {
+        SolveProblem::Model(problem) => problem,
+        SolveProblem::Value { code, message, .. } => usage(message).code(code),
+    })?;
+    let report = SolveReport::of(solved)?;
+    let text = documents::model_file(&report.model);
+    if to_stdout {
+        print(text.as_bytes())?;
+    } else {
+        if let Some(path) = &args.output {
+            files::write_whole(path, text.as_bytes()).map_err(|error| Problem::io(path.display(), &error))?;
+        }
+        if args.json { print_json(&report)? } else { print_json(&report.space)? }
+    }
+    if to_stdout && !quiet {
+        sum_up(&report.space);
+    }
+    Ok(())
+}
+
+/// The solutions in a line on stderr, when the model takes stdout.
+fn sum_up(space: &SolutionSpace) {
+    const LISTED: usize = 8;
+    let listed: Vec<String> = space.parameters.iter().take(LISTED).map(|p| format!("{} = {}", p.name, p.value)).collect();
+    let more = if space.parameters.len() > LISTED { ", ..." } else { "" };
+    let parameters = if listed.is_empty() { String::new() } else { format!(": {}{more}", listed.join(", ")) };
+    let mut stderr = std::io::stderr().lock();
+    // With stderr gone there is nobody left to tell.
+    let _ = writeln!(stderr, "{} degrees of freedom{parameters}; residual {:e}", space.degrees_of_freedom, space.residual);
+}
+
 /// `lacuna plan`.
 pub(super) fn plan(job: &Path) -> Result<(), Problem> {
     let bytes = read_input(job, DOCUMENT_BYTES)?;
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
-    let job = documents::read_job(&bytes, &most, &|_| None)?;
-    print_json(&crate::routes::studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
+    let job = documents::read_job_in(&bytes, &most, folder_of(job))?;
+    print_json(&studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
 }
 
 /// `lacuna verify`.

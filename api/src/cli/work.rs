@@ -6,9 +6,9 @@ use lacuna_fabrication::{Input, Job, JobKind, Outcome, Params};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
 use super::args::{EvaluateArgs, LimitArgs, MeasureArgs, OutputArgs, ProgressMode, RunArgs, SolidifyArgs};
-use super::output::{Target, Written, deliver, target};
+use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
-use super::{DOCUMENT_BYTES, print_json, read_input, stop};
+use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::{documents, files, production};
@@ -45,7 +45,7 @@ pub(super) fn run(args: &RunArgs, manner: Manner) -> Result<(), Problem> {
     let bytes = read_input(&args.job, DOCUMENT_BYTES)?;
     // Whoever sits at the machine may ask for as much of it as there is.
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
-    let mut job = documents::read_job(&bytes, &most, &|_| None)?;
+    let mut job = documents::read_job_in(&bytes, &most, folder_of(&args.job))?;
     job.limits = limits(job.limits, &args.limits);
     std::fs::create_dir_all(&args.folder).map_err(|error| Problem::io(args.folder.display(), &error))?;
     let title = job.inputs.first().map(|input| input.name.clone());
@@ -72,8 +72,13 @@ fn make(kind: JobKind, model: &Path, params: Params, output: &OutputArgs, limit_
         targets.push(Target { name: None, ..target(path, Some("png"))? });
     }
     let title = job.inputs.first().map(|input| input.name.clone());
-    let (outcome, written) = perform(&job, limit_args, manner, |outcome, budget| {
-        deliver(outcome, title.as_deref(), &targets, output.certificate.as_deref(), budget)
+    let certificate = output.certificate.as_deref();
+    let (outcome, written) = watched(&job, limit_args, manner, |budget| {
+        // Points need not be held to be written.
+        if let Some(done) = deliver_streamed(&job, title.as_deref(), &targets, certificate, budget)? {
+            return Ok(done);
+        }
+        computed(&job, budget, |outcome, budget| deliver(outcome, title.as_deref(), &targets, certificate, budget))
     })?;
     if !manner.quiet {
         summarize(&outcome, &written);
@@ -93,7 +98,7 @@ fn check_distinct(targets: &[Target], output: &OutputArgs) -> Result<(), Problem
 }
 
 fn job_of(kind: JobKind, model: &Path, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Result<Job, Problem> {
-    let model = documents::read_model(&read_input(model, DOCUMENT_BYTES)?)?;
+    let model = documents::read_model_in(&read_input(model, DOCUMENT_BYTES)?, folder_of(model))?;
     let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
     let mut names: Vec<String> = Vec::new();
     for output in outputs {
@@ -120,18 +125,29 @@ fn perform(
     manner: Manner,
     deliver: impl FnOnce(&mut Outcome, &Budget) -> Result<Vec<Written>, Problem>,
 ) -> Result<(Outcome, Vec<Written>), Problem> {
+    watched(job, limit_args, manner, |budget| computed(job, budget, deliver))
+}
+
+fn computed(
+    job: &Job,
+    budget: &Budget,
+    deliver: impl FnOnce(&mut Outcome, &Budget) -> Result<Vec<Written>, Problem>,
+) -> Result<(Outcome, Vec<Written>), Problem> {
+    let mut outcome = production::compute(job, budget)?;
+    outcome.certificate.input_digest = documents::job_digest(job).to_string();
+    let written = deliver(&mut outcome, budget)?;
+    Ok((outcome, written))
+}
+
+/// Works under the eyes of the clock and of the user.
+fn watched<T>(job: &Job, limit_args: &LimitArgs, manner: Manner, work: impl FnOnce(&Budget) -> Result<T, Problem>) -> Result<T, Problem> {
     use_threads(limit_args.threads)?;
     let reporter = Reporter::new(manner.progress, manner.quiet);
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: reporter.sink() };
     stop::on_signals(&budget.cancel)?;
     let _watchdog =
         Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
-    let done = production::compute(job, &budget).and_then(|mut outcome| {
-        outcome.certificate.input_digest = documents::job_digest(job).to_string();
-        let written = deliver(&mut outcome, &budget)?;
-        Ok((outcome, written))
-    });
-    done.map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
+    work(&budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
 }
 
 /// Sets the number of threads of this process's computations.

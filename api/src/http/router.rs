@@ -8,7 +8,7 @@ use utoipa_axum::routes;
 use super::state::Shared;
 use super::{auth, layers};
 use crate::problem::{Problem, ProblemKind};
-use crate::routes::{capabilities, docs, events, health, jobs, models, results, studies};
+use crate::routes::{capabilities, docs, events, health, jobs, library, models, results, studies};
 
 /// Every address with its description; the public ones apart, because the others need a key.
 fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
@@ -21,8 +21,13 @@ fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
     let private = OpenApiRouter::new()
         .routes(routes!(models::store, models::list))
         .routes(routes!(models::fetch, models::forget))
+        .routes(routes!(library::list))
+        .routes(routes!(library::fetch))
         .routes(routes!(studies::validate))
         .routes(routes!(studies::plan))
+        .routes(routes!(studies::solve))
+        .routes(routes!(studies::automaton))
+        .routes(routes!(studies::address))
         .routes(routes!(jobs::submit, jobs::list))
         .routes(routes!(jobs::show, jobs::forget))
         .routes(routes!(jobs::cancel))

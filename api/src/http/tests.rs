@@ -300,3 +300,28 @@ async fn listed_pages_may_read_answers_and_errors() {
     let preflight = [("origin", "https://shop.example"), ("access-control-request-method", "POST")];
     assert_eq!(service.send("OPTIONS", "/v1/jobs", &preflight, Body::empty()).await.0, StatusCode::NO_CONTENT);
 }
+
+#[tokio::test]
+async fn the_library_is_served_and_mesh_files_are_not() {
+    let service = Service::start(0, &[]);
+    let (status, list) = service.get("/v1/library").await;
+    assert_eq!((status, list["items"][0]["name"].as_str()), (StatusCode::OK, Some("barnsley_fern")));
+    let (status, headers, document) = service.send("GET", "/v1/library/koch_curve", &[], Body::empty()).await;
+    assert_eq!((status, headers["content-type"].to_str().unwrap()), (StatusCode::OK, "application/vnd.lacuna.model+json;v=1"));
+    let etag = headers["etag"].to_str().unwrap();
+    let (status, _, body) = service.send("GET", "/v1/library/koch_curve", &[("if-none-match", etag)], Body::empty()).await;
+    assert_eq!((status, body.len()), (StatusCode::NOT_MODIFIED, 0));
+    let json = [("content-type", "application/json")];
+    let (status, _, report) = service.send("POST", "/v1/validate", &json, document).await;
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!((status, &report["valid"]), (StatusCode::OK, &json!(true)));
+    let (status, problem) = service.get("/v1/library/no_such").await;
+    assert_eq!((status, &problem["code"]), (StatusCode::NOT_FOUND, &json!("library.unknown")));
+    // A service has no folder that a document may look into.
+    let named = r#"{"lacuna":1,"shape":{"family":"mesh","file":"cage.obj"}}"#;
+    let (_, _, report) = service.send("POST", "/v1/validate", &json, named).await;
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!(report["diagnostics"][0]["code"], "document.file-not-available");
+    let (status, _, _) = service.send("POST", "/v1/models", &json, named).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+}

@@ -5,6 +5,7 @@ pub mod docs;
 pub mod events;
 pub mod health;
 pub mod jobs;
+pub mod library;
 pub mod models;
 pub mod results;
 pub mod studies;

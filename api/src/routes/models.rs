@@ -16,7 +16,8 @@ use crate::openapi::Model;
 use crate::problem::{Problem, ProblemKind};
 use crate::store::ModelView;
 
-const MEDIA_TYPE: &str = "application/vnd.lacuna.model+json;v=1";
+/// The media type of model documents.
+pub(super) const MEDIA_TYPE: &str = "application/vnd.lacuna.model+json;v=1";
 
 /// Which page of models.
 #[derive(Debug, Deserialize, IntoParams)]

@@ -1,23 +1,26 @@
 //! Compares a certificate with a case. What is absent, `"not_checked"` or not finite never passes.
 
-use lacuna_fabrication::JobKind;
 use serde_json::Value;
 
-use super::manifest::{BoundingBox, Manifest, Scalar};
+use super::manifest::{BoundingBox, CaseKind, Manifest, Scalar};
 use super::report::Row;
 
 /// All comparisons of a case, those that every case implies included.
 pub(super) fn rows(manifest: &Manifest, got: &Value) -> Vec<Row> {
-    let mut rows = Vec::new();
-    if let Some(exact) = &manifest.exact {
-        rows.extend(exact.members.iter().map(|(name, expected)| exact_row(name, expected, got.get(name))));
-    }
-    rows.extend(manifest.scalar.iter().map(|(name, scalar)| scalar_row(name, scalar, got.get(name))));
+    let mut rows = stated(manifest, got);
+    let tolerance = manifest.tolerance_mm.unwrap_or(f64::NAN);
     if let Some(bounding_box) = &manifest.bounding_box {
-        rows.extend(box_rows(bounding_box, manifest.tolerance_mm, got));
+        rows.extend(box_rows(bounding_box, tolerance, got));
     }
-    rows.extend(implied(manifest, got));
+    rows.extend(implied(manifest.kind, tolerance, got));
     rows
+}
+
+/// The comparisons of `[exact]` and `[scalar.*]`.
+pub(super) fn stated(manifest: &Manifest, got: &Value) -> Vec<Row> {
+    let exact = manifest.exact.iter().flat_map(|exact| &exact.members);
+    let exact = exact.map(|(name, expected)| exact_row(name, expected, got.get(name)));
+    exact.chain(manifest.scalar.iter().map(|(name, scalar)| scalar_row(name, scalar, got.get(name)))).collect()
 }
 
 fn exact_row(name: &str, expected: &toml::Value, got: Option<&Value>) -> Row {
@@ -73,9 +76,8 @@ fn box_rows(expected: &BoundingBox, tolerance: f64, got: &Value) -> Vec<Row> {
     rows
 }
 
-fn implied(manifest: &Manifest, got: &Value) -> Vec<Row> {
+fn implied(kind: CaseKind, tolerance: f64, got: &Value) -> Vec<Row> {
     let number = |name: &str| got.get(name).and_then(Value::as_f64).filter(|number| number.is_finite());
-    let tolerance = manifest.tolerance_mm;
     let mut rows = vec![
         Row::verdict(
             "requested_tolerance_mm",
@@ -90,7 +92,7 @@ fn implied(manifest: &Manifest, got: &Value) -> Vec<Row> {
             rows.push(Row::verdict(name, "an ordered, finite interval", &shown(Some(found)), interval(found).is_some()));
         }
     }
-    if manifest.kind == JobKind::Solidify {
+    if kind == CaseKind::Solidify {
         rows.extend(implied_of_solids(tolerance, got));
     }
     rows

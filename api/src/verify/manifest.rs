@@ -10,8 +10,8 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {
     pub(super) about: String,
-    pub(super) kind: JobKind,
-    pub(super) tolerance_mm: f64,
+    pub(super) kind: CaseKind,
+    pub(super) tolerance_mm: Option<f64>,
     pub(super) radius_mm: Option<f64>,
     pub(super) exact: Option<Exact>,
     #[serde(default)]
@@ -19,6 +19,47 @@ pub(super) struct Manifest {
     #[serde(rename = "box")]
     pub(super) bounding_box: Option<BoundingBox>,
     pub(super) refused: Option<Refused>,
+    /// Values chosen for free parameters.
+    #[serde(default)]
+    pub(super) values: BTreeMap<String, f64>,
+    /// Entries of the solution by their place.
+    #[serde(default)]
+    pub(super) entry: BTreeMap<String, ExpectedEntry>,
+}
+
+/// What is done with a case's model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum CaseKind {
+    Evaluate,
+    Solidify,
+    Measure,
+    Solve,
+}
+
+impl CaseKind {
+    /// The kind of job, if it is one.
+    pub(super) fn job(self) -> Option<JobKind> {
+        match self {
+            Self::Evaluate => Some(JobKind::Evaluate),
+            Self::Solidify => Some(JobKind::Solidify),
+            Self::Measure => Some(JobKind::Measure),
+            Self::Solve => None,
+        }
+    }
+}
+
+/// An entry of a solution.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ExpectedEntry {
+    pub(super) value: f64,
+    /// Where all parameters are 0, as a fraction.
+    pub(super) constant: Option<String>,
+    /// Fractions by the name of the parameter.
+    pub(super) coefficients: Option<BTreeMap<String, String>>,
+    #[serde(rename = "source")]
+    _source: String,
 }
 
 /// Members of the certificate that must be equal.
@@ -67,6 +108,8 @@ pub(super) struct BoundingBox {
 pub(super) struct Refused {
     pub(super) code: String,
     pub(super) pointer: Option<String>,
+    /// The places of all findings, in order; only of a `solve`.
+    pub(super) pointers: Option<Vec<String>>,
 }
 
 impl Manifest {
@@ -81,13 +124,21 @@ impl Manifest {
             return Err("`about` is empty".into());
         }
         match (self.kind, self.radius_mm) {
-            (JobKind::Solidify, None) => return Err("`solidify` needs radius_mm".into()),
-            (JobKind::Evaluate, Some(_)) => return Err("`evaluate` has no radius_mm".into()),
+            (CaseKind::Solidify, None) => return Err("`solidify` needs radius_mm".into()),
+            (CaseKind::Evaluate | CaseKind::Solve, Some(_)) => return Err("`evaluate` and `solve` have no radius_mm".into()),
             _ => {}
         }
-        let stated = self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some();
+        let solves = self.kind == CaseKind::Solve;
+        if solves == self.tolerance_mm.is_some() {
+            return Err("`solve` has no tolerance_mm, everything else needs it".into());
+        }
+        let of_solve = !self.values.is_empty() || !self.entry.is_empty() || self.refused.as_ref().is_some_and(|r| r.pointers.is_some());
+        if of_solve && !solves || solves && self.bounding_box.is_some() {
+            return Err("[values], [entry.*] and refused.pointers belong to `solve`, which has no [box]".into());
+        }
+        let stated = self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some() || !self.entry.is_empty();
         if stated == self.refused.is_some() {
-            return Err("either [refused], or at least one of [exact], [scalar.*] and [box]".into());
+            return Err("either [refused], or at least one of [exact], [scalar.*], [entry.*] and [box]".into());
         }
         for (name, scalar) in &self.scalar {
             let finite = [scalar.value, scalar.lower, scalar.upper, Some(scalar.absolute), Some(scalar.relative)];
@@ -109,6 +160,26 @@ mod tests {
     use super::*;
 
     const HEAD: &str = "about = \"x\"\nkind = \"measure\"\ntolerance_mm = 1\n";
+
+    #[test]
+    fn cases_of_solve() {
+        let read = |rest: &str| Manifest::read(&format!("about = \"x\"\nkind = \"solve\"\n{rest}"));
+        let entry = "[entry.\"/shape/x\"]\nvalue = 1\nconstant = \"1\"\ncoefficients = {a = \"-1/2\"}\nsource = \"s\"\n";
+        assert!(read(entry).is_ok());
+        assert!(read(&format!("[values]\na = 0.25\n{entry}")).is_ok());
+        assert!(read("[refused]\ncode = \"c\"\npointers = [\"/shape\"]").is_ok());
+        for bad in [
+            "",
+            "[values]\na = 1",
+            "[entry.x]\nvalue = 1",
+            "tolerance_mm = 1\n[exact]\nsource = \"s\"",
+            "radius_mm = 1\n[refused]\ncode = \"c\"",
+        ] {
+            assert!(read(bad).is_err(), "{bad}");
+        }
+        assert!(Manifest::read(&format!("{HEAD}{entry}")).is_err());
+        assert!(Manifest::read(&HEAD.replace("tolerance_mm = 1", "[refused]\ncode = \"c\"")).is_err());
+    }
 
     #[test]
     fn legal_and_illegal_cases() {

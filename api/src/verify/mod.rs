@@ -5,12 +5,13 @@
 mod compare;
 mod manifest;
 mod report;
+mod solve;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use lacuna_fabrication::{Input, Job, Params};
+use lacuna_fabrication::{Input, Job, JobKind, Params};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
 use crate::jobs::watchdog::Watchdog;
@@ -77,7 +78,8 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
         Ok(document) => document,
         Err(error) => return vec![Row::failure("model.json", "a readable file", &error.to_string())],
     };
-    let result = perform(&document, manifest);
+    let Some(kind) = manifest.kind.job() else { return solve::rows(&document, manifest) };
+    let result = perform(folder, &document, kind, manifest);
     match (&manifest.refused, result) {
         (Some(refused), result) => vec![compare_refusal(refused, result)],
         (None, Ok(certificate)) => compare::rows(manifest, &certificate),
@@ -86,13 +88,13 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
 }
 
 /// Does the case as any door would, and gives its certificate as JSON.
-fn perform(document: &[u8], manifest: &Manifest) -> Result<serde_json::Value, Problem> {
-    let model = documents::read_model(document)?;
+fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -> Result<serde_json::Value, Problem> {
+    let model = documents::read_model_in(document, Some(folder))?;
     let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
     let job = Job {
-        kind: manifest.kind,
+        kind,
         inputs: vec![Input { name, model }],
-        params: Params { tolerance_mm: manifest.tolerance_mm, radius_mm: manifest.radius_mm },
+        params: Params { tolerance_mm: manifest.tolerance_mm.unwrap_or(f64::NAN), radius_mm: manifest.radius_mm },
         outputs: Vec::new(),
         limits: Limits::default(),
     };

@@ -102,10 +102,14 @@ codes! {
     ZERO_AXIS = "document.zero-axis";
     /// The document's version is not one that this program reads.
     UNSUPPORTED_VERSION = "document.unsupported-version";
-    /// The family belongs to the grammar and cannot be evaluated yet.
-    FAMILY_NOT_AVAILABLE = "document.family-not-available";
     /// The kind of job belongs to the grammar and cannot be done yet.
     KIND_NOT_AVAILABLE = "document.kind-not-available";
+    /// A document names a file, and it comes without a folder, as over HTTP.
+    FILE_NOT_AVAILABLE = "document.file-not-available";
+    /// A document names a file outside of its folder.
+    FILE_OUTSIDE = "document.file-outside";
+    /// A file that a document names is not there, or holds no mesh.
+    FILE_NOT_READ = "document.file-not-read";
     /// The model has more states than the limit.
     TOO_MANY_STATES = "document.too-many-states";
     /// The model has more transitions than the limit.
@@ -114,6 +118,8 @@ codes! {
     MORE_DIAGNOSTICS = "document.more-diagnostics";
     /// A state's name is not that of a state of the model.
     UNKNOWN_STATE = "automaton.unknown-state";
+    /// The text is no address of a cell or point.
+    BAD_ADDRESS = "address.syntax";
     /// A job refers to a model that is not stored.
     UNKNOWN_MODEL = "job.unknown-model";
     /// A limit that a job asks for is above what the service allows.

@@ -1,6 +1,6 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
-use lacuna_kernel::attractor::{Attractor, CellComplex};
+use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
 use lacuna_kernel::dilation::Dilation;
 use lacuna_kernel::measure::AxisBox;
 use lacuna_kernel::measure::mass::{area, dilated_area, dilated_volume, mesh_measures, volume};
@@ -187,6 +187,17 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         certificate.warnings.push(format!("{} separate pieces: they will not hold together", topology.components));
     }
     certificate
+}
+
+/// What is proven of an evaluation to points that were handed over.
+pub(crate) fn of_points(attractor: &Attractor, points: u64, streamed: Streamed, bounds: &AxisBox, tolerance: Tolerance) -> Certificate {
+    Certificate {
+        achieved_bound_mm: streamed.deviation_mm + bounds.single_precision(),
+        leaf_cells: streamed.leaf_cells,
+        vertices: points,
+        bbox_mm: corners(bounds),
+        ..start(attractor, tolerance)
+    }
 }
 
 /// What is proven of an evaluation. Counts of its topology are those of the shape's own cells, when all of it has a

@@ -3,7 +3,9 @@
 pub mod certificate;
 pub mod job;
 pub mod run;
+pub mod solve;
 
 pub use certificate::Certificate;
 pub use job::{Input, Job, JobKind, Params};
-pub use run::{Geometry, JobError, Outcome, Plan, Validation, plan, run, validate};
+pub use run::{Geometry, JobError, Outcome, Plan, StreamError, Validation, plan, run, stream_points, validate};
+pub use solve::{SolutionSpace, SolveRefusal, Solved, solve};

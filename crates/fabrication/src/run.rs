@@ -1,15 +1,16 @@
 //! One entry for every door: `plan` predicts, `run` does, `validate` tells what is wrong.
 
-use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine};
+use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
 use lacuna_kernel::dilation::{DilationError, dilate, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::bounding_box;
+use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::{Finding, Lowered, Model};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
+use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, certificate};
 
 /// The geometry of a result.
@@ -58,8 +59,8 @@ pub struct Validation {
     pub diagnostics: Vec<ModelDiagnostic>,
     /// Number of states of the automaton.
     pub states: u64,
-    /// Degrees of freedom of the unknown operators; 0 when none is unknown.
-    pub degrees_of_freedom: u64,
+    /// Degrees of freedom of the unknown operators: 0 when none is unknown, absent when they could not be found.
+    pub degrees_of_freedom: Option<u64>,
     /// Largest violation of a constraint.
     pub constraint_residual: f64,
     /// [lower, upper] bounds of the joint spectral radius on the zero-sum subspaces, when the model is sound
@@ -104,12 +105,13 @@ impl From<Finding> for ModelDiagnostic {
 }
 
 impl JobError {
-    fn new(kind: Kind, code: &'static str, message: String) -> Self {
+    pub(crate) fn new(kind: Kind, code: &'static str, message: String) -> Self {
         Self { kind, code, message, limit: None, diagnostics: Vec::new() }
     }
 
     /// The first error speaks for all; every finding is listed.
-    fn model(findings: Vec<Finding>) -> Self {
+    #[must_use]
+    pub fn model(findings: Vec<Finding>) -> Self {
         let first = findings.iter().find(|finding| !finding.warning).cloned();
         let (code, message) = first.map_or(("invalid-model", String::new()), |finding| (finding.code, finding.message));
         let kind = if code == "automaton.convergence-undecided" { Kind::Unreachable } else { Kind::Invalid };
@@ -187,7 +189,8 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     }
 }
 
-fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+/// The box, and the share of the tolerance that single precision leaves.
+fn share_of(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(AxisBox, Tolerance), JobError> {
     let bounds = bounding_box(attractor, budget)?;
     let rounding = bounds.single_precision();
     let share = tolerance.mm() - rounding;
@@ -203,9 +206,65 @@ fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Res
             LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
         return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) });
     }
-    let tessellation = refine(attractor, Tolerance::new(share)?, budget)?;
+    Ok((bounds, Tolerance::new(share)?))
+}
+
+fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+    let (bounds, share) = share_of(attractor, tolerance, budget)?;
+    let tessellation = refine(attractor, share, budget)?;
     let certificate = certificate::of_evaluation(attractor, &tessellation, &bounds, tolerance);
     Ok(Outcome { geometry: Geometry::Tessellation(tessellation), certificate })
+}
+
+/// Why a streamed evaluation ended early.
+#[derive(Debug)]
+pub enum StreamError<E> {
+    /// The job has no result.
+    Job(JobError),
+    /// Whoever takes the points failed.
+    Sink(E),
+    /// Something other than points stands for a cell; some points may have been handed over.
+    NotPoints,
+}
+
+impl<E> From<RefineError> for StreamError<E> {
+    fn from(error: RefineError) -> Self {
+        Self::Job(error.into())
+    }
+}
+
+impl<E> From<JobError> for StreamError<E> {
+    fn from(error: JobError) -> Self {
+        Self::Job(error)
+    }
+}
+
+/// Evaluates a shape that is drawn as points, and hands them over in address order without holding them: memory
+/// does not grow with their number. The certificate is that of [`run`].
+///
+/// # Errors
+/// As [`run`]; what `sink` returns; [`StreamError::NotPoints`] for every other shape, as a rule before any work.
+pub fn stream_points<E>(
+    job: &Job,
+    budget: &Budget,
+    sink: &mut dyn FnMut(&Tessellation) -> Result<(), E>,
+) -> Result<Certificate, StreamError<E>> {
+    let tolerance = Tolerance::new(job.params.tolerance_mm).map_err(JobError::from)?;
+    let lowered = lower(job, budget)?;
+    let attractor = &lowered.attractor;
+    if !attractor.is_drawn_as_points() {
+        return Err(StreamError::NotPoints);
+    }
+    let (bounds, share) = share_of(attractor, tolerance, budget)?;
+    let mut points = 0;
+    let streamed = stream(attractor, share, budget, &mut |piece| {
+        if piece.vertices.len() != piece.points.len() {
+            return Err(StreamError::NotPoints);
+        }
+        points += piece.vertices.len() as u64;
+        sink(&piece).map_err(StreamError::Sink)
+    })?;
+    Ok(certificate::of_points(attractor, points, streamed, &bounds, tolerance))
 }
 
 /// Bytes of a binary STL file with so many triangles.
@@ -253,7 +312,7 @@ fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -
     for _ in 0..200 {
         match count_cells(attractor, Tolerance::new(coarse)?, &counted) {
             Ok(count) => known.push((coarse, count as f64)),
-            Err(RefineError::Cells { .. } | RefineError::Depth { .. }) => {}
+            Err(RefineError::Cells { .. } | RefineError::Memory { .. } | RefineError::Depth { .. }) => {}
             Err(stopped @ RefineError::Stopped(_)) => return Err(stopped.into()),
         }
         match known.as_slice() {
@@ -268,9 +327,9 @@ fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -
     Ok(known.first().map_or(f64::INFINITY, |(_, count)| *count))
 }
 
-/// Says what is wrong with a model.
+/// Says what is wrong with a model, and what its unknown operators leave open.
 #[must_use]
-pub fn validate(model: &Model) -> Validation {
+pub fn validate(model: &Model, budget: &Budget) -> Validation {
     match model.lower() {
         Ok(lowered) => {
             let contraction = lowered.attractor.contraction();
@@ -278,11 +337,22 @@ pub fn validate(model: &Model) -> Validation {
                 valid: true,
                 diagnostics: lowered.findings.into_iter().map(ModelDiagnostic::from).collect(),
                 states: lowered.attractor.automaton().states().len() as u64,
-                degrees_of_freedom: 0,
+                degrees_of_freedom: Some(0),
                 constraint_residual: lowered.constraint_residual,
                 spectral_radius: Some([contraction.lower, contraction.upper]),
             }
         }
-        Err(findings) => Validation { diagnostics: findings.into_iter().map(ModelDiagnostic::from).collect(), ..Validation::default() },
+        Err(findings) => {
+            let diagnostics: Vec<ModelDiagnostic> = findings.into_iter().map(ModelDiagnostic::from).collect();
+            match freedom(&model.shape, budget) {
+                None => Validation { diagnostics, degrees_of_freedom: Some(0), ..Validation::default() },
+                Some(freedom) => Validation {
+                    diagnostics: diagnostics.into_iter().chain(freedom.conflicts).collect(),
+                    states: freedom.states,
+                    degrees_of_freedom: freedom.degrees,
+                    ..Validation::default()
+                },
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use glam::{DVec3, DVec4};
 use lacuna_kernel::attractor::{Attractor, refine};
-use lacuna_kernel::budget::Budget;
+use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{
     Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, CornerCutting, Entry, Glue, Matrix, Model, RootCell, Shape, TransitionSpec,
 };
@@ -76,11 +76,11 @@ fn biquadratic(cyclic: bool, patches: Vec<Vec<DVec3>>) -> Bcifs {
         state("edge", CellKind::Edge, 6, &[("edge", kronecker(&t0, &ts)), ("edge", kronecker(&t1, &ts))], &ends),
         state("vertex", CellKind::Vertex, 4, &[("vertex", kronecker(&ts, &ts))], &[]),
     ];
-    let adjacency = |a, b| Adjacency { state: "face".into(), between: [a, b], reversed: cyclic };
+    let adjacency = |a, b| Adjacency { state: "face".into(), between: [a, b], reversed: cyclic, permutation: None };
     let adjacencies = vec![adjacency((0, 1), (1, 3)), adjacency((2, 1), (3, 3)), adjacency((0, 2), (2, 0)), adjacency((1, 2), (3, 0))];
     let cells = patches
         .into_iter()
-        .map(|points| RootCell { state: "face".into(), control_points: points.into_iter().map(|p| p.extend(1.0)).collect() })
+        .map(|points| RootCell { state: "face".into(), control_points: points.into_iter().map(|p| Some(p.extend(1.0))).collect() })
         .collect();
     Bcifs { states, adjacencies, cells, ..Bcifs::default() }
 }
@@ -135,8 +135,8 @@ fn torus(cyclic: bool, glued: bool) -> Bcifs {
     if glued {
         for f in 0..9 {
             let (next_u, next_v) = ((f + 3) % 9, f / 3 * 3 + (f % 3 + 1) % 3);
-            bcifs.glue.push(Glue { between: [(f, 1), (next_u, 3)], reversed: cyclic });
-            bcifs.glue.push(Glue { between: [(f, 2), (next_v, 0)], reversed: cyclic });
+            bcifs.glue.push(Glue { between: [(f, 1), (next_u, 3)], reversed: cyclic, permutation: None });
+            bcifs.glue.push(Glue { between: [(f, 2), (next_v, 0)], reversed: cyclic, permutation: None });
         }
     }
     bcifs
@@ -188,7 +188,7 @@ fn a_sierpinski_triangle_keeps_its_holes() {
         state("vertex", CellKind::Vertex, 1, &[("vertex", vec![vec![1.0]])], &[]),
     ];
     let points = [DVec3::ZERO, DVec3::new(64.0, 0.0, 0.0), DVec3::new(32.0, 55.4, 0.0)];
-    let cells = vec![RootCell { state: "face".into(), control_points: points.map(|p| p.extend(1.0)).to_vec() }];
+    let cells = vec![RootCell { state: "face".into(), control_points: points.map(|p| Some(p.extend(1.0))).to_vec() }];
     let attractor = attractor(Bcifs { states, cells, ..Bcifs::default() });
     let tessellation = evaluated(&attractor, 20.0);
     let complex = tessellation.complex.as_ref().expect("a B-rep");
@@ -230,7 +230,7 @@ fn a_wire_that_branches_shares_its_fork() {
         state("vertex", CellKind::Vertex, 1, &[("vertex", vec![vec![1.0]])], &[]),
     ];
     let points = [[-10.0, 0.0], [10.0, 0.0], [0.0, 10.0], [0.0, -10.0]].map(|[x, y]| DVec4::new(x, y, 0.0, 1.0));
-    let cells = vec![RootCell { state: "cross".into(), control_points: points.to_vec() }];
+    let cells = vec![RootCell { state: "cross".into(), control_points: points.map(Some).to_vec() }];
     let tessellation = evaluated(&attractor(Bcifs { states, cells, ..Bcifs::default() }), 0.1);
     let complex = tessellation.complex.as_ref().expect("a B-rep");
     assert_eq!((complex.components, complex.euler), (1, 1));
@@ -260,9 +260,32 @@ fn a_boundary_seen_backwards_must_be_alike_backwards() {
     assert_eq!(agreed(&tessellation), (1, 1, 1));
     // Glue the patch's side 0 to a copy's side 0, turned round.
     let mut copy = bcifs.cells[0].clone();
-    copy.control_points.iter_mut().for_each(|point| point.x = 20.0 - point.x);
+    // Half a turn about the middle of the edge's points, so that they agree.
+    for point in copy.control_points.iter_mut().flatten() {
+        (point.x, point.y) = (20.0 - point.x, 10.0 - point.y);
+    }
     bcifs.cells.push(copy);
-    bcifs.glue.push(Glue { between: [(0, 0), (1, 0)], reversed: true });
+    bcifs.glue.push(Glue { between: [(0, 0), (1, 0)], reversed: true, permutation: None });
     let findings = Model { name: None, shape: Shape::Bcifs(bcifs) }.lower().expect_err("the edge is not symmetric");
     assert!(findings.iter().any(|finding| finding.code == "automaton.asymmetric-boundary"), "{findings:?}");
+}
+
+#[test]
+fn memory_beyond_the_limit_is_refused_with_a_tolerance_that_passes() {
+    let attractor = attractor(torus(false, true));
+    let limits = Limits { memory_bytes: 4 << 20, ..Limits::default() };
+    let budget = Budget { limits, ..Budget::default() };
+    let error = refine(&attractor, Tolerance::new(1e-5).expect("positive"), &budget).expect_err("too fine");
+    assert_eq!(error.code(), "limit-memory");
+    let (_, remedy) = error.limit().and_then(|facts| facts.remedy).expect("a way out");
+    assert!(remedy > 1e-5);
+    assert!(refine(&attractor, Tolerance::new(0.5).expect("positive"), &budget).is_ok());
+}
+
+#[test]
+fn boundaries_are_of_lower_dimension() {
+    let mut bcifs = biquadratic(false, vec![patch(|_, _| 0.0)]);
+    bcifs.states[1].boundaries.push(BoundarySpec { state: "edge".into(), incidence: matrix(&identity(6)) });
+    let findings = Model { name: None, shape: Shape::Bcifs(bcifs) }.lower().expect_err("an edge bounds itself");
+    assert!(findings.iter().any(|finding| finding.code == "automaton.boundary-dimension"), "{findings:?}");
 }

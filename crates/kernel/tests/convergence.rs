@@ -3,9 +3,7 @@
 
 mod automata;
 
-use automata::{
-    Columns, Numbers, automaton, catmull_clark, corner_cutting, cubic, extended, fifty_states, iterated, nurbs, tensor,
-};
+use automata::{Columns, Numbers, automaton, catmull_clark, corner_cutting, cubic, extended, fifty_states, iterated, nurbs, tensor};
 use lacuna_kernel::automaton::{Automaton, Contraction, convergence::contraction};
 
 /// Asserts that the bounds hold the radius and are within `share` of it.
@@ -208,11 +206,13 @@ fn rectangular_operators_and_transient_states() {
 #[test]
 fn a_million_transitions_end() {
     let mut numbers = Numbers(3);
-    let mut operators = |scale: f64| -> Vec<(usize, Columns)> { (0..1000).map(|_| (numbers.below(1000), numbers.signed(3, scale))).collect() };
-    let contracting = automaton((0..1000).map(|_| (3, operators(0.2))).collect());
+    let mut operators = |count: usize, scale: f64| -> Vec<(usize, Columns)> {
+        (0..count).map(|_| (numbers.below(1000), numbers.signed(3, scale))).collect()
+    };
+    let contracting = automaton((0..1000).map(|_| (3, operators(100, 0.2))).collect());
     let found = contraction(&contracting);
     assert!(found.lower <= found.upper && found.upper < 1.0, "{} {}", found.lower, found.upper);
-    let hard = automaton((0..1000).map(|_| (3, operators(0.9))).collect());
+    let hard = automaton((0..1000).map(|_| (3, operators(1000, 0.9))).collect());
     let found = contraction(&hard);
     assert!(found.lower > 0.5 && found.lower <= found.upper && found.upper.is_finite(), "{} {}", found.lower, found.upper);
 }

@@ -6,9 +6,9 @@ mod cages;
 use cages::{attractor, cube, evaluated, grid, model, patches, tetrahedron, torus};
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
+use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, CellKind, Coefficients, Corner, Crease, Scheme, Subdivision};
 use lacuna_kernel::solid::{Topology, TriMesh};
-use lacuna_kernel::budget::Budget;
 use lacuna_kernel::tessellation::Tessellation;
 
 /// Volume by the divergence theorem on the bilinear patches, extrapolated from three depths: the error of smooth
@@ -20,9 +20,7 @@ fn volume(attractor: &Attractor, depth: usize) -> f64 {
             .iter()
             .map(|p| match p.as_slice() {
                 [a, b, c] => triangle(*a, *b, *c),
-                [a, b, c, d] => {
-                    0.5 * (triangle(*a, *b, *c) + triangle(*a, *c, *d) + triangle(*a, *b, *d) + triangle(*b, *c, *d))
-                }
+                [a, b, c, d] => 0.5 * (triangle(*a, *b, *c) + triangle(*a, *c, *d) + triangle(*a, *b, *d) + triangle(*b, *c, *d)),
                 _ => panic!("triangles and quads"),
             })
             .sum()
@@ -56,9 +54,7 @@ fn dimensions(attractor: &Attractor, kind: CellKind) -> Vec<usize> {
 
 #[test]
 fn regular_dimensions_are_those_of_the_box_splines() {
-    for (scheme, face, edge, vertex) in
-        [(Scheme::CatmullClark, 16, 12, 9), (Scheme::DooSabin, 9, 6, 4), (Scheme::Loop, 12, 10, 7)]
-    {
+    for (scheme, face, edge, vertex) in [(Scheme::CatmullClark, 16, 12, 9), (Scheme::DooSabin, 9, 6, 4), (Scheme::Loop, 12, 10, 7)] {
         let attractor = attractor(torus(scheme, 6, 6));
         assert_eq!(dimensions(&attractor, CellKind::Face), [face], "{scheme:?}");
         assert_eq!(dimensions(&attractor, CellKind::Edge), [edge], "{scheme:?}");

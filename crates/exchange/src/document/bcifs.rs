@@ -3,11 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lacuna_kernel::model::{
-    Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec,
-};
+use glam::DVec4;
+use lacuna_kernel::model::{Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Matrix, RootCell, TransitionSpec};
 
-use super::grammar::{ADJACENCY, BCIFS, BOUNDARY, GLUE, INCIDENCE, Member, ROOT_CELL, STATE, TRANSITION};
+use super::constraint::{adjacency, glue, incidence, relation};
+use super::grammar::{BCIFS, BOUNDARY, Member, ROOT_CELL, STATE, TRANSITION};
 use super::node::{Node, Place, Value, quoted};
 use super::transform::weighted_point;
 use super::walk::{Members, Walker, length, reads_as_number, suggestion};
@@ -15,15 +15,27 @@ use crate::diagnostic::code;
 
 /// What other parts of the document may refer to in a state, taken from the tree before anything is
 /// checked, so that one wrong operator does not make every reference wrong.
-struct Outline<'p> {
-    children: Option<Vec<Option<&'p str>>>,
-    boundaries: Option<usize>,
+pub(super) struct Outline<'p> {
+    /// States of the children.
+    pub(super) children: Option<Vec<Option<&'p str>>>,
+    /// States of the boundaries.
+    pub(super) boundaries: Option<Vec<Option<&'p str>>>,
+    /// The number of control points.
+    pub(super) dimension: Option<usize>,
 }
 
 /// The names that a document declares, in an order that no hash decides. `None` when they cannot be told: then no reference is judged.
-struct Names<'p> {
+pub(super) struct Names<'p> {
     states: Option<BTreeMap<&'p str, Outline<'p>>>,
     parameters: Option<BTreeSet<&'p str>>,
+}
+
+impl Names<'_> {
+    /// What is known of a state.
+    pub(super) fn outline(&self, state: Option<&str>) -> Option<&Outline<'_>> {
+        // why: the map's names outlive the lookup, so the longer lifetime may shrink
+        self.states.as_ref()?.get(state?)
+    }
 }
 
 /// A `bcifs` shape.
@@ -46,6 +58,7 @@ pub(super) fn bcifs(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member])
         optional_list(walker, &members, "incidences", "an array of incidences", |walker, place| incidence(walker, place, &names));
     let adjacencies =
         optional_list(walker, &members, "adjacencies", "an array of adjacencies", |walker, place| adjacency(walker, place, &names));
+    let relations = optional_list(walker, &members, "relations", "an array of relations", |walker, place| relation(walker, place, &names));
     let cells = members
         .get("cells")
         .and_then(|place| walker.each_of(place, 1, "an array of root cells", |walker, place| root_cell(walker, place, &names)));
@@ -53,7 +66,15 @@ pub(super) fn bcifs(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member])
     let glue = optional_list(walker, &members, "glue", "an array of glued boundaries", |walker, place| {
         glue(walker, place, roots.as_deref(), &names)
     });
-    Some(Bcifs { states: states?, incidences: incidences?, adjacencies: adjacencies?, cells: cells?, glue: glue?, parameters: parameters? })
+    Some(Bcifs {
+        states: states?,
+        incidences: incidences?,
+        adjacencies: adjacencies?,
+        relations: relations?,
+        cells: cells?,
+        glue: glue?,
+        parameters: parameters?,
+    })
 }
 
 fn optional_list<T>(
@@ -81,16 +102,26 @@ fn elements<'p>(node: &'p Node<'p>) -> Option<&'p [Node<'p>]> {
     }
 }
 
+/// The number, if it is one that counts something.
+fn count(node: &Node<'_>) -> Option<usize> {
+    match node.value {
+        // why: larger dimensions are refused before anything is as long as they are
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        Value::Number(number) if number >= 1.0 && number.fract() == 0.0 && number < 1e9 => Some(number as usize),
+        _ => None,
+    }
+}
+
 fn outlines<'p>(states: &'p Node<'p>) -> Option<BTreeMap<&'p str, Outline<'p>>> {
     let states = elements(states)?;
     let named = states.iter().filter_map(|state| Some((member(state, "name")?.text()?, state)));
     Some(
         named
             .map(|(name, state)| {
-                let transitions = member(state, "transitions").and_then(elements);
-                let children = transitions.map(|list| list.iter().map(|child| member(child, "to").and_then(Node::text)).collect());
-                let boundaries = member(state, "boundaries").map_or(Some(0), length);
-                (name, Outline { children, boundaries })
+                let listed = |list: &'p [Node<'p>], to: &str| list.iter().map(|link| member(link, to).and_then(Node::text)).collect();
+                let children = member(state, "transitions").and_then(elements).map(|list| listed(list, "to"));
+                let boundaries = member(state, "boundaries").map_or(Some(&[][..]), elements).map(|list| listed(list, "state"));
+                (name, Outline { children, boundaries, dimension: member(state, "dimension").and_then(count) })
             })
             .collect(),
     )
@@ -100,7 +131,8 @@ fn root_states<'p>(cells: &'p Node<'p>) -> Option<Vec<Option<&'p str>>> {
     Some(elements(cells)?.iter().map(|cell| member(cell, "state").and_then(Node::text)).collect())
 }
 
-fn parameters(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Vec<(String, f64)>> {
+/// Named numbers.
+pub(super) fn parameters(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Vec<(String, f64)>> {
     let Value::Object(entries) = &place.node.value else {
         return walker.wrong_type(&place, "an object of named numbers");
     };
@@ -182,7 +214,7 @@ fn boundary(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Opt
 }
 
 /// The name of a state of the model.
-fn state_name(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option<String> {
+pub(super) fn state_name(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option<String> {
     let name = walker.text(place, "the name of a state")?;
     match &names.states {
         Some(states) if !states.contains_key(name) => {
@@ -245,93 +277,20 @@ fn entry(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option
     }
 }
 
-const CHILD_BOUNDARY: &str = "a pair [child, boundary of that child]";
-
-/// A pair (i, m): child i of the state, and boundary m of that child's state.
-fn child_boundary(walker: &mut Walker<'_>, place: Place<'_>, state: Option<&Outline<'_>>, names: &Names<'_>) -> Option<(usize, usize)> {
-    let children = state.and_then(|state| state.children.as_deref());
-    pair_of(walker, place, CHILD_BOUNDARY, children, "child", names)
-}
-
-/// A pair (i, m): element i of a list of cells with states, and boundary m of that state.
-fn pair_of(
-    walker: &mut Walker<'_>,
-    place: Place<'_>,
-    expected: &str,
-    cells: Option<&[Option<&str>]>,
-    meaning: &str,
-    names: &Names<'_>,
-) -> Option<(usize, usize)> {
-    let (cell, boundary) = walker.index_pair(place, expected)?;
-    let offset = place.node.offset;
-    let count = cells.map_or(usize::MAX, <[_]>::len);
-    let cell = walker.in_range(&place.path.index(0), offset, cell, count, meaning)?;
-    let state = cells.and_then(|cells| *cells.get(cell)?);
-    let boundaries = state.and_then(|name| names.states.as_ref()?.get(name)?.boundaries);
-    let boundary = walker.in_range(&place.path.index(1), offset, boundary, boundaries.unwrap_or(usize::MAX), "boundary")?;
-    Some((cell, boundary))
-}
-
-/// Two pairs.
-fn between(
-    walker: &mut Walker<'_>,
-    place: Place<'_>,
-    read: impl FnMut(&mut Walker<'_>, Place<'_>) -> Option<(usize, usize)>,
-) -> Option<[(usize, usize); 2]> {
-    const EXPECTED: &str = "two pairs [[i, m], [j, n]]";
-    let pairs = walker.each(place, EXPECTED, read);
-    match length(place.node) {
-        Some(found) if found != 2 => walker.wrong_length(&place, found, EXPECTED),
-        _ => pairs?.try_into().ok(),
-    }
-}
-
-fn outline<'n>(names: &'n Names<'_>, state: Option<&String>) -> Option<&'n Outline<'n>> {
-    // why: the map's names outlive the lookup, so the longer lifetime may shrink
-    names.states.as_ref()?.get(state?.as_str())
-}
-
-fn incidence(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option<Incidence> {
-    let members = walker.object(place, &INCIDENCE)?;
-    let state = members.get("state").and_then(|place| state_name(walker, place, names));
-    let outline = outline(names, state.as_ref());
-    let boundaries = outline.and_then(|outline| outline.boundaries).unwrap_or(usize::MAX);
-    let boundary = members.get("boundary").and_then(|place| walker.index(place, boundaries, "boundary"));
-    let children = members.get("children").and_then(|place| {
-        walker.each(place, "an array of pairs [child, boundary]", |walker, place| child_boundary(walker, place, outline, names))
-    });
-    Some(Incidence { state: state?, boundary: boundary?, children: children? })
-}
-
-fn adjacency(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option<Adjacency> {
-    let members = walker.object(place, &ADJACENCY)?;
-    let state = members.get("state").and_then(|place| state_name(walker, place, names));
-    let outline = outline(names, state.as_ref());
-    let pairs =
-        members.get("between").and_then(|place| between(walker, place, |walker, place| child_boundary(walker, place, outline, names)));
-    let reversed = members.get("reversed").map_or(Some(false), |place| walker.flag(place));
-    Some(Adjacency { state: state?, between: pairs?, reversed: reversed? })
-}
-
 fn root_cell(walker: &mut Walker<'_>, place: Place<'_>, names: &Names<'_>) -> Option<RootCell> {
     let members = walker.object(place, &ROOT_CELL)?;
     let state = members.get("state").and_then(|place| state_name(walker, place, names));
     let control_points = members
         .get("control_points")
-        .and_then(|place| walker.each_of(place, 1, "an array of points [x, y, z] or [x, y, z, w]", weighted_point));
+        .and_then(|place| walker.each_of(place, 1, "an array of points [x, y, z] or [x, y, z, w], or null", placed_point));
     Some(RootCell { state: state?, control_points: control_points? })
 }
 
-/// Glued boundaries: an object, or a bare pair of pairs.
-fn glue(walker: &mut Walker<'_>, place: Place<'_>, roots: Option<&[Option<&str>]>, names: &Names<'_>) -> Option<Glue> {
-    let pair = |walker: &mut Walker<'_>, place: Place<'_>| {
-        pair_of(walker, place, "a pair [root cell, boundary of its state]", roots, "root cell", names)
-    };
-    if length(place.node).is_some() {
-        return Some(Glue { between: between(walker, place, pair)?, reversed: false });
+/// A control point, or `null` for one that is to be placed.
+#[allow(clippy::option_option)] // why: the outer option is the reader's, for values that are wrong
+fn placed_point(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Option<DVec4>> {
+    if matches!(place.node.value, Value::Null) {
+        return Some(None);
     }
-    let members = walker.object(place, &GLUE)?;
-    let pairs = members.get("between").and_then(|place| between(walker, place, pair));
-    let reversed = members.get("reversed").map_or(Some(false), |place| walker.flag(place));
-    Some(Glue { between: pairs?, reversed: reversed? })
+    weighted_point(walker, place).map(Some)
 }

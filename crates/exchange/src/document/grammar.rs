@@ -3,6 +3,7 @@
 
 use serde_json::{Value, json};
 
+use super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
 use crate::format::FORMATS;
 
 /// A kind of object.
@@ -63,6 +64,10 @@ fn text() -> Value {
     json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f]*$" })
 }
 
+fn file_name() -> Value {
+    json!({ "type": "string", "minLength": 1, "maxLength": 256, "pattern": "^[^\\u0000-\\u001f\\u007f-\\u009f\\\\:]*$" })
+}
+
 fn list(items: Value, least: usize) -> Value {
     json!({ "type": "array", "items": items, "minItems": least })
 }
@@ -81,6 +86,19 @@ fn points(least: usize) -> Value {
 
 fn rational_points(least: usize) -> Value {
     list(reference("ControlPoint"), least)
+}
+
+/// Control points of a root cell, some of them to be placed.
+fn placed_points() -> Value {
+    list(json!({ "anyOf": [reference("ControlPoint"), { "type": "null" }] }), 1)
+}
+
+fn permutation() -> Value {
+    json!({ "type": "array", "items": index(), "minItems": 1, "uniqueItems": true })
+}
+
+fn path() -> Value {
+    json!({ "type": "array", "items": index(), "maxItems": 64 })
 }
 
 fn faces(least: usize) -> Value {
@@ -225,6 +243,7 @@ pub(super) const BCIFS: Object = Object {
             list(reference("Incidence"), 0)
         }),
         optional("adjacencies", "Adjacency constraints: boundaries that two children share.", || list(reference("Adjacency"), 0)),
+        optional("relations", "Further equations between products of operators and embeddings.", || list(reference("Relation"), 0)),
         required("cells", "The root cells.", || list(reference("RootCell"), 1)),
         optional("glue", "Boundaries of root cells that are one; as objects or as bare pairs.", || {
             list(json!({ "anyOf": [reference("Glue"), tuple(index_pair(), 2)] }), 0)
@@ -277,6 +296,8 @@ pub(super) const INCIDENCE: Object = Object {
     ],
 };
 
+const PERMUTATION: &str = "The order in which the second's control points are taken: the k-th of the first is number permutation[k] of the second. Excludes reversed.";
+
 pub(super) const ADJACENCY: Object = Object {
     title: "an adjacency",
     about: "Two children share a boundary.",
@@ -284,6 +305,22 @@ pub(super) const ADJACENCY: Object = Object {
         required("state", "Name of the state.", text),
         required("between", "Two pairs [child, boundary of that child].", || tuple(index_pair(), 2)),
         optional("reversed", "Whether the second is seen from its other end.", flag),
+        optional("permutation", PERMUTATION, permutation),
+    ],
+};
+
+pub(super) const RELATION: Object = Object {
+    title: "a relation",
+    about: "Two products of a state's operators and embeddings that are equal.",
+    members: &[required("state", "Name of the state.", text), required("equal", "The two products.", || tuple(reference("Side"), 2))],
+};
+
+pub(super) const SIDE: Object = Object {
+    title: "a side of a relation",
+    about: "The product T_i T_j ... b_m b_p ...: a child, a child of that child and so on, then a boundary of the last, a boundary of that boundary and so on.",
+    members: &[
+        optional("path", "Children i, j, ...; none when absent.", path),
+        optional("boundary", "Boundaries m, p, ...; none when absent.", path),
     ],
 };
 
@@ -292,7 +329,7 @@ pub(super) const ROOT_CELL: Object = Object {
     about: "A cell that the shape starts from.",
     members: &[
         required("state", "Name of the cell's state.", text),
-        required("control_points", "As many points as the state's dimension.", || rational_points(1)),
+        required("control_points", "As many points as the state's dimension; null for one that is to be placed.", placed_points),
     ],
 };
 
@@ -302,6 +339,7 @@ pub(super) const GLUE: Object = Object {
     members: &[
         required("between", "Two pairs [root cell, boundary of its state].", || tuple(index_pair(), 2)),
         optional("reversed", "Whether the second is seen from its other end.", flag),
+        optional("permutation", PERMUTATION, permutation),
     ],
 };
 
@@ -327,13 +365,261 @@ pub(super) const CORNER_CUTTING: Object = Object {
     ],
 };
 
+fn degree() -> Value {
+    json!({ "type": "integer", "minimum": 1, "maximum": 9 })
+}
+
+fn degrees(directions: usize) -> Value {
+    json!({ "anyOf": [degree(), tuple(degree(), directions)] })
+}
+
+fn knots() -> Value {
+    list(number(), 4)
+}
+
+/// Lists of lists, one level per direction.
+fn nested(item: fn() -> Value, directions: usize) -> Value {
+    (0..directions).fold(item(), |inner, _| list(inner, 1))
+}
+
+fn net_point() -> Value {
+    reference("ControlPoint")
+}
+
+fn curve_scheme() -> Value {
+    reference("CurveScheme")
+}
+
+fn curve_shape() -> Value {
+    reference("CurveShape")
+}
+
+fn factors() -> Value {
+    list(json!({ "type": "number", "exclusiveMinimum": -1, "exclusiveMaximum": 1 }), 1)
+}
+
+const WEIGHTS: Member =
+    optional("weights", "One positive weight per control point, unless the points carry theirs.", || list(positive(), 1));
+const POLYGON: Member = required("control_points", "The control polygon.", || points(3));
+const CLOSED: Member = optional("closed", "Whether the polygon is closed.", flag);
+
+pub(super) const BEZIER_SCHEME: Object = Object {
+    title: "a bezier_curve without control points",
+    about: "A Bezier curve of as many points as the net has in this direction.",
+    members: &[family!("bezier_curve")],
+};
+
+pub(super) const NURBS_SCHEME: Object = Object {
+    title: "a nurbs_curve without control points",
+    about: "A spline of any degree on any knots.",
+    members: &[
+        family!("nurbs_curve"),
+        required("degree", "The degree d, from 1 to 9.", degree),
+        required(
+            "knots",
+            "The full knot vector: as many as control points, plus d + 1; not decreasing, multiplicities up to d + 1. The curve is defined from knot d to knot n, n being the number of control points.",
+            knots,
+        ),
+    ],
+};
+
+pub(super) const NURBS_CURVE: Object = Object {
+    title: "a nurbs_curve",
+    about: "A polynomial or rational spline of any degree from 1 to 9 on any knots: clamped, periodic, with multiple knots.",
+    members: &[
+        NURBS_SCHEME.members[0],
+        NURBS_SCHEME.members[1],
+        NURBS_SCHEME.members[2],
+        required("control_points", "The control points, in order.", || rational_points(2)),
+        WEIGHTS,
+    ],
+};
+
+pub(super) const NURBS_SURFACE: Object = Object {
+    title: "a nurbs_surface",
+    about: "A polynomial or rational spline surface. Directions whose ends meet are closed; sides that are single points are poles.",
+    members: &[
+        family!("nurbs_surface"),
+        required("degree", "The degree, from 1 to 9, or one for each direction.", || degrees(2)),
+        required("knots", "A full knot vector for each direction.", || tuple(knots(), 2)),
+        required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
+        optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+    ],
+};
+
+pub(super) const NURBS_VOLUME: Object = Object {
+    title: "a nurbs_volume",
+    about: "A polynomial or rational spline volume.",
+    members: &[
+        family!("nurbs_volume"),
+        required("degree", "The degree, from 1 to 9, or one for each direction.", || degrees(3)),
+        required("knots", "A full knot vector for each direction.", || tuple(knots(), 3)),
+        required("control_points", "control_points[i][j][k], i along the first direction.", || nested(net_point, 3)),
+        optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 3)),
+    ],
+};
+
+pub(super) const BEZIER_SURFACE: Object = Object {
+    title: "a bezier_surface",
+    about: "A polynomial or rational Bezier patch.",
+    members: &[
+        family!("bezier_surface"),
+        required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
+        optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+    ],
+};
+
+pub(super) const CATMULL_ROM_SCHEME: Object = Object {
+    title: "a catmull_rom without control points",
+    about: "A Catmull-Rom spline.",
+    members: &[
+        family!("catmull_rom"),
+        optional(
+            "parametrization",
+            "Intervals of the parameter: all equal, or as the square roots of the distances of the points, or as the distances.",
+            || json!({ "type": "string", "enum": ["uniform", "centripetal", "chordal"], "default": "uniform" }),
+        ),
+        CLOSED,
+    ],
+};
+
+pub(super) const CATMULL_ROM: Object = Object {
+    title: "a catmull_rom",
+    about: "A Catmull-Rom spline. Four points make the span between the second and the third, which it interpolates: an open one goes from the second point to the last but one.",
+    members: &[CATMULL_ROM_SCHEME.members[0], POLYGON, CATMULL_ROM_SCHEME.members[1], CLOSED],
+};
+
+pub(super) const BETA_SPLINE_SCHEME: Object = Object {
+    title: "a beta_spline without control points",
+    about: "A uniformly shaped beta-spline.",
+    members: &[
+        family!("beta_spline"),
+        optional(
+            "beta1",
+            "Bias, above zero; 1, no bias, when absent.",
+            || json!({ "type": "number", "exclusiveMinimum": 0, "default": 1 }),
+        ),
+        optional("beta2", "Tension; 0, none, when absent.", || json!({ "type": "number", "default": 0 })),
+        CLOSED,
+    ],
+};
+
+pub(super) const BETA_SPLINE: Object = Object {
+    title: "a beta_spline",
+    about: "A uniformly shaped cubic beta-spline (Barsky); beta1 = 1 and beta2 = 0 make the uniform B-spline.",
+    members: &[BETA_SPLINE_SCHEME.members[0], POLYGON, BETA_SPLINE_SCHEME.members[1], BETA_SPLINE_SCHEME.members[2], CLOSED],
+};
+
+pub(super) const CORNER_CUTTING_SCHEME: Object = Object {
+    title: "a corner_cutting without control points",
+    about: "The corner-cutting scheme (a, b).",
+    members: &[CORNER_CUTTING.members[0], CORNER_CUTTING.members[2], CORNER_CUTTING.members[3], CLOSED],
+};
+
+pub(super) const FOUR_POINT_SCHEME: Object = Object {
+    title: "a four_point without control points",
+    about: "The four-point scheme.",
+    members: &[
+        family!("four_point"),
+        optional(
+            "w",
+            "Tension; 1/16, which reproduces cubics, when absent; 0 gives the polygon.",
+            || json!({ "type": "number", "default": 0.0625 }),
+        ),
+        CLOSED,
+    ],
+};
+
+pub(super) const FOUR_POINT: Object = Object {
+    title: "a four_point",
+    about: "The interpolating four-point scheme. Six points make the span between the third and the fourth: an open one goes from the third point to the last but two.",
+    members: &[FOUR_POINT_SCHEME.members[0], POLYGON, FOUR_POINT_SCHEME.members[1], CLOSED],
+};
+
+pub(super) const INTERPOLATION_SCHEME: Object = Object {
+    title: "an interpolation without points",
+    about: "A fractal interpolation function at equal distances.",
+    members: &[family!("interpolation"), required("vertical_scaling", "One factor per interval, between -1 and 1.", factors)],
+};
+
+pub(super) const INTERPOLATION: Object = Object {
+    title: "an interpolation",
+    about: "The graph of a fractal interpolation function: exactly one of vertical_scaling and maps.",
+    members: &[
+        INTERPOLATION_SCHEME.members[0],
+        required("points", "The points that the graph goes through, x increasing; in any order with maps.", || points(3)),
+        optional(
+            "vertical_scaling",
+            "One factor per interval, between -1 and 1: over the interval stands the whole graph, scaled by it, plus what is linear along x.",
+            factors,
+        ),
+        optional("maps", "One affine map per interval: it takes the first and the last point to the interval's.", || {
+            list(reference("AffineMap"), 2)
+        }),
+    ],
+};
+
+pub(super) const TENSOR: Object = Object {
+    title: "a tensor",
+    about: "The tensor product of two or three curve schemes on a net of control points.",
+    members: &[
+        family!("tensor"),
+        required("u", "The first direction: a curve shape without control points.", curve_scheme),
+        required("v", "The second direction.", curve_scheme),
+        optional("w", "The third direction, of a volume.", curve_scheme),
+        required(
+            "control_points",
+            "control_points[i][j], or [i][j][k] with w; i along u.",
+            || json!({ "anyOf": [nested(net_point, 2), nested(net_point, 3)] }),
+        ),
+        optional(
+            "weights",
+            "Positive weights of the same shape, unless the points carry theirs.",
+            || json!({ "anyOf": [nested(positive, 2), nested(positive, 3)] }),
+        ),
+    ],
+};
+
+pub(super) const SUM: Object = Object {
+    title: "a sum",
+    about: "The surface u(s) + v(t): one curve moved along another. Its quadrilateral cells are parallelograms.",
+    members: &[family!("sum"), required("u", "A curve in space.", curve_shape), required("v", "A curve in space.", curve_shape)],
+};
+
+/// Curve schemes that products are made of, with the schema's name.
+pub(super) const SCHEMES: [(&str, &str, &Object); 7] = [
+    ("bezier_curve", "BezierScheme", &BEZIER_SCHEME),
+    ("nurbs_curve", "NurbsScheme", &NURBS_SCHEME),
+    ("catmull_rom", "CatmullRomScheme", &CATMULL_ROM_SCHEME),
+    ("beta_spline", "BetaSplineScheme", &BETA_SPLINE_SCHEME),
+    ("corner_cutting", "CornerCuttingScheme", &CORNER_CUTTING_SCHEME),
+    ("four_point", "FourPointScheme", &FOUR_POINT_SCHEME),
+    ("interpolation", "InterpolationScheme", &INTERPOLATION_SCHEME),
+];
+
+/// Curves that sums are made of, with the schema's name.
+pub(super) const CURVES: [(&str, &str, &Object); 7] = [
+    ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
+    ("nurbs_curve", "NurbsCurveShape", &NURBS_CURVE),
+    ("catmull_rom", "CatmullRomShape", &CATMULL_ROM),
+    ("beta_spline", "BetaSplineShape", &BETA_SPLINE),
+    ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
+    ("four_point", "FourPointShape", &FOUR_POINT),
+    ("interpolation", "InterpolationShape", &INTERPOLATION),
+];
+
 pub(super) const MESH: Object = Object {
     title: "a mesh",
     about: "A polygon mesh: faces of one corner are points, of two segments, of three and more polygons.",
     members: &[
         family!("mesh"),
-        required("vertices", "The corner points.", || points(1)),
-        required("faces", "The corner indices of each face, counter-clockwise seen from outside.", || faces(1)),
+        optional("vertices", "The corner points; unless there is a file.", || points(1)),
+        optional("faces", "The corner indices of each face, counter-clockwise seen from outside; unless there is a file.", || faces(1)),
+        optional(
+            "file",
+            "Instead of vertices and faces: an STL, 3MF, OBJ, PLY, OFF or VRML file, by its path in the document's folder. Polygons stay polygons; lengths are in the file's unit, or in the document's if the file names none. Only for documents that are read from a folder.",
+            file_name,
+        ),
         optional(
             "interior",
             "Whether the mesh stands for the solid that it bounds or for its surface; `auto`: the solid if it is closed.",
@@ -405,6 +691,27 @@ pub(super) const COEFFICIENTS: Object = Object {
     ],
 };
 
+pub(super) const TERRAIN: Object = Object {
+    title: "a terrain",
+    about: "A surface of random midpoint displacement (Fournier, Fussell, Carpenter): triangles are cut in four `levels` times, and every new midpoint moves along z.",
+    members: &[
+        family!("terrain"),
+        optional("triangle", "The three corners to start from; or a grid.", || tuple(vector(), 3)),
+        optional("grid", "Rows of points to start from, two or more of two or more; or a triangle.", || list(points(2), 2)),
+        required(
+            "roughness",
+            "r: a midpoint that is new at level k moves by at most half the longest given edge times r^k. 0 is flat; 1/2 halves with the edges; below 1.",
+            || json!({ "type": "number", "minimum": 0, "exclusiveMaximum": 1 }),
+        ),
+        required("levels", "How often triangles are cut in four.", index),
+        optional(
+            "random_seed",
+            "Which of the terrains; 0 when absent. The same seed gives the same terrain.",
+            || json!({ "type": "integer", "minimum": 0, "maximum": 9_007_199_254_740_991_u64, "default": 0 }),
+        ),
+    ],
+};
+
 pub(super) const GROUP: Object = Object {
     title: "a group",
     about: "The union of several shapes.",
@@ -423,30 +730,26 @@ pub(super) const PART: Object = Object {
     members: &[PART_MEMBERS[0], PART_MEMBERS[1], required("shape", "The shape of the part.", || reference("Shape"))],
 };
 
-/// The families that can be evaluated, with the schema's name.
-pub(super) const FAMILIES: [(&str, &str, &Object); 7] = [
+/// The families, with the schema's name.
+pub(super) const FAMILIES: [(&str, &str, &Object); 18] = [
     ("ifs", "IfsShape", &IFS),
     ("bcifs", "BcifsShape", &BCIFS),
     ("bezier_curve", "BezierCurveShape", &BEZIER_CURVE),
     ("corner_cutting", "CornerCuttingShape", &CORNER_CUTTING),
     ("subdivision", "SubdivisionShape", &SUBDIVISION),
+    ("bezier_surface", "BezierSurfaceShape", &BEZIER_SURFACE),
+    ("nurbs_curve", "NurbsCurveShape", &NURBS_CURVE),
+    ("nurbs_surface", "NurbsSurfaceShape", &NURBS_SURFACE),
+    ("nurbs_volume", "NurbsVolumeShape", &NURBS_VOLUME),
+    ("catmull_rom", "CatmullRomShape", &CATMULL_ROM),
+    ("beta_spline", "BetaSplineShape", &BETA_SPLINE),
+    ("four_point", "FourPointShape", &FOUR_POINT),
+    ("interpolation", "InterpolationShape", &INTERPOLATION),
+    ("tensor", "TensorShape", &TENSOR),
+    ("sum", "SumShape", &SUM),
     ("mesh", "MeshShape", &MESH),
+    ("terrain", "TerrainShape", &TERRAIN),
     ("group", "GroupShape", &GROUP),
-];
-
-/// Families of the grammar that cannot be evaluated yet.
-pub(super) const LATER_FAMILIES: [&str; 11] = [
-    "bezier_surface",
-    "nurbs_curve",
-    "nurbs_surface",
-    "nurbs_volume",
-    "catmull_rom",
-    "beta_spline",
-    "four_point",
-    "interpolation",
-    "terrain",
-    "tensor",
-    "sum",
 ];
 
 /// Kinds of jobs of the grammar that cannot be done yet.
@@ -472,6 +775,21 @@ pub(super) const JOB: Object = Object {
             || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
         ),
         optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
+    ],
+};
+
+pub(super) const SOLVE: Object = Object {
+    title: "a solve request",
+    about: "A model with unknown entries, and the values chosen for what its constraints leave free. Exactly one of model and model_ref is given.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "values",
+            "Values of free parameters by their names; those that are absent keep the value that the solver chooses.",
+            || json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() }),
+        ),
     ],
 };
 
@@ -507,5 +825,32 @@ pub(super) const JOB_LIMITS: Object = Object {
         optional("cells", "Leaf cells that the evaluation may produce.", count),
         optional("memory_bytes", "Accounted memory in bytes.", count),
         optional("depth", "Length of the longest address.", || json!({ "type": "integer", "minimum": 1, "maximum": u32::MAX })),
+    ],
+};
+
+pub(super) const ADDRESS_QUESTION: Object = Object {
+    title: "a question about addresses",
+    about: "Where an address leads (at), or which addresses lead near a point (near). Exactly one of model and model_ref is given, and exactly one of at and near.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "at",
+            "An address: the root cell, a colon, the indices of transitions, and in parentheses those that repeat without end, for example `0: 1 2 (0 3)`.",
+            || json!({ "type": "string" }),
+        ),
+        optional("near", "A point, in mm whatever the unit of the model.", vector),
+        optional(
+            "within_mm",
+            "With `near`: cells as far as this are listed; those that may hold the closest point of the shape when absent.",
+            || json!({ "type": "number", "minimum": 0 }),
+        ),
+        optional("tolerance_mm", "With `near`: radius to which cells are refined; a thousandth of the shape's when absent.", positive),
+        optional(
+            "most",
+            "With `near`: cells to list at most.",
+            || json!({ "type": "integer", "minimum": 1, "maximum": MOST_CELLS_LISTED, "default": CELLS_LISTED }),
+        ),
     ],
 };

@@ -97,6 +97,27 @@ impl RequestedLimits {
     }
 }
 
+/// The model itself, fetched by `find` if it is stored.
+fn fetched(source: ModelSource, pointer: String, find: &mut impl FnMut(&str) -> Option<Model>) -> Result<Model, Diagnostic> {
+    match source {
+        ModelSource::Inline(model) => Ok(*model),
+        ModelSource::Stored(id) => find(&id).ok_or_else(|| {
+            let message = format!("no model is stored as {}; store it first, or send it as \"model\"", quoted(&id));
+            Diagnostic { pointer, code: code::UNKNOWN_MODEL, message, line: None, column: None }
+        }),
+    }
+}
+
+impl InputDocument {
+    /// The model, fetched by `find` if it is stored.
+    ///
+    /// # Errors
+    /// A diagnostic when `find` does not know it.
+    pub fn resolve(self, mut find: impl FnMut(&str) -> Option<Model>) -> Result<Model, Diagnostic> {
+        fetched(self.source, self.pointer, &mut find)
+    }
+}
+
 impl JobDocument {
     /// The ids of stored models that the job refers to.
     pub fn references(&self) -> impl Iterator<Item = &str> {
@@ -115,17 +136,7 @@ impl JobDocument {
         let mut diagnostics = Vec::new();
         let mut inputs = Vec::with_capacity(self.inputs.len());
         for InputDocument { name, source, pointer } in self.inputs {
-            let model = match source {
-                ModelSource::Inline(model) => Some(*model),
-                ModelSource::Stored(id) => {
-                    let model = find(&id);
-                    if model.is_none() {
-                        let message = format!("no model is stored as {}; store it first, or send it as \"model\"", quoted(&id));
-                        diagnostics.push(Diagnostic { pointer, code: code::UNKNOWN_MODEL, message, line: None, column: None });
-                    }
-                    model
-                }
-            };
+            let model = fetched(source, pointer, &mut find).map_err(|diagnostic| diagnostics.push(diagnostic)).ok();
             if let Some(model) = model {
                 let name = name.or_else(|| model.name.clone()).unwrap_or_else(|| "shape".into());
                 inputs.push(Input { name, model });
@@ -204,7 +215,7 @@ fn inputs(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Vec<InputDoc
 }
 
 /// Reports unless exactly one of the members is there.
-fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title: &str) -> Option<()> {
+pub(super) fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title: &str) -> Option<()> {
     let listed = || names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
     let mut stated = names.iter().filter(|name| members.has(name));
     let Some(first) = stated.next() else {
@@ -224,7 +235,7 @@ fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&str], title:
 }
 
 /// The model, or the reference to it.
-fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<InputDocument> {
+pub(super) fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<InputDocument> {
     if let Some(place) = members.get("model") {
         let source = ModelSource::Inline(Box::new(model(walker, place, true)?));
         return Some(InputDocument { name: None, source, pointer: place.path.pointer() });

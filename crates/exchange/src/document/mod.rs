@@ -6,7 +6,9 @@
 //! the reading. After that nothing about the document needs to be looked at again, except what only the
 //! mathematics can tell: the kernel's business.
 
+mod address;
 mod bcifs;
+mod constraint;
 mod curve;
 mod grammar;
 mod ifs;
@@ -17,7 +19,10 @@ mod node;
 mod parse;
 mod report;
 mod schema;
+mod scheme;
+mod solve;
 mod subdivision;
+mod terrain;
 mod transform;
 mod units;
 mod walk;
@@ -26,13 +31,16 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use address::{AddressQuestion, CELLS_LISTED, MOST_CELLS_LISTED, Sought};
 pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
 pub use schema::{job_schema, model_schema, schemas};
-pub use write::{write_job, write_model, write_model_indented};
+pub use solve::SolveDocument;
+pub use write::{model_value, write_job, write_model, write_model_indented};
 
 use lacuna_kernel::model::Model;
 
 use crate::diagnostic::{Diagnostic, code};
+use crate::format::MeshFile;
 use node::Place;
 use report::{Report, single};
 use walk::{Walker, root};
@@ -61,6 +69,11 @@ impl Default for DocumentLimits {
     }
 }
 
+/// Gives the mesh in a file of the document's folder, or says why there is none.
+///
+/// The name is a path with `/` between its parts, none of them empty, `.` or `..`; links are the finder's business.
+pub type MeshFinder<'a> = &'a dyn Fn(&str) -> Result<MeshFile, String>;
+
 /// Reads a model document. Lengths come out in mm.
 ///
 /// Linear in the document's length.
@@ -68,7 +81,16 @@ impl Default for DocumentLimits {
 /// # Errors
 /// Every fault that can be found without mathematics, in the order of the text, and at least one.
 pub fn read_model(bytes: &[u8], limits: &DocumentLimits) -> Result<Model, Vec<Diagnostic>> {
-    read(bytes, limits, |walker, place| model::model(walker, place, false))
+    read(bytes, limits, None, |walker, place| model::model(walker, place, false))
+}
+
+/// Reads a model document that comes from a folder: meshes that it names as files are taken from `files`. For
+/// [`read_model`] such names are faults ([`code::FILE_NOT_AVAILABLE`]).
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_model_beside(bytes: &[u8], limits: &DocumentLimits, files: MeshFinder<'_>) -> Result<Model, Vec<Diagnostic>> {
+    read(bytes, limits, Some(files), |walker, place| model::model(walker, place, false))
 }
 
 /// Reads a job document; [`JobDocument::resolve`] makes a job of it.
@@ -76,12 +98,37 @@ pub fn read_model(bytes: &[u8], limits: &DocumentLimits) -> Result<Model, Vec<Di
 /// # Errors
 /// As [`read_model`], and what the kind of job needs or cannot have.
 pub fn read_job(bytes: &[u8], limits: &DocumentLimits) -> Result<JobDocument, Vec<Diagnostic>> {
-    read(bytes, limits, job::job)
+    read(bytes, limits, None, job::job)
+}
+
+/// Reads a job document that comes from a folder, as [`read_model_beside`] does a model.
+///
+/// # Errors
+/// As [`read_job`].
+pub fn read_job_beside(bytes: &[u8], limits: &DocumentLimits, files: MeshFinder<'_>) -> Result<JobDocument, Vec<Diagnostic>> {
+    read(bytes, limits, Some(files), job::job)
+}
+
+/// Reads a request to solve a model.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_solve(bytes: &[u8], limits: &DocumentLimits) -> Result<SolveDocument, Vec<Diagnostic>> {
+    read(bytes, limits, None, solve::solve)
+}
+
+/// Reads a question about addresses.
+///
+/// # Errors
+/// As [`read_model`], and an address that cannot be read.
+pub fn read_address_question(bytes: &[u8], limits: &DocumentLimits) -> Result<AddressQuestion, Vec<Diagnostic>> {
+    read(bytes, limits, None, address::question)
 }
 
 fn read<T>(
     bytes: &[u8],
     limits: &DocumentLimits,
+    files: Option<MeshFinder<'_>>,
     take: impl FnOnce(&mut Walker<'_>, Place<'_>) -> Option<T>,
 ) -> Result<T, Vec<Diagnostic>> {
     let text = text(bytes, limits)?;
@@ -89,7 +136,7 @@ fn read<T>(
     let Some(node) = parse::parse(text, limits, &mut report) else {
         return Err(report.into_diagnostics(text));
     };
-    let mut walker = Walker::new(limits, report);
+    let mut walker = Walker { files, ..Walker::new(limits, report) };
     match take(&mut walker, root(&node)) {
         Some(value) if walker.report.is_clean() => Ok(value),
         _ => {

@@ -4,11 +4,13 @@ use lacuna_kernel::model::{Group, Model, Part, Shape};
 
 use super::bcifs::bcifs;
 use super::curve::{bezier_curve, corner_cutting};
-use super::grammar::{EMBEDDED_MODEL, FAMILIES, GROUP, LATER_FAMILIES, MODEL, Member, PART, PART_MEMBERS};
+use super::grammar::{BEZIER_SURFACE, EMBEDDED_MODEL, FAMILIES, GROUP, MODEL, Member, NURBS_SURFACE, NURBS_VOLUME, PART, PART_MEMBERS};
 use super::ifs::ifs;
 use super::mesh::mesh;
 use super::node::{Place, Value, number_text, quoted};
+use super::scheme;
 use super::subdivision::subdivision;
+use super::terrain::terrain;
 use super::transform::affine_map;
 use super::units::{UNITS, Unit};
 use super::walk::{Walker, suggestion};
@@ -65,14 +67,17 @@ fn shape(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<
         "bezier_curve" => bezier_curve(walker, place, added).map(Shape::BezierCurve),
         "corner_cutting" => corner_cutting(walker, place, added).map(Shape::CornerCutting),
         "subdivision" => subdivision(walker, place, added).map(Shape::Subdivision),
-        "mesh" => mesh(walker, place, added).map(Shape::Mesh),
-        "group" => group(walker, place, added).map(Shape::Group),
-        later if LATER_FAMILIES.contains(&later) => {
-            walker.fault(&family_place, code::FAMILY_NOT_AVAILABLE, || {
-                format!("the family \"{later}\" is not available yet; available are {}", available().collect::<Vec<_>>().join(", "))
-            });
-            None
+        "bezier_surface" => scheme::surface(walker, place, &BEZIER_SURFACE, added).map(Shape::TensorProduct),
+        "nurbs_surface" => scheme::surface(walker, place, &NURBS_SURFACE, added).map(Shape::TensorProduct),
+        "nurbs_volume" => scheme::surface(walker, place, &NURBS_VOLUME, added).map(Shape::TensorProduct),
+        "tensor" => scheme::tensor(walker, place, added).map(Shape::TensorProduct),
+        "sum" => scheme::sum(walker, place, added).map(Shape::Sum),
+        "nurbs_curve" | "catmull_rom" | "beta_spline" | "four_point" | "interpolation" => {
+            scheme::curve(walker, place, family, added).map(Shape::Curve)
         }
+        "mesh" => mesh(walker, place, added).map(Shape::Mesh),
+        "terrain" => terrain(walker, place, added).map(Shape::Terrain),
+        "group" => group(walker, place, added).map(Shape::Group),
         unknown => {
             walker.fault(&family_place, code::UNKNOWN_VALUE, || {
                 format!("{} is not a family; {}", quoted(unknown), suggestion(unknown, available()))

@@ -7,9 +7,9 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADJACENCY, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL,
-    Member, Object, PART, PART_MEMBERS, PRIMITIVE, ROOT_CELL, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema,
-    reference,
+    ADDRESS_QUESTION, ADJACENCY, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE,
+    JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION,
+    ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema, reference,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -45,7 +45,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 16] = [
+    const PLAIN: [(&str, &Object); 18] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -54,6 +54,8 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Boundary", &BOUNDARY),
         ("Incidence", &INCIDENCE),
         ("Adjacency", &ADJACENCY),
+        ("Relation", &RELATION),
+        ("Side", &SIDE),
         ("RootCell", &ROOT_CELL),
         ("Glue", &GLUE),
         ("ControlMesh", &CONTROL_MESH),
@@ -66,6 +68,10 @@ fn named_schemas() -> Vec<(String, Value)> {
     let mut schemas: Vec<(String, Value)> = PLAIN.iter().map(|(name, grammar)| ((*name).into(), object(grammar, &[]))).collect();
     schemas.extend(FAMILIES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
     schemas.push(("Shape".into(), any_of("A shape of one of the families.", FAMILIES.iter().map(|(_, name, _)| reference(name)))));
+    schemas.extend(SCHEMES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
+    let schemes = any_of("A curve shape without control points.", SCHEMES.iter().map(|(_, name, _)| reference(name)));
+    schemas.push(("CurveScheme".into(), schemes));
+    schemas.push(("CurveShape".into(), any_of("A curve.", CURVES.iter().map(|(_, name, _)| reference(name)))));
     let placed = FAMILIES.iter().map(|(_, _, grammar)| object(grammar, PART_MEMBERS));
     let parts = std::iter::once(object(&PART, &[])).chain(placed);
     schemas.push((
@@ -78,6 +84,8 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
+    schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
+    schemas.push(("AddressQuestion".into(), address_question()));
     schemas.push(("Job".into(), job()));
     schemas.sort_by(|(one, _), (other, _)| one.cmp(other));
     schemas
@@ -119,6 +127,18 @@ fn exactly_one(mut schema: Value, names: &[&str]) -> Value {
 fn primitive() -> Value {
     let mut schema = exactly_one(object(&PRIMITIVE, &[]), &["points", "polyline", "mesh", "solid"]);
     schema["dependentRequired"] = json!({ "closed": ["polyline"] });
+    schema
+}
+
+fn address_question() -> Value {
+    let mut schema = object(&ADDRESS_QUESTION, &[]);
+    schema["allOf"] = json!([
+        exactly_one(json!({}), &["model", "model_ref"]),
+        exactly_one(json!({}), &["at", "near"]),
+        { "if": { "required": ["at"] }, "then": { "not": { "anyOf": [
+            { "required": ["within_mm"] }, { "required": ["tolerance_mm"] }, { "required": ["most"] }
+        ] } } },
+    ]);
     schema
 }
 

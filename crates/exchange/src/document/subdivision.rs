@@ -9,8 +9,7 @@ use super::walk::{Walker, length, reads_as_number};
 
 /// A `subdivision` shape.
 pub(super) fn subdivision(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<Subdivision> {
-    const SCHEMES: [(&str, Scheme); 3] =
-        [("catmull_clark", Scheme::CatmullClark), ("doo_sabin", Scheme::DooSabin), ("loop", Scheme::Loop)];
+    const SCHEMES: [(&str, Scheme); 3] = [("catmull_clark", Scheme::CatmullClark), ("doo_sabin", Scheme::DooSabin), ("loop", Scheme::Loop)];
     const BOUNDARIES: [(&str, BoundaryRule); 2] = [("smooth", BoundaryRule::Smooth), ("sharp_corners", BoundaryRule::SharpCorners)];
     let members = walker.object_of(place, &SUBDIVISION, added)?;
     let scheme = members.get("scheme").and_then(|place| walker.word(place, "a scheme", &SCHEMES));

@@ -3,11 +3,11 @@
 //! Every function returns `None` when it has reported something, so that a caller can go on with the
 //! other members and only build its value when all of them are there.
 
-use super::DocumentLimits;
 use super::grammar::{Member, Object};
 use super::node::{Node, Path, Place, Value, number_text, quoted};
 use super::report::Report;
 use super::units::Unit;
+use super::{DocumentLimits, MeshFinder};
 use crate::diagnostic::code;
 
 /// Characters that a name of a model, a state or a parameter may have.
@@ -23,6 +23,8 @@ pub(super) struct Walker<'w> {
     pub(super) unit: Unit,
     pub(super) states: usize,
     pub(super) transitions: usize,
+    /// Where meshes are found that the document names; nowhere for documents without a folder.
+    pub(super) files: Option<MeshFinder<'w>>,
 }
 
 /// The members of an object that its grammar knows.
@@ -46,7 +48,7 @@ impl<'p> Members<'p> {
 
 impl<'w> Walker<'w> {
     pub(super) fn new(limits: &'w DocumentLimits, report: Report) -> Self {
-        Self { report, limits, unit: Unit::Millimetre, states: 0, transitions: 0 }
+        Self { report, limits, unit: Unit::Millimetre, states: 0, transitions: 0, files: None }
     }
 
     /// Reports a fault at a value.

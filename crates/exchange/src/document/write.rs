@@ -8,8 +8,9 @@ use glam::{DMat3, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, CellKind, Coefficients, Corner, CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix,
-    Model, Part, PolygonMesh, Primitive, RootCell, Shape, Subdivision,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, CellKind, Coefficients, ControlNet, Corner, CornerCutting, Crease,
+    Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model, Parametrization, Part, PolygonMesh, Primitive,
+    Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -26,6 +27,12 @@ pub fn write_model(model: &Model) -> String {
 #[must_use]
 pub fn write_model_indented(model: &Model) -> String {
     text(&Wire(model), true)
+}
+
+/// The canonical document of a model as a value, to stand in another one.
+#[must_use]
+pub fn model_value(model: &Model) -> impl Serialize + '_ {
+    Wire(model)
 }
 
 /// The canonical document of a job, models in full and limits complete: what `input_digest` hashes.
@@ -88,6 +95,88 @@ impl<M: SerializeMap> Members<M> {
     }
 }
 
+impl<M: SerializeMap> Members<M> {
+    /// The members of a curve scheme in the grammar's order, the points among them where there are any.
+    fn scheme(&mut self, scheme: &CurveScheme, net: Option<&ControlNet>) -> Result<&mut Self, M::Error> {
+        let family = match scheme {
+            CurveScheme::Bezier => "bezier_curve",
+            CurveScheme::Nurbs { .. } => "nurbs_curve",
+            CurveScheme::CornerCutting { .. } => "corner_cutting",
+            CurveScheme::CatmullRom { .. } => "catmull_rom",
+            CurveScheme::BetaSpline { .. } => "beta_spline",
+            CurveScheme::FourPoint { .. } => "four_point",
+            CurveScheme::Interpolation { .. } | CurveScheme::AffineInterpolation { .. } => "interpolation",
+        };
+        self.put("family", &family)?;
+        if let CurveScheme::Nurbs { degree, knots } = scheme {
+            self.put("degree", degree)?.put("knots", &numbers(knots))?;
+        }
+        let name = if family == "interpolation" { "points" } else { "control_points" };
+        self.put_some(name, net.map(points_of).as_ref())?;
+        match scheme {
+            CurveScheme::Bezier | CurveScheme::Nurbs { .. } => Ok(self),
+            CurveScheme::CornerCutting { a, b, closed } => {
+                self.put("a", &Number(*a))?.put("b", &Number(*b))?.put_if(*closed, "closed", &true)
+            }
+            CurveScheme::CatmullRom { parametrization, closed } => {
+                let word = match parametrization {
+                    Parametrization::Uniform => None,
+                    Parametrization::Centripetal => Some(&"centripetal"),
+                    Parametrization::Chordal => Some(&"chordal"),
+                };
+                self.put_some("parametrization", word)?.put_if(*closed, "closed", &true)
+            }
+            CurveScheme::BetaSpline { beta1, beta2, closed } => {
+                self.put("beta1", &Number(*beta1))?.put("beta2", &Number(*beta2))?.put_if(*closed, "closed", &true)
+            }
+            CurveScheme::FourPoint { tension, closed } => self.put("w", &Number(*tension))?.put_if(*closed, "closed", &true),
+            CurveScheme::Interpolation { vertical_scaling } => self.put("vertical_scaling", &numbers(vertical_scaling)),
+            CurveScheme::AffineInterpolation { maps } => self.put("maps", &list(maps)),
+        }
+    }
+
+    fn weights(&mut self, net: &ControlNet) -> Result<&mut Self, M::Error> {
+        let nested = net.weights.as_ref().map(|weights| Nested { size: &net.size, items: numbers(weights) });
+        self.put_some("weights", nested.as_ref())
+    }
+}
+
+fn numbers(values: &[f64]) -> Vec<Number> {
+    values.iter().map(|&value| Number(value)).collect()
+}
+
+/// The points of a net as nested lists.
+fn points_of(net: &ControlNet) -> Nested<'_, Wire<'_, DVec3>> {
+    Nested { size: &net.size, items: list(&net.points) }
+}
+
+/// A list, or a list of lists and so on: as many levels as sizes, the last index fastest.
+struct Nested<'m, T> {
+    size: &'m [usize],
+    items: Vec<T>,
+}
+
+impl<T: Serialize> Serialize for Nested<'_, T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Level { size: self.size, items: &self.items }.serialize(serializer)
+    }
+}
+
+struct Level<'m, T> {
+    size: &'m [usize],
+    items: &'m [T],
+}
+
+impl<T: Serialize> Serialize for Level<'_, T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Some((_, inner)) = self.size.split_first().filter(|(_, inner)| !inner.is_empty()) else {
+            return serializer.collect_seq(self.items);
+        };
+        let each = inner.iter().product::<usize>().max(1);
+        serializer.collect_seq(self.items.chunks(each).map(|items| Level { size: inner, items }))
+    }
+}
+
 macro_rules! object {
     ($($kind:ty: |$value:ident, $members:ident| $body:expr;)+) => {$(
         impl Serialize for Wire<'_, $kind> {
@@ -142,9 +231,17 @@ object! {
     Adjacency: |adjacency, members| members
         .put("state", &adjacency.state)?
         .put("between", &adjacency.between)?
-        .put_if(adjacency.reversed, "reversed", &true)?;
-    RootCell: |cell, members| members.put("state", &cell.state)?.put("control_points", &list(&cell.control_points))?;
-    Glue: |glue, members| members.put("between", &glue.between)?.put_if(glue.reversed, "reversed", &true)?;
+        .put_if(adjacency.reversed, "reversed", &true)?
+        .put_some("permutation", adjacency.permutation.as_ref())?;
+    Relation: |relation, members| members.put("state", &relation.state)?.put("equal", &list(&relation.equal))?;
+    Side: |side, members| members
+        .put_if(!side.path.is_empty(), "path", &side.path)?
+        .put_if(!side.boundary.is_empty(), "boundary", &side.boundary)?;
+    RootCell: |cell, members| members.put("state", &cell.state)?.put("control_points", &PlacedPoints(&cell.control_points))?;
+    Glue: |glue, members| members
+        .put("between", &glue.between)?
+        .put_if(glue.reversed, "reversed", &true)?
+        .put_some("permutation", glue.permutation.as_ref())?;
     Job: |job, members| members
         .put("lacuna", &1)?
         .put("kind", &job.kind)?
@@ -172,6 +269,7 @@ object! {
         .put("states", &list(&bcifs.states))?
         .put_if(!bcifs.incidences.is_empty(), "incidences", &list(&bcifs.incidences))?
         .put_if(!bcifs.adjacencies.is_empty(), "adjacencies", &list(&bcifs.adjacencies))?
+        .put_if(!bcifs.relations.is_empty(), "relations", &list(&bcifs.relations))?
         .put("cells", &list(&bcifs.cells))?
         .put_if(!bcifs.glue.is_empty(), "glue", &list(&bcifs.glue))?
         .put_if(!bcifs.parameters.is_empty(), "parameters", &Parameters(&bcifs.parameters))?;
@@ -198,6 +296,35 @@ object! {
     Coefficients: |own, members| members
         .put_some("faces", own.faces.as_ref())?
         .put("weights", &own.weights.iter().map(|list| list.iter().map(|weight| Number(*weight)).collect::<Vec<_>>()).collect::<Vec<_>>())?;
+    Curve: |curve, members| {
+        members.scheme(&curve.scheme, Some(&curve.control_points))?;
+        members.weights(&curve.control_points)?
+    };
+    TensorProduct: |product, members| {
+        match product.schemes.as_slice() {
+            schemes if product.separate => {
+                members.put("family", &"tensor")?;
+                for (name, scheme) in ["u", "v", "w"].into_iter().zip(schemes) {
+                    members.put(name, &Wire(scheme))?;
+                }
+            }
+            [CurveScheme::Bezier, ..] => {
+                members.put("family", &"bezier_surface")?;
+            }
+            schemes => {
+                let nurbs = |scheme: &CurveScheme| match scheme {
+                    CurveScheme::Nurbs { degree, knots } => Some((*degree, numbers(knots))),
+                    _ => None,
+                };
+                let (degrees, knots): (Vec<usize>, Vec<Vec<Number>>) = schemes.iter().filter_map(nurbs).unzip();
+                let family = if schemes.len() == 2 { "nurbs_surface" } else { "nurbs_volume" };
+                members.put("family", &family)?.put("degree", &degrees)?.put("knots", &knots)?;
+            }
+        }
+        members.put("control_points", &points_of(&product.control_points))?.weights(&product.control_points)?
+    };
+    Sum: |sum, members| members.put("family", &"sum")?.put("u", &Wire(&sum.u))?.put("v", &Wire(&sum.v))?;
+    CurveScheme: |scheme, members| members.scheme(scheme, None)?;
     PolygonMesh: |mesh, members| members
         .put("family", &"mesh")?
         .put("vertices", &list(&mesh.vertices))?
@@ -207,6 +334,17 @@ object! {
             Interior::Solid => Some(&"solid"),
             Interior::Surface => Some(&"surface"),
         })?;
+    Terrain: |terrain, members| {
+        members.put("family", &"terrain")?;
+        match &terrain.base {
+            TerrainBase::Triangle(corners) => members.put("triangle", &list(corners))?,
+            TerrainBase::Grid(rows) => members.put("grid", &rows.iter().map(|row| list(row)).collect::<Vec<_>>())?,
+        };
+        members
+            .put("roughness", &Number(terrain.roughness))?
+            .put("levels", &terrain.levels)?
+            .put_if(terrain.random_seed != 0, "random_seed", &terrain.random_seed)?
+    };
     Group: |group, members| members.put("family", &"group")?.put("parts", &list(&group.parts))?;
 }
 
@@ -218,7 +356,11 @@ impl Serialize for Wire<'_, Shape> {
             Shape::BezierCurve(curve) => Wire(curve).serialize(serializer),
             Shape::CornerCutting(curve) => Wire(curve).serialize(serializer),
             Shape::Subdivision(surface) => Wire(surface).serialize(serializer),
+            Shape::Curve(curve) => Wire(curve).serialize(serializer),
+            Shape::TensorProduct(product) => Wire(product).serialize(serializer),
+            Shape::Sum(sum) => Wire(sum).serialize(serializer),
             Shape::Mesh(mesh) => Wire(mesh).serialize(serializer),
+            Shape::Terrain(terrain) => Wire(terrain).serialize(serializer),
             Shape::Group(group) => Wire(group).serialize(serializer),
         }
     }
@@ -235,6 +377,15 @@ impl Serialize for MeshData<'_> {
         let mut map = Members(serializer.serialize_map(Some(2))?);
         map.put("vertices", &list(self.vertices))?.put("faces", &self.faces)?;
         map.0.end()
+    }
+}
+
+/// Control points of a root cell; null for one that is to be placed.
+struct PlacedPoints<'m>(&'m [Option<DVec4>]);
+
+impl Serialize for PlacedPoints<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|point| point.as_ref().map(Wire)))
     }
 }
 

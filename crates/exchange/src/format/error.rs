@@ -65,6 +65,11 @@ pub enum FormatError {
         /// The format that was asked.
         format: Format,
     },
+    /// A table of addresses was asked of a shape whose cells have none.
+    #[error(
+        "there are no addresses to write: the shape, or a part of it, has no B-rep; addresses are known for curves between vertices and for faces with edges"
+    )]
+    NoAddresses,
     /// No format of the table fits the bytes.
     #[error("the bytes fit none of the formats that are read")]
     UnknownFormat,
@@ -187,6 +192,7 @@ impl FormatError {
             Self::CannotCarry { .. }
             | Self::CannotRead { .. }
             | Self::CannotVerify { .. }
+            | Self::NoAddresses
             | Self::UnknownFormat
             | Self::Empty
             | Self::NotFinite { .. }
@@ -212,6 +218,7 @@ impl FormatError {
             Self::CannotCarry { .. } => "format.cannot-carry",
             Self::CannotRead { .. } => "format.cannot-read",
             Self::CannotVerify { .. } => "format.cannot-verify",
+            Self::NoAddresses => "format.no-addresses",
             Self::UnknownFormat => "format.unknown",
             Self::Empty => "format.empty-geometry",
             Self::NotSinglePrecision { .. } => "format.not-single-precision",

@@ -1,6 +1,7 @@
 //! What is written: one view on solids, parts and evaluations that every encoder shares.
 
 use super::error::{FormatError, Place};
+use super::read::{Fan, MeshFile, each_face, face_count};
 use super::{Carries, text};
 use glam::DVec3;
 use lacuna_kernel::solid::{Solid, TriMesh};
@@ -27,6 +28,13 @@ pub enum Geometry<'a> {
     /// Triangles, segments and points of an evaluation; coordinates are rounded to single
     /// precision, 6e-8 of their size.
     Sample(&'a Tessellation),
+    /// A mesh with its polygons, as it was read; they stay polygons where the format has them (OBJ, PLY, OFF, VRML).
+    Polygons {
+        /// The mesh; coordinates are rounded to single precision.
+        file: &'a MeshFile,
+        /// Whether it is proven to be a closed 2-manifold.
+        closed: bool,
+    },
 }
 
 impl<'a> From<&'a TriMesh> for Geometry<'a> {
@@ -59,6 +67,8 @@ pub(crate) struct Piece<'a> {
     pub(crate) name: Option<&'a str>,
     pub(crate) vertices: &'a [DVec3],
     pub(crate) triangles: &'a [[u32; 3]],
+    /// Which triangles are polygons.
+    fans: &'a [Fan],
     pub(crate) segments: &'a [[u32; 2]],
     pub(crate) points: &'a [u32],
     /// Whether the coordinates must be single-precision numbers already.
@@ -67,7 +77,24 @@ pub(crate) struct Piece<'a> {
 
 impl<'a> Piece<'a> {
     fn closed(name: Option<&'a str>, mesh: &'a TriMesh) -> Self {
-        Self { name, vertices: &mesh.vertices, triangles: &mesh.triangles, segments: &[], points: &[], exact: true }
+        Self { name, vertices: &mesh.vertices, triangles: &mesh.triangles, fans: &[], segments: &[], points: &[], exact: true }
+    }
+}
+
+impl Piece<'_> {
+    /// Hands over the corners of every face in turn, polygons whole.
+    pub(crate) fn each_face(&self, take: impl FnMut(&[u32]) -> Result<(), FormatError>) -> Result<(), FormatError> {
+        each_face(self.triangles, self.fans, take)
+    }
+
+    /// The most corners that a face has; 3 without faces.
+    pub(crate) fn most_corners(&self) -> u32 {
+        self.fans.iter().map(|fan| fan.count).max().unwrap_or(1) + 2
+    }
+
+    /// Whether the mesh bounds material, so that only its outside need be seen.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.exact
     }
 }
 
@@ -84,6 +111,10 @@ impl<'a> Geometry<'a> {
                 wires: !sample.segments.is_empty(),
                 points: !sample.points.is_empty(),
             },
+            Self::Polygons { file, closed } => {
+                let filled = !file.mesh.triangles.is_empty();
+                Carries { solid: filled && *closed, surface: filled && !*closed, ..Carries::default() }
+            }
         }
     }
 
@@ -100,10 +131,14 @@ impl<'a> Geometry<'a> {
                 name: None,
                 vertices: &sample.vertices,
                 triangles: &sample.triangles,
+                fans: &[],
                 segments: &sample.segments,
                 points: &sample.points,
                 exact: false,
             }],
+            Self::Polygons { file, .. } => {
+                vec![Piece { fans: &file.fans, exact: false, ..Piece::closed(None, &file.mesh) }]
+            }
         }
     }
 }
@@ -113,6 +148,8 @@ impl<'a> Geometry<'a> {
 pub(crate) struct Counts {
     pub(crate) vertices: u64,
     pub(crate) triangles: u64,
+    /// Triangles and polygons.
+    pub(crate) faces: u64,
     pub(crate) segments: u64,
     pub(crate) points: u64,
 }
@@ -121,6 +158,7 @@ pub(crate) fn counts(pieces: &[Piece<'_>]) -> Counts {
     pieces.iter().fold(Counts::default(), |sum, piece| Counts {
         vertices: sum.vertices + piece.vertices.len() as u64,
         triangles: sum.triangles + piece.triangles.len() as u64,
+        faces: sum.faces + face_count(piece.triangles, piece.fans),
         segments: sum.segments + piece.segments.len() as u64,
         points: sum.points + piece.points.len() as u64,
     })

@@ -1,6 +1,7 @@
 //! How much a file that somebody sent may ask for.
 
 use super::error::{FormatError, Place};
+use super::read::Fan;
 use glam::DVec3;
 use lacuna_kernel::solid::TriMesh;
 
@@ -58,13 +59,12 @@ pub(crate) fn reserve<T>(vector: &mut Vec<T>, count: usize, place: &Place) -> Re
 pub(crate) struct MeshBuilder<'a> {
     limits: &'a ReadLimits,
     mesh: TriMesh,
-    /// Polygons with more than three corners.
-    pub(crate) fanned: u64,
+    fans: Vec<Fan>,
 }
 
 impl<'a> MeshBuilder<'a> {
     pub(crate) fn new(limits: &'a ReadLimits) -> Self {
-        Self { limits, mesh: TriMesh::default(), fanned: 0 }
+        Self { limits, mesh: TriMesh::default(), fans: Vec::new() }
     }
 
     pub(crate) fn vertex_count(&self) -> usize {
@@ -103,11 +103,15 @@ impl<'a> MeshBuilder<'a> {
         for &index in corners {
             self.index(index, place)?;
         }
-        if corners.len() > 3 {
-            self.fanned += 1;
-        }
+        let first = self.mesh.triangles.len() as u32;
         for pair in corners.get(1..).unwrap_or_default().windows(2) {
             self.triangle([self.index(corners[0], place)?, self.index(pair[0], place)?, self.index(pair[1], place)?], place)?;
+        }
+        if corners.len() > 3 {
+            if self.fans.len() == self.fans.capacity() {
+                reserve(&mut self.fans, 1, &place())?;
+            }
+            self.fans.push(Fan { first, count: self.mesh.triangles.len() as u32 - first });
         }
         Ok(())
     }
@@ -133,7 +137,8 @@ impl<'a> MeshBuilder<'a> {
         Ok(())
     }
 
-    pub(crate) fn finish(self) -> TriMesh {
-        self.mesh
+    /// The mesh, and which of its triangles are polygons.
+    pub(crate) fn finish(self) -> (TriMesh, Vec<Fan>) {
+        (self.mesh, self.fans)
     }
 }

@@ -21,6 +21,8 @@
 //! # Ok::<(), lacuna_exchange::format::FormatError>(())
 //! ```
 
+mod addresses;
+pub mod automaton;
 mod error;
 mod geometry;
 mod glb;
@@ -34,11 +36,13 @@ mod scanner;
 mod stl;
 mod text;
 mod threemf;
+mod vrml;
 
 pub use error::{FormatError, Place};
 pub use geometry::{Geometry, NamedMesh};
 pub use limits::ReadLimits;
-pub use read::{MeshFacts, MeshFile, Unit, detect, read};
+pub use ply::PointFile;
+pub use read::{Fan, MeshFacts, MeshFile, Unit, detect, read};
 
 use geometry::Piece;
 use lacuna_fabrication::certificate::Certificate;
@@ -60,8 +64,12 @@ pub enum Format {
     Ply,
     /// Object file format of Geomview.
     Off,
+    /// Virtual reality modelling language, the polygons of both versions.
+    Vrml,
     /// A picture.
     Png,
+    /// The addresses of an evaluation's cells, as comma-separated values.
+    Addresses,
 }
 
 /// The kinds of content that a geometry holds or a format has room for.
@@ -101,7 +109,7 @@ const EVERYTHING: Carries = Carries { solid: true, surface: true, wires: true, p
 /// STL and OFF are lists of faces; 3MF objects of type `model` must be closed, and a printer's
 /// file that is not is a trap, so open surfaces are refused there although the format has a type
 /// for them.
-pub const FORMATS: [FormatFacts; 7] = [
+pub const FORMATS: [FormatFacts; 9] = [
     FormatFacts {
         format: Format::Stl,
         name: "STL",
@@ -136,7 +144,17 @@ pub const FORMATS: [FormatFacts; 7] = [
         carries: Carries { wires: false, ..EVERYTHING },
         reads: true,
     },
+    FormatFacts { format: Format::Vrml, name: "VRML", ending: "wrl", media_type: "model/vrml", carries: EVERYTHING, reads: true },
     FormatFacts { format: Format::Png, name: "PNG", ending: "png", media_type: "image/png", carries: EVERYTHING, reads: false },
+    FormatFacts {
+        format: Format::Addresses,
+        name: "CSV",
+        ending: "csv",
+        media_type: "text/csv",
+        // No geometry: a table beside it.
+        carries: Carries { solid: false, surface: false, wires: false, points: false },
+        reads: false,
+    },
 ];
 
 impl Format {
@@ -226,7 +244,7 @@ impl Default for Metadata<'_> {
 /// [`FormatError::CannotCarry`] if the format has no room for what the geometry holds,
 /// [`FormatError::Empty`], [`FormatError::NotSinglePrecision`], [`FormatError::NotFinite`],
 /// [`FormatError::IndexOutOfRange`] if the geometry is not fit for a file,
-/// [`FormatError::Limit`] beyond what the format can count, [`FormatError::Stream`] if the sink fails.
+/// [`FormatError::NoAddresses`] for a table of addresses of a shape without B-rep, [`FormatError::Limit`] beyond what the format can count, [`FormatError::Stream`] if the sink fails.
 pub fn write<'a, W: Write + Seek>(
     format: Format,
     geometry: impl Into<Geometry<'a>>,
@@ -234,6 +252,9 @@ pub fn write<'a, W: Write + Seek>(
     sink: &mut W,
 ) -> Result<(), FormatError> {
     let geometry = geometry.into();
+    if format == Format::Addresses {
+        return addresses::write(&geometry, sink);
+    }
     let pieces = fit_pieces(format, &geometry)?;
     match format {
         Format::Stl => stl::write(&pieces, metadata, sink),
@@ -242,7 +263,9 @@ pub fn write<'a, W: Write + Seek>(
         Format::Obj => obj::write(&pieces, metadata, sink),
         Format::Ply => ply::write(&pieces, metadata, sink),
         Format::Off => off::write(&pieces, metadata, sink),
+        Format::Vrml => vrml::write(&pieces, metadata, sink),
         Format::Png => preview::write(geometry, &preview::PreviewOptions::default(), sink),
+        Format::Addresses => Err(FormatError::NoAddresses),
     }
 }
 
@@ -274,7 +297,7 @@ fn fit_pieces<'a>(format: Format, geometry: &Geometry<'a>) -> Result<Vec<Piece<'
 /// pictures and evaluations, of which nothing is proven that a file could carry on.
 pub fn verify_written<'a, R: Read + Seek>(format: Format, source: &mut R, geometry: impl Into<Geometry<'a>>) -> Result<(), FormatError> {
     let geometry = geometry.into();
-    if matches!(geometry, Geometry::Sample(_)) || format == Format::Png {
+    if matches!(geometry, Geometry::Sample(_) | Geometry::Polygons { .. }) || format == Format::Png {
         return Err(FormatError::CannotVerify { format });
     }
     let pieces = fit_pieces(format, &geometry)?;
@@ -286,7 +309,8 @@ pub fn verify_written<'a, R: Read + Seek>(format: Format, source: &mut R, geomet
         Format::Obj => obj::verify(&pieces, source),
         Format::Ply => ply::verify(&pieces, source),
         Format::Off => off::verify(&pieces, source),
-        Format::Png => Err(FormatError::CannotVerify { format }),
+        Format::Vrml => vrml::verify(&pieces, source),
+        Format::Png | Format::Addresses => Err(FormatError::CannotVerify { format }),
     }
 }
 

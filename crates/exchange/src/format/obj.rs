@@ -33,10 +33,9 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
             text.push(b'\n');
             flush_full(&mut text, sink)?;
         }
-        elements(b'f', piece.triangles, first, &mut text, sink)?;
-        elements(b'l', piece.segments, first, &mut text, sink)?;
-        let (alone, _) = piece.points.as_chunks::<1>();
-        elements(b'p', alone, first, &mut text, sink)?;
+        piece.each_face(|corners| element(b'f', corners, first, &mut text, sink))?;
+        piece.segments.iter().try_for_each(|ends| element(b'l', ends, first, &mut text, sink))?;
+        piece.points.iter().try_for_each(|&point| element(b'p', &[point], first, &mut text, sink))?;
         first += piece.vertices.len() as u64;
     }
     sink.write_all(&text)?;
@@ -44,23 +43,15 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     Ok(())
 }
 
-fn elements<W: Write, const CORNERS: usize>(
-    keyword: u8,
-    elements: &[[u32; CORNERS]],
-    first: u64,
-    text: &mut Vec<u8>,
-    sink: &mut W,
-) -> Result<(), FormatError> {
-    for element in elements {
-        text.push(keyword);
-        for &index in element {
-            text.push(b' ');
-            push_integer(text, first + u64::from(index));
-        }
-        text.push(b'\n');
-        flush_full(text, sink)?;
+#[inline]
+fn element<W: Write>(keyword: u8, corners: &[u32], first: u64, text: &mut Vec<u8>, sink: &mut W) -> Result<(), FormatError> {
+    text.push(keyword);
+    for &index in corners {
+        text.push(b' ');
+        push_integer(text, first + u64::from(index));
     }
-    Ok(())
+    text.push(b'\n');
+    flush_full(text, sink)
 }
 
 pub(crate) fn verify<R: Read>(pieces: &[Piece<'_>], source: &mut R) -> Result<(), FormatError> {
@@ -141,8 +132,7 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
     if builder.vertex_count() == 0 {
         return Err(FormatError::malformed(Format::Obj, lines.place(), "vertices", bytes));
     }
-    facts.polygons_fanned = builder.fanned;
-    Ok(MeshFile { mesh: builder.finish(), facts })
+    Ok(MeshFile::new(builder, facts))
 }
 
 /// The vertex of `vertex/texture/normal`, counted from 0.

@@ -24,7 +24,7 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     if let Some(title) = metadata.title {
         text.extend_from_slice(format!("# {}\n", one_line(title)).as_bytes());
     }
-    text.extend_from_slice(format!("{} {} 0\n", counts.vertices, counts.triangles).as_bytes());
+    text.extend_from_slice(format!("{} {} 0\n", counts.vertices, counts.faces).as_bytes());
     for vertex in pieces.iter().flat_map(|piece| piece.vertices) {
         push_position(&mut text, vertex);
         text.push(b'\n');
@@ -32,15 +32,15 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     }
     let mut before = 0;
     for piece in pieces {
-        for triangle in piece.triangles {
-            text.push(b'3');
-            for &index in triangle {
+        piece.each_face(|corners| {
+            push_integer(&mut text, corners.len() as u64);
+            for &index in corners {
                 text.push(b' ');
                 push_integer(&mut text, before + u64::from(index));
             }
             text.push(b'\n');
-            flush_full(&mut text, sink)?;
-        }
+            flush_full(&mut text, sink)
+        })?;
         before += piece.vertices.len() as u64;
     }
     sink.write_all(&text)?;
@@ -144,9 +144,8 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
         read_face(line, &lines, &mut corners)?;
         builder.polygon(&corners, &|| lines.place())?;
     }
-    let mut facts = MeshFacts::of(Format::Off, "ascii");
-    facts.polygons_fanned = builder.fanned;
-    Ok(MeshFile { mesh: builder.finish(), facts })
+    let facts = MeshFacts::of(Format::Off, "ascii");
+    Ok(MeshFile::new(builder, facts))
 }
 
 /// The corners of a face; the colour that may follow them is left.

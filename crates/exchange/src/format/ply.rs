@@ -13,7 +13,8 @@ use super::off::flush_full;
 use super::scanner::Scanner;
 use super::text::{CHUNK_BYTES, one_line, singles};
 use super::{Format, Metadata};
-use std::io::{Read, Write};
+use glam::DVec3;
+use std::io::{Read, Seek, SeekFrom, Write};
 
 pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
     let counts = counts(pieces);
@@ -22,6 +23,7 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     if counts.vertices > most {
         return Err(FormatError::limit(Place::File, "vertices", counts.vertices, most));
     }
+    let wide = counts_are_wide(pieces);
     let mut bytes = Vec::with_capacity(CHUNK_BYTES + 4096);
     bytes.extend_from_slice(header(pieces, metadata).as_bytes());
     for vertex in pieces.iter().flat_map(|piece| piece.vertices) {
@@ -32,10 +34,18 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     }
     let mut before = 0;
     for piece in pieces {
-        for triangle in piece.triangles {
-            bytes.extend_from_slice(&face(triangle, before));
-            flush_full(&mut bytes, sink)?;
-        }
+        piece.each_face(|corners| {
+            if let Ok(triangle) = <&[u32; 3]>::try_from(corners)
+                && !wide
+            {
+                bytes.extend_from_slice(&face(triangle, before));
+            } else {
+                let count = (corners.len() as u32).to_le_bytes();
+                bytes.extend_from_slice(if wide { &count } else { &count[..1] });
+                corners.iter().for_each(|index| bytes.extend_from_slice(&(before + index).to_le_bytes()));
+            }
+            flush_full(&mut bytes, sink)
+        })?;
         before += piece.vertices.len() as u32;
     }
     let mut before = 0;
@@ -53,18 +63,87 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     Ok(())
 }
 
+/// A file of points whose number is known when they have all been written: memory stays flat. The header is as long
+/// for every number of points, and is written again at the end.
+pub struct PointFile<'a, W> {
+    sink: W,
+    metadata: &'a Metadata<'a>,
+    bytes: Vec<u8>,
+    written: u64,
+}
+
+impl<'a, W: Write + Seek> PointFile<'a, W> {
+    /// Starts a file where the sink is.
+    ///
+    /// # Errors
+    /// When the sink fails.
+    pub fn start(mut sink: W, metadata: &'a Metadata<'a>) -> Result<Self, FormatError> {
+        sink.write_all(point_header(0, metadata).as_bytes())?;
+        Ok(Self { sink, metadata, bytes: Vec::with_capacity(CHUNK_BYTES + 4096), written: 0 })
+    }
+
+    /// Adds points, in mm, rounded to single precision.
+    ///
+    /// # Errors
+    /// When the sink fails.
+    pub fn push(&mut self, points: &[DVec3]) -> Result<(), FormatError> {
+        for point in points {
+            for number in singles(point) {
+                self.bytes.extend_from_slice(&number.to_le_bytes());
+            }
+            flush_full(&mut self.bytes, &mut self.sink)?;
+        }
+        self.written += points.len() as u64;
+        Ok(())
+    }
+
+    /// Writes the rest and the header with the number of points.
+    ///
+    /// # Errors
+    /// When the sink fails.
+    pub fn finish(mut self) -> Result<(), FormatError> {
+        self.sink.write_all(&self.bytes)?;
+        let end = self.sink.stream_position()?;
+        let header = point_header(self.written, self.metadata);
+        self.sink.seek(SeekFrom::Start(end - 12 * self.written - header.len() as u64))?;
+        self.sink.write_all(header.as_bytes())?;
+        self.sink.seek(SeekFrom::Start(end))?;
+        self.sink.flush()?;
+        Ok(())
+    }
+}
+
+/// The header of a file of points, with a comment of as many blanks as the number leaves of twenty digits.
+fn point_header(count: u64, metadata: &Metadata<'_>) -> String {
+    let header = header_of([count, 0, 0], false, metadata);
+    let blanks = " ".repeat(20 - count.to_string().len());
+    // Titles may hold any words, but are before the elements.
+    let (comments, elements) = header.split_at(header.rfind("element vertex").unwrap_or(header.len()));
+    format!("{comments}comment{blanks}\n{elements}")
+}
+
+/// Whether a face has more corners than one byte counts.
+fn counts_are_wide(pieces: &[Piece<'_>]) -> bool {
+    pieces.iter().any(|piece| piece.most_corners() > 255)
+}
+
 fn header(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> String {
     let counts = counts(pieces);
+    header_of([counts.vertices, counts.faces, counts.segments], counts_are_wide(pieces), metadata)
+}
+
+fn header_of([vertices, faces, segments]: [u64; 3], wide: bool, metadata: &Metadata<'_>) -> String {
     let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment {} units mm\n", one_line(metadata.application));
     if let Some(title) = metadata.title {
         header.push_str(&format!("comment {}\n", one_line(title)));
     }
-    header.push_str(&format!("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", counts.vertices));
-    if counts.triangles > 0 {
-        header.push_str(&format!("element face {}\nproperty list uchar int vertex_indices\n", counts.triangles));
+    header.push_str(&format!("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", vertices));
+    if faces > 0 {
+        let count = if wide { "uint" } else { "uchar" };
+        header.push_str(&format!("element face {}\nproperty list {count} int vertex_indices\n", faces));
     }
-    if counts.segments > 0 {
-        header.push_str(&format!("element edge {}\nproperty int vertex1\nproperty int vertex2\n", counts.segments));
+    if segments > 0 {
+        header.push_str(&format!("element edge {}\nproperty int vertex1\nproperty int vertex2\n", segments));
     }
     header.push_str("end_header\n");
     header
@@ -108,4 +187,27 @@ pub(crate) fn verify<R: Read>(pieces: &[Piece<'_>], source: &mut R) -> Result<()
         before += piece.vertices.len() as u32;
     }
     scanner.end()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::{ReadLimits, read};
+    use super::*;
+
+    #[test]
+    fn a_file_of_points_has_its_number_in_its_header() {
+        let metadata = Metadata { title: Some("element vertex"), ..Metadata::default() };
+        let mut bytes = std::io::Cursor::new(b"before".to_vec());
+        bytes.set_position(6);
+        let mut file = PointFile::start(&mut bytes, &metadata).unwrap();
+        let points: Vec<DVec3> = (0..12_345).map(|i| DVec3::new(f64::from(i), 0.5, -1.0)).collect();
+        points.chunks(1000).for_each(|chunk| file.push(chunk).unwrap());
+        file.finish().unwrap();
+        let bytes = bytes.into_inner();
+        let text = String::from_utf8_lossy(&bytes[6..300]);
+        assert!(text.contains("\nelement vertex 12345\n"), "{text}");
+        assert_eq!(bytes.len() - 6, point_header(0, &metadata).len() + 12 * points.len());
+        assert_eq!(read(&bytes[6..], None, &ReadLimits::default()).unwrap().mesh.vertices, points);
+    }
 }

@@ -2,9 +2,10 @@
 
 use super::error::FormatError;
 use super::error::Place;
-use super::limits::within;
-use super::{Format, ReadLimits, obj, off, ply, stl, threemf};
+use super::limits::{MeshBuilder, within};
+use super::{Format, ReadLimits, obj, off, ply, stl, threemf, vrml};
 use lacuna_kernel::solid::TriMesh;
+use std::convert::Infallible;
 
 /// A unit of length that a file names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -50,8 +51,9 @@ pub struct MeshFacts {
     pub unit: Option<Unit>,
     /// Names of objects, at most [`MeshFacts::NAMES`], each cut to [`MeshFacts::NAME_CHARACTERS`].
     pub object_names: Vec<String>,
-    /// Polygons with more than three corners, cut into triangles about their first corner.
-    pub polygons_fanned: u64,
+    /// Shapes that hold no polygons and were left out, by the word for their kind, with their number; only VRML
+    /// has any.
+    pub left_out: Vec<(&'static str, u64)>,
 }
 
 impl MeshFacts {
@@ -61,17 +63,66 @@ impl MeshFacts {
     pub const NAME_CHARACTERS: usize = 256;
 
     pub(crate) fn of(format: Format, encoding: &'static str) -> Self {
-        Self { format, encoding, unit: None, object_names: Vec::new(), polygons_fanned: 0 }
+        Self { format, encoding, unit: None, object_names: Vec::new(), left_out: Vec::new() }
     }
 }
 
 /// A mesh that was read. Nothing is proven of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshFile {
-    /// The mesh, in mm.
+    /// The mesh, in mm, polygons cut into triangles about their first corner.
     pub mesh: TriMesh,
+    /// Which triangles are polygons, in order.
+    pub fans: Vec<Fan>,
     /// What else the file said.
     pub facts: MeshFacts,
+}
+
+/// A polygon of four corners or more, as a run of triangles about its first corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fan {
+    /// The first triangle.
+    pub first: u32,
+    /// How many there are: two less than the polygon has corners.
+    pub count: u32,
+}
+
+impl MeshFile {
+    pub(crate) fn new(builder: MeshBuilder<'_>, facts: MeshFacts) -> Self {
+        let (mesh, fans) = builder.finish();
+        Self { mesh, fans, facts }
+    }
+
+    /// The faces as the file has them: its polygons whole, their corners in its order.
+    #[must_use]
+    pub fn faces(&self) -> Vec<Vec<u32>> {
+        let mut faces = Vec::with_capacity(face_count(&self.mesh.triangles, &self.fans) as usize);
+        let Ok(()) = each_face(&self.mesh.triangles, &self.fans, |face| {
+            faces.push(face.to_vec());
+            Ok::<(), Infallible>(())
+        });
+        faces
+    }
+}
+
+/// How many faces there are.
+pub(crate) fn face_count(triangles: &[[u32; 3]], fans: &[Fan]) -> u64 {
+    triangles.len() as u64 - fans.iter().map(|fan| u64::from(fan.count) - 1).sum::<u64>()
+}
+
+/// Hands over the corners of every face in turn.
+pub(crate) fn each_face<E>(triangles: &[[u32; 3]], fans: &[Fan], mut take: impl FnMut(&[u32]) -> Result<(), E>) -> Result<(), E> {
+    let (mut at, mut corners) = (0, Vec::new());
+    for fan in fans {
+        triangles[at..fan.first as usize].iter().try_for_each(|triangle| take(triangle))?;
+        let polygon = &triangles[fan.first as usize..(fan.first + fan.count) as usize];
+        corners.clear();
+        corners.extend_from_slice(&polygon[0]);
+        corners.extend(polygon[1..].iter().map(|triangle| triangle[2]));
+        take(&corners)?;
+        at = (fan.first + fan.count) as usize;
+    }
+    triangles[at..].iter().try_for_each(|triangle| take(triangle))
 }
 
 /// Keeps a name, if there is one and there is room.
@@ -98,6 +149,9 @@ pub fn detect(bytes: &[u8]) -> Option<Format> {
     if let Some((_, format)) = marks.iter().find(|(mark, _)| bytes.starts_with(mark)) {
         return Some(*format);
     }
+    if vrml::looks_like(bytes) {
+        return Some(Format::Vrml);
+    }
     if stl::is_binary(bytes) || stl::looks_like_text(bytes) {
         return Some(Format::Stl);
     }
@@ -109,7 +163,7 @@ pub fn detect(bytes: &[u8]) -> Option<Format> {
 
 /// Reads a mesh. The format is detected unless it is given.
 ///
-/// Polygons become fans, units become mm, the objects of a 3MF file are placed where its build
+/// Polygons become fans of triangles and are kept as such, units become mm, the objects of a 3MF file are placed where its build
 /// puts them, and vertices of an STL file with equal coordinates become one. A decimal is read as
 /// the nearest double. Nothing is repaired.
 ///
@@ -125,6 +179,7 @@ pub fn read(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result
         Format::Obj => obj::read(bytes, limits),
         Format::Ply => ply::read(bytes, limits),
         Format::Off => off::read(bytes, limits),
-        Format::Glb | Format::Png => Err(FormatError::CannotRead { format }),
+        Format::Vrml => vrml::read(bytes, limits),
+        Format::Glb | Format::Png | Format::Addresses => Err(FormatError::CannotRead { format }),
     }
 }

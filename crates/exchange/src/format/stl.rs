@@ -237,7 +237,7 @@ impl<'a> Joined<'a> {
     }
 
     fn finish(self, facts: MeshFacts) -> MeshFile {
-        MeshFile { mesh: self.builder.finish(), facts }
+        MeshFile::new(self.builder, facts)
     }
 }
 

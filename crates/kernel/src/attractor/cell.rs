@@ -1,8 +1,8 @@
 //! Cells: instances of states. Their control points, their bounding ball, and what stands for them
 //! when they are small enough.
 
-use super::{Attractor, StateBound};
-use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator};
+use super::{Attractor, LinearPrecision, StateBound};
+use crate::automaton::{Ends, LeafPrimitive, State, StateId, SubdivisionOperator};
 use crate::measure::triangle::closest_on_triangle;
 
 /// A point or vector of space in mm.
@@ -197,6 +197,20 @@ impl Attractor {
         Cell { state, root: cell.root, ball, stretch }
     }
 
+    /// As [`Attractor::child_cell`], for a walk that only asks for the leaf's error and sites: where neither looks at
+    /// the ball, it is left without bounds.
+    #[inline]
+    pub(super) fn refined_cell(&self, cell: &Cell, index: usize, points: &[ControlPoint]) -> Cell {
+        let state = self.automaton().state(cell.state).transitions[index].to;
+        if let (StateBound::Hull { .. }, LeafPrimitive::Chord(_) | LeafPrimitive::Simplex) =
+            (self.bound(state), &self.automaton().state(state).leaf)
+        {
+            let ball = Ball { centre: [0.0; 3], radius: f64::INFINITY };
+            return Cell { state, root: cell.root, ball, stretch: 0.0 };
+        }
+        self.child_cell(cell, index, points)
+    }
+
     /// The bounding ball of a cell; see `StateBound` for the proof.
     #[inline]
     fn ball(&self, state: StateId, points: &[ControlPoint], rational: bool, stretch: f64) -> Ball {
@@ -233,7 +247,7 @@ impl Attractor {
     pub(crate) fn leaf_error(&self, cell: &Cell, points: &[ControlPoint]) -> f64 {
         let rational = self.roots()[cell.root as usize].rational;
         match &self.automaton().state(cell.state).leaf {
-            LeafPrimitive::Centre => cell.ball.radius,
+            LeafPrimitive::Centre => self.needle(cell, points).map_or(cell.ball.radius, |needle| needle.error.min(cell.ball.radius)),
             LeafPrimitive::Simplex => 0.0,
             LeafPrimitive::Chord(ends) => {
                 // The curve lies within `off` of the chord because its hull does, the distance to a segment being
@@ -246,13 +260,25 @@ impl Attractor {
                 };
                 let chord = points.iter().map(off).fold(0.0, f64::max).sqrt();
                 let margin = self.bound(cell.state).margin();
-                if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord }
+                let first_order = if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord };
+                match self.precision(cell.state) {
+                    Some(precision) if rational => first_order.min(rational_chord_error(precision, points, ends)),
+                    Some(precision) => first_order.min(chord_error(precision, margin, points, &start, &end)),
+                    None => first_order,
+                }
             }
             // Points of the cell, and segments between them, are in the ball too.
             LeafPrimitive::Star(_) => 2.0 * cell.ball.radius,
             // Corners belong to the surface and every point of the polygon and of the cell is within the ball:
             // no two points of them are farther apart than its diameter.
-            LeafPrimitive::Polygon(_) => 2.0 * cell.ball.radius,
+            LeafPrimitive::Polygon(_) => {
+                let first_order = 2.0 * cell.ball.radius;
+                match self.precision(cell.state) {
+                    Some(precision) if rational => first_order.min(rational_polygon_error(precision, points)),
+                    Some(precision) => first_order.min(polygon_error(precision, self.bound(cell.state).margin(), points)),
+                    None => first_order,
+                }
+            }
             LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
         }
     }
@@ -263,7 +289,10 @@ impl Attractor {
         let rational = self.roots()[cell.root as usize].rational;
         let corner = |j: usize| project(&points[j], rational);
         match &self.automaton().state(cell.state).leaf {
-            LeafPrimitive::Centre => sink(Site::Point(cell.ball.centre)),
+            LeafPrimitive::Centre => match self.needle(cell, points) {
+                Some(needle) if needle.error < cell.ball.radius => sink(Site::Segment(needle.ends)),
+                _ => sink(Site::Point(cell.ball.centre)),
+            },
             LeafPrimitive::Simplex => match points.len() {
                 1 => sink(Site::Point(corner(0))),
                 2 => sink(Site::Segment([corner(0), corner(1)])),
@@ -319,6 +348,87 @@ impl Attractor {
     pub(crate) fn state_of(&self, cell: &Cell) -> &State {
         self.automaton().state(cell.state)
     }
+}
+
+/// eta for the affine map that takes a curve's parameters to its chord; see `precision`.
+#[inline]
+fn chord_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
+    let chord = subtract(end, start);
+    let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
+        let linear: Point = std::array::from_fn(|i| start[i] + parameter[0] * chord[i]);
+        distance_squared(&[point[0], point[1], point[2]], &linear)
+    };
+    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
+    (1.0 + 2.0 * margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
+}
+
+/// 2 eta for the affine map that fits a face's control points best; see `precision`.
+#[inline]
+fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint]) -> f64 {
+    let mut map = [[0.0; 3]; 3];
+    for (point, fit) in points.iter().zip(&precision.fit) {
+        for (column, weight) in map.iter_mut().zip(fit) {
+            (0..3).for_each(|i| column[i] += weight * point[i]);
+        }
+    }
+    let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
+        let linear: Point = std::array::from_fn(|i| map[0][i] + parameter[0] * map[1][i] + parameter[1] * map[2][i]);
+        distance_squared(&[point[0], point[1], point[2]], &linear)
+    };
+    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
+    let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
+    2.0 * (1.0 + 2.0 * margin) * largest + precision.residual * slope
+}
+
+/// As [`chord_error`] for weights; see [`homogeneous_error`].
+fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], ends: &Ends) -> f64 {
+    let place = |weights: &[f64]| -> ControlPoint { std::array::from_fn(|i| points.iter().zip(weights).map(|(p, w)| w * p[i]).sum()) };
+    let (start, end) = (place(&ends.start), place(&ends.end));
+    let linear: [ControlPoint; 3] = [start, std::array::from_fn(|i| end[i] - start[i]), [0.0; 4]];
+    homogeneous_error(precision, points, &linear)
+}
+
+/// As [`polygon_error`] for weights; see [`homogeneous_error`].
+fn rational_polygon_error(precision: &LinearPrecision, points: &[ControlPoint]) -> f64 {
+    let mut linear = [[0.0; 4]; 3];
+    for (point, fit) in points.iter().zip(&precision.fit) {
+        for (column, weight) in linear.iter_mut().zip(fit) {
+            (0..4).for_each(|i| column[i] += weight * point[i]);
+        }
+    }
+    2.0 * homogeneous_error(precision, points, &linear)
+}
+
+/// eta for rational cells, whose operators are non-negative: let L map parameters to homogeneous points, with positive
+/// weights over the domain D. For x in the attractor, Q x = L(G x) + r with r in the hull of the r_k. Let c be the
+/// projection of L(G x), (n, d) the parts of r as seen from a point o, and W the weight of Q x, at least the least w_k.
+/// Then the projection of Q x is c + (n - (c - o) d) / W, so eta = (max |n_k| + max |c - o| max |d_k|) / min w_k; the
+/// largest |c - o| is at a corner of D. Projection with positive weights takes hulls to hulls, so that the rest of the
+/// argument in `precision` holds as it stands.
+fn homogeneous_error(precision: &LinearPrecision, points: &[ControlPoint], linear: &[ControlPoint; 3]) -> f64 {
+    let at = |p: &[f64; 2]| -> ControlPoint { std::array::from_fn(|i| linear[0][i] + p[0] * linear[1][i] + p[1] * linear[2][i]) };
+    let corners = precision.domain.iter().map(at);
+    if corners.clone().any(|corner| corner[3] <= 0.0) {
+        return f64::INFINITY;
+    }
+    let origin = project(&linear[0], true);
+    let reach = corners.map(|corner| distance_squared(&project(&corner, true), &origin)).fold(0.0, f64::max).sqrt();
+    let size = |v: &ControlPoint| {
+        let seen: Point = std::array::from_fn(|i| v[i] - origin[i] * v[3]);
+        (dot(&seen, &seen).sqrt(), v[3].abs())
+    };
+    let (mut off, mut skew, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
+    for (point, parameter) in points.iter().zip(&precision.parameters) {
+        let linear = at(parameter);
+        let (n, d) = size(&std::array::from_fn(|i| point[i] - linear[i]));
+        (off, skew, least) = (off.max(n), skew.max(d), least.min(point[3]));
+    }
+    // Parameters may miss the domain by the residual.
+    for column in &linear[1..] {
+        let (n, d) = size(column);
+        (off, skew) = (off + precision.residual * n, skew + precision.residual * d);
+    }
+    (off + reach * skew) / least
 }
 
 /// The diagonal of the box of polynomial control points: at least their diameter.

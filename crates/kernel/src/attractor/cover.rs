@@ -9,7 +9,7 @@
 //! thus be of size sqrt(r e), where its Hausdorff distance from S would ask for size e.
 
 use super::StateBound;
-use super::cell::{Point, distance_squared, dot, subtract};
+use super::cell::{Point, distance_squared, dot, matrix_norm, subtract, times};
 use crate::automaton::{Automaton, Contraction, StateId};
 
 /// Points that stand for a state's attractor, in coordinates of its frame.
@@ -17,10 +17,42 @@ use crate::automaton::{Automaton, Contraction, StateId};
 pub struct PointCover {
     /// Points of the attractor.
     pub points: Vec<Point>,
-    /// Radius of a ball that contains them.
+    /// Centre of a ball that contains them.
+    pub centre: Point,
+    /// Radius of that ball.
     pub radius: f64,
-    /// The attractor is within this distance of their hull.
-    pub excess: f64,
+    /// The attractor lies in the sum of the points' hull and this.
+    pub halo: Halo,
+}
+
+/// A neighbourhood of the origin, {sum_j h_j x_j} with the columns h_j.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Halo {
+    /// h_j.
+    pub columns: [Point; 3],
+    /// An ellipsoid, |x| <= 1, if set; else a box, |x_j| <= 1.
+    pub round: bool,
+}
+
+impl Halo {
+    /// Its image under a linear map with the given columns.
+    #[inline]
+    pub(super) fn image(&self, columns: &[Point; 3]) -> Self {
+        Self { columns: self.columns.map(|column| times(columns, &column)), round: self.round }
+    }
+
+    /// How far it extends along the vector, times the vector's length.
+    #[inline]
+    pub(super) fn along(&self, vector: &Point) -> f64 {
+        let [a, b, c] = self.columns.map(|column| dot(&column, vector));
+        if self.round { (a * a + b * b + c * c).sqrt() } else { a.abs() + b.abs() + c.abs() }
+    }
+
+    /// A bound of its points' distance from the origin.
+    #[inline]
+    pub(super) fn radius(&self) -> f64 {
+        if self.round { matrix_norm(&self.columns) } else { self.columns.iter().map(|column| dot(column, column).sqrt()).sum() }
+    }
 }
 
 /// More points than this cost more than larger cells save.
@@ -33,56 +65,122 @@ const DESCENT: usize = 200;
 /// Steps of a descent at most: maps that contract by 0.99 need 4200.
 const LONGEST_DESCENT: usize = 5000;
 
-/// Covers of all states; `None` where maps do not contract at each step in the Euclidean norm.
+/// Steps contract by this much at least, or there are no covers.
+const LEAST_CONTRACTION: f64 = 0.99;
+
+/// Covers of all states; `None` where maps do not contract at each step in the adapted norm.
 pub(super) fn covers(automaton: &Automaton, bounds: &[StateBound], contraction: &Contraction) -> Vec<Option<PointCover>> {
     let states = automaton.states();
-    let frame = |index: usize| states[index].frame;
-    let mut covers: Vec<Option<Vec<Point>>> =
-        (0..states.len()).map(|index| frame(index).then(|| extremes(automaton, bounds, StateId::new(index)))).collect();
-    let norms: Vec<Vec<f64>> = states.iter().map(|state| state.transitions.iter().map(|t| linear_norm(&t.operator)).collect()).collect();
-    let contracts = norms.iter().zip(states).filter(|(_, state)| state.frame).flat_map(|(norms, _)| norms).all(|&norm| norm < 0.99);
-    if !contracts || contraction.upper >= 1.0 {
-        covers.iter_mut().for_each(|cover| *cover = None);
-    }
-    // delta_v = max distance of T_e s from conv(S_v); the excess solves excess_v >= delta_v + s_e excess_w.
-    let deltas: Vec<f64> = (0..states.len()).map(|index| overhang(automaton, &covers, index)).collect();
-    let mut excess = vec![0.0_f64; states.len()];
+    let norms = &contraction.step_norms;
     // Frames lead to frames: other states have neither covers nor norms that matter.
-    let frames = || (0..states.len()).filter(|&index| frame(index));
+    let frames = || (0..states.len()).filter(|&index| states[index].frame);
+    let contracts = frames().flat_map(|index| &norms[index]).all(|&norm| norm < LEAST_CONTRACTION);
+    if !contracts {
+        return vec![None; states.len()];
+    }
+    let extreme = |index: usize| states[index].frame.then(|| extremes(automaton, bounds, contraction, StateId::new(index)));
+    let covers: Vec<Option<Vec<Point>>> = (0..states.len()).map(extreme).collect();
+    // delta_v = max distance of T_e s from conv(S_v); the excess solves excess_v >= delta_v + s_e excess_w. All in
+    // adapted norms.
+    let deltas: Vec<f64> = (0..states.len()).map(|index| overhang(automaton, contraction, &covers, index)).collect();
     let worst = frames().map(|index| deltas[index]).fold(0.0, f64::max);
     let largest = frames().flat_map(|index| &norms[index]).fold(0.0_f64, |a, &b| a.max(b));
-    if contracts {
-        excess.fill(worst / (1.0 - largest));
-        for _ in 0..100 {
-            // Decreasing from above: every iterate satisfies the inequality.
-            excess = (0..states.len())
-                .map(|index| {
-                    let children = states[index].transitions.iter().zip(&norms[index]);
-                    deltas[index] + children.map(|(t, norm)| norm * excess[t.to.index()]).fold(0.0, f64::max)
-                })
-                .collect();
-        }
+    let mut excess = vec![worst / (1.0 - largest); states.len()];
+    for _ in 0..100 {
+        // Decreasing from above: every iterate satisfies the inequality.
+        excess = (0..states.len())
+            .map(|index| {
+                let children = states[index].transitions.iter().zip(&norms[index]);
+                deltas[index] + children.map(|(t, norm)| norm * excess[t.to.index()]).fold(0.0, f64::max)
+            })
+            .collect();
     }
+    let round: Vec<Halo> = (0..states.len()).map(|index| round_halo(contraction, index, excess[index])).collect();
+    let boxes = boxes(automaton, &covers, &round);
     covers
         .into_iter()
-        .zip(excess)
-        .map(|(points, excess)| {
+        .enumerate()
+        .map(|(index, points)| {
             let points = points.filter(|points| !points.is_empty())?;
-            let radius = enclosing_radius(&points);
+            let (centre, radius) = enclosing_ball(&points);
+            let narrow = boxes.as_ref().map(|boxes| boxes[index]).filter(|halo| halo.radius() < round[index].radius());
+            let mut halo = narrow.unwrap_or(round[index]);
             let rounding = 1e-12 * points.iter().flatten().fold(radius, |a, x| a.max(x.abs()));
-            Some(PointCover { points, radius, excess: excess * (1.0 + 1e-9) + rounding })
+            (0..3).for_each(|j| halo.columns[j][j] += rounding.copysign(halo.columns[j][j]));
+            Some(PointCover { points, centre, radius, halo })
         })
         .collect()
 }
 
-/// Norm bound of the linear part of a frame operator.
-fn linear_norm(operator: &crate::automaton::SubdivisionOperator) -> f64 {
-    let (rows, columns) = (operator.rows(), operator.columns());
-    let entry = |i: usize, j: usize| operator.entry(i, j) - operator.entry(i, 0);
-    let product = |a: usize, b: usize| (1..columns).map(|j| entry(a, j) * entry(b, j)).sum::<f64>();
-    let row_sums = (1..rows).map(|a| (1..rows).map(|b| product(a, b).abs()).sum::<f64>()).fold(0.0, f64::max);
-    let frobenius = (1..rows).flat_map(|a| (1..rows).map(move |b| (a, b))).map(|(a, b)| product(a, b).powi(2)).sum::<f64>().sqrt();
-    row_sums.min(frobenius).sqrt()
+fn round_halo(contraction: &Contraction, index: usize, excess: f64) -> Halo {
+    let unit = contraction.unit_ball(StateId::new(index));
+    // States that are not frames have other dimensions, and no cover.
+    let entry = |i: usize, j: usize| unit.get(j).and_then(|column| column.get(i)).copied().unwrap_or(0.0);
+    Halo { columns: std::array::from_fn(|j| std::array::from_fn(|i| entry(i, j) * excess * (1.0 + 1e-9))), round: true }
+}
+
+/// Halos along the frame's axes, for attractors whose hulls are round in some directions only: boxes of half
+/// extents e_v. If T_e s lies in conv(S_v) plus the box delta_v for all points s of children, and
+/// delta_v + |L_e| e_w <= e_v with the absolute values of the linear parts, then T_e maps conv(S_w) plus the box e_w into
+/// conv(S_v) plus the box e_v, and the attractors lie in these sets. `None` where no such boxes are found.
+fn boxes(automaton: &Automaton, covers: &[Option<Vec<Point>>], round: &[Halo]) -> Option<Vec<Halo>> {
+    let states = automaton.states();
+    let extent =
+        |halo: &Halo| -> Point { std::array::from_fn(|i| halo.columns.iter().map(|column| column[i].powi(2)).sum::<f64>().sqrt()) };
+    let mut extents: Vec<Point> = round.iter().map(extent).collect();
+    for _ in 0..BOX_ROUNDS {
+        // Offsets are measured in units of the extents so far: where hulls are exact along an axis, they stay so.
+        let offsets: Vec<Point> = (0..states.len()).map(|index| box_overhang(automaton, covers, index, &extents[index])).collect();
+        let step = |extents: &[Point]| -> Vec<Point> {
+            let through = |index: usize, axis: usize| {
+                let child = |t: &crate::automaton::Transition| -> f64 {
+                    let entry = |j: usize| (t.operator.entry(axis + 1, j + 1) - t.operator.entry(axis + 1, 0)).abs();
+                    (0..3).map(|j| entry(j) * extents[t.to.index()][j]).sum()
+                };
+                offsets[index][axis] + states[index].transitions.iter().map(child).fold(0.0, f64::max)
+            };
+            let frame = |index: usize| if states[index].frame { std::array::from_fn(|axis| through(index, axis)) } else { [0.0; 3] };
+            (0..states.len()).map(frame).collect()
+        };
+        let mut solution = vec![[0.0; 3]; states.len()];
+        for _ in 0..400 {
+            solution = step(&solution);
+        }
+        let size = solution.iter().flatten().fold(0.0_f64, |a, &x| a.max(x));
+        solution.iter_mut().flatten().for_each(|x| *x = *x * (1.0 + 1e-9) + 1e-12 * size);
+        let holds = step(&solution).iter().flatten().zip(solution.iter().flatten()).all(|(next, own)| next <= own || *own == 0.0);
+        if !holds || !size.is_finite() {
+            return None;
+        }
+        extents = solution;
+    }
+    let halo = |extent: &Point| Halo {
+        columns: std::array::from_fn(|j| std::array::from_fn(|i| if i == j { extent[j] } else { 0.0 })),
+        round: false,
+    };
+    Some(extents.iter().map(halo).collect())
+}
+
+/// Rounds in which boxes adapt to the offsets that they hold.
+const BOX_ROUNDS: usize = 4;
+
+/// Largest offsets along the axes of children's points from points of the hull, near in units of the extents.
+fn box_overhang(automaton: &Automaton, covers: &[Option<Vec<Point>>], index: usize, extents: &Point) -> Point {
+    let Some(points) = &covers[index] else { return [0.0; 3] };
+    let largest = extents.iter().fold(f64::MIN_POSITIVE, |a, &x| a.max(x));
+    let unit = extents.map(|x| x.max(1e-4 * largest));
+    let scaled = |point: &Point| -> Point { std::array::from_fn(|i| point[i] / unit[i]) };
+    let hull: Vec<Point> = points.iter().map(scaled).collect();
+    let mut worst = [0.0_f64; 3];
+    for transition in &automaton.states()[index].transitions {
+        let Some(child) = &covers[transition.to.index()] else { continue };
+        for point in child {
+            let mapped = transition.operator.apply(&[1.0 - point.iter().sum::<f64>(), point[0], point[1], point[2]]);
+            let offset = offset_from_hull(&scaled(&[mapped[1], mapped[2], mapped[3]]), &hull);
+            (0..3).for_each(|i| worst[i] = worst[i].max((offset[i] * unit[i]).abs()));
+        }
+    }
+    worst
 }
 
 /// Directions in which extreme points are sought: axes, diagonals of faces and of the cube, and points
@@ -106,10 +204,13 @@ fn directions() -> Vec<Point> {
 }
 
 /// Extreme points of a state's attractor, each computed along an address to the last digit.
-fn extremes(automaton: &Automaton, bounds: &[StateBound], id: StateId) -> Vec<Point> {
+fn extremes(automaton: &Automaton, bounds: &[StateBound], contraction: &Contraction, id: StateId) -> Vec<Point> {
     let mut points: Vec<Point> = Vec::new();
     let mut size = 0.0_f64;
-    for direction in directions() {
+    // Spread over the sphere in coordinates in which the attractor is about as long as wide.
+    let columns: [Point; 3] = std::array::from_fn(|j| contraction.rounded(id, &std::array::from_fn(|i| if i == j { 1.0 } else { 0.0 })));
+    let covector = |direction: &Point| -> Point { std::array::from_fn(|j| dot(&columns[j], direction)) };
+    for direction in directions().iter().map(covector) {
         let Some(point) = extreme(automaton, bounds, id, &direction) else { continue };
         size = points.first().map_or(size, |first| size.max(distance_squared(first, &point).sqrt()));
         if points.iter().all(|known| distance_squared(known, &point).sqrt() > 1e-7 * size.max(f64::MIN_POSITIVE)) {
@@ -119,7 +220,7 @@ fn extremes(automaton: &Automaton, bounds: &[StateBound], id: StateId) -> Vec<Po
             break;
         }
     }
-    prune(points, size)
+    prune(points, &|point| contraction.rounded(id, point))
 }
 
 /// Follows, at every level, the child that reaches farthest along the direction, looking a few levels
@@ -175,39 +276,53 @@ fn reach(automaton: &Automaton, bounds: &[StateBound], state: StateId, frame: &[
 
 /// Chooses points one by one, each time the farthest from the hull of those chosen, until the hull holds all or
 /// [`MOST_POINTS`] are chosen: what is left out shows in the excess.
-fn prune(mut points: Vec<Point>, size: f64) -> Vec<Point> {
-    let mut chosen: Vec<Point> = Vec::new();
+fn prune(points: Vec<Point>, rounded: &dyn Fn(&Point) -> Point) -> Vec<Point> {
+    let mut left: Vec<(Point, Point)> = points.into_iter().map(|point| (point, rounded(&point))).collect();
+    let (mut chosen, mut hull): (Vec<Point>, Vec<Point>) = (Vec::new(), Vec::new());
+    let mut size = 0.0_f64;
     while chosen.len() < MOST_POINTS {
-        let distances = points.iter().map(|point| if chosen.is_empty() { f64::MAX } else { distance_to_hull(point, &chosen) });
+        let distances = left.iter().map(|(_, point)| if hull.is_empty() { f64::MAX } else { distance_to_hull(point, &hull) });
         let Some((index, farthest)) = distances.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-        if farthest <= 1e-9 * size && !chosen.is_empty() {
+        if farthest <= 1e-9 * size && !hull.is_empty() {
             break;
         }
-        chosen.push(points.swap_remove(index));
+        let (point, round) = left.swap_remove(index);
+        size = hull.first().map_or(size, |first| size.max(distance_squared(first, &round).sqrt()));
+        chosen.push(point);
+        hull.push(round);
     }
     chosen
 }
 
-fn overhang(automaton: &Automaton, covers: &[Option<Vec<Point>>], index: usize) -> f64 {
+/// The largest distance, in the adapted norm, of a child's point from the hull of the state's points.
+fn overhang(automaton: &Automaton, contraction: &Contraction, covers: &[Option<Vec<Point>>], index: usize) -> f64 {
     let Some(points) = &covers[index] else { return f64::INFINITY };
+    let rounded = |point: &Point| contraction.rounded(StateId::new(index), point);
+    let hull: Vec<Point> = points.iter().map(rounded).collect();
     let mut worst = 0.0_f64;
     for transition in &automaton.states()[index].transitions {
         let Some(child) = &covers[transition.to.index()] else { return f64::INFINITY };
         for point in child {
             let mapped = transition.operator.apply(&[1.0 - point.iter().sum::<f64>(), point[0], point[1], point[2]]);
-            worst = worst.max(distance_to_hull(&[mapped[1], mapped[2], mapped[3]], points));
+            worst = worst.max(distance_to_hull(&rounded(&[mapped[1], mapped[2], mapped[3]]), &hull));
         }
     }
     worst
 }
 
-/// An upper bound of the distance from x to the convex hull of points, by pairwise Frank-Wolfe steps: every
-/// iterate is a point of the hull, and convergence is linear on polytopes.
+/// An upper bound of the distance from x to the convex hull of points.
 fn distance_to_hull(x: &Point, points: &[Point]) -> f64 {
+    let offset = offset_from_hull(x, points);
+    dot(&offset, &offset).sqrt()
+}
+
+/// A point of the convex hull close to x, minus x, by pairwise Frank-Wolfe steps: every iterate is a point of the
+/// hull, and convergence is linear on polytopes.
+fn offset_from_hull(x: &Point, points: &[Point]) -> Point {
     let relative: Vec<Point> = points.iter().map(|point| subtract(point, x)).collect();
     let Some(start) = (0..relative.len()).min_by(|&a, &b| dot(&relative[a], &relative[a]).total_cmp(&dot(&relative[b], &relative[b])))
     else {
-        return f64::INFINITY;
+        return [f64::INFINITY; 3];
     };
     let mut weights = vec![0.0; relative.len()];
     weights[start] = 1.0;
@@ -231,22 +346,24 @@ fn distance_to_hull(x: &Point, points: &[Point]) -> f64 {
     }
     // The iterate itself, from its weights: what was accumulated may have drifted.
     let total: f64 = weights.iter().sum();
-    let point: Point = std::array::from_fn(|i| relative.iter().zip(&weights).map(|(p, w)| p[i] * w).sum::<f64>() / total);
-    dot(&point, &point).sqrt()
+    std::array::from_fn(|i| relative.iter().zip(&weights).map(|(p, w)| p[i] * w).sum::<f64>() / total)
 }
 
-/// Radius of a ball around the points, close to the smallest: Badoiu and Clarkson's walk to the farthest.
-fn enclosing_radius(points: &[Point]) -> f64 {
+/// A ball around the points, close to the smallest: Badoiu and Clarkson's walk to the farthest.
+fn enclosing_ball(points: &[Point]) -> (Point, f64) {
     let mut centre: Point = std::array::from_fn(|i| points.iter().map(|p| p[i]).sum::<f64>() / points.len() as f64);
     let farthest = |centre: &Point| {
         let squares = points.iter().map(|p| (distance_squared(p, centre), p));
         squares.max_by(|a, b| a.0.total_cmp(&b.0)).map_or((0.0, *centre), |(square, p)| (square, *p))
     };
-    let mut best = farthest(&centre).0;
+    let mut best = (centre, farthest(&centre).0);
     for k in 0..400 {
         let (_, point) = farthest(&centre);
         centre = std::array::from_fn(|i| centre[i] + (point[i] - centre[i]) / f64::from(k + 2));
-        best = best.min(farthest(&centre).0);
+        let square = farthest(&centre).0;
+        if square < best.1 {
+            best = (centre, square);
+        }
     }
-    best.sqrt() * (1.0 + 1e-12)
+    (best.0, best.1.sqrt() * (1.0 + 1e-12))
 }

@@ -1,21 +1,31 @@
 //! The limit set of an automaton and control points: bounded once per state, so that every cell is
 //! bounded by a few multiplications, whatever the signs of its operators.
 
+mod address;
 mod bound;
 pub mod cell;
 mod complex;
+mod connected;
 mod cover;
 mod defect;
+mod early;
+mod near;
+mod needle;
+mod precision;
 mod refine;
 pub(crate) mod sites;
+mod walk;
 
 use crate::automaton::topology::{Topology, TopologyError};
-use crate::automaton::{Automaton, AutomatonError, Contraction, StateId, convergence};
+use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, StateId, convergence};
 use crate::error::Kind;
+pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
-pub use cover::PointCover;
-pub use refine::{RefineError, count_cells, refine};
+pub use cover::{Halo, PointCover};
+pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
+pub use precision::LinearPrecision;
+pub use refine::{RefineError, Streamed, count_cells, refine, stream};
 use std::sync::Arc;
 
 /// Where a shape begins: a state and its control points.
@@ -57,6 +67,9 @@ pub struct Attractor {
     solids: Vec<SolidSurface>,
     bounds: Vec<StateBound>,
     covers: Vec<Option<PointCover>>,
+    /// Widest gap of every frame state that is proven connected; see `connected`.
+    connected: Vec<Option<f64>>,
+    precisions: Vec<Option<LinearPrecision>>,
     contraction: Contraction,
     warnings: Vec<String>,
     /// The B-rep and where it begins, when the states have one.
@@ -189,18 +202,28 @@ impl Attractor {
         }
         defect::measure_drawings(&mut automaton, &bounds);
         let covers = cover::covers(&automaton, &bounds, &contraction);
-        let attractor = Self { automaton, roots, solids, bounds, covers, contraction, warnings, brep: None, seam_mm: 0.0 };
+        let connected = connected::connected(&automaton, &bounds, &contraction);
+        let precisions = precision::precisions(&automaton, &bounds);
+        let attractor =
+            Self { automaton, roots, solids, bounds, covers, connected, precisions, contraction, warnings, brep: None, seam_mm: 0.0 };
         attractor.check_roots()?;
         Ok(attractor)
     }
 
-    /// Gives the attractor its B-rep: the topology of its states, and which boundaries of roots are one. `seam_mm`
-    /// bounds the distance between control points that gluing takes for equal.
+    /// Gives the attractor its B-rep: the topology of its states, which boundaries of roots are one, and which edges
+    /// among them (root, boundary) are single points in space. `seam_mm` bounds the distance between control points
+    /// that gluing takes for equal.
     ///
     /// # Errors
     /// [`TopologyError`] when a gluing contradicts the boundaries' subdivision.
-    pub fn with_topology(mut self, mut topology: Topology, gluings: &[Gluing], seam_mm: f64) -> Result<Self, TopologyError> {
-        let start = complex::Start::new(&mut topology, &self.automaton, &self.roots, gluings)?;
+    pub fn with_topology(
+        mut self,
+        mut topology: Topology,
+        gluings: &[Gluing],
+        collapsed: &[(usize, usize)],
+        seam_mm: f64,
+    ) -> Result<Self, TopologyError> {
+        let start = complex::Start::new(&mut topology, &self.automaton, &self.roots, gluings, collapsed)?;
         self.brep = Some((Arc::new(topology), start));
         self.seam_mm = seam_mm;
         Ok(self)
@@ -231,6 +254,19 @@ impl Attractor {
         &self.roots
     }
 
+    /// Whether every leaf is drawn as points, cell by cell.
+    #[must_use]
+    pub fn is_drawn_as_points(&self) -> bool {
+        let apart = (0..self.roots.len()).all(|root| !self.has_brep(root));
+        apart
+            && self.automaton.states().iter().all(|state| match &state.leaf {
+                LeafPrimitive::Centre => true,
+                LeafPrimitive::Drawn(drawing) => drawing.segments.is_empty() && drawing.triangles.is_empty(),
+                LeafPrimitive::Simplex => state.dimension == 1,
+                LeafPrimitive::Chord(_) | LeafPrimitive::Star(_) | LeafPrimitive::Polygon(_) => false,
+            })
+    }
+
     /// Surfaces that stand for solids.
     #[must_use]
     pub fn solids(&self) -> &[SolidSurface] {
@@ -254,12 +290,16 @@ impl Attractor {
         self.covers[state.index()].as_ref()
     }
 
-    /// Radius of a frame state's ball, in the frame's unit.
-    pub(crate) fn ball_radius(&self, state: StateId) -> f64 {
-        match self.bound(state) {
-            StateBound::Frame { reach, .. } => cell::matrix_norm(reach),
-            StateBound::Hull { .. } => f64::INFINITY,
-        }
+    /// Parameters of a state's points, where its curves or faces are proven to have linear precision.
+    #[must_use]
+    pub fn precision(&self, state: StateId) -> Option<&LinearPrecision> {
+        self.precisions[state.index()].as_ref()
+    }
+
+    /// Whether cells of a state may be needles: it is proven connected, and its cells are of different proportions.
+    pub(crate) fn has_needles(&self, state: StateId) -> bool {
+        let varies = matches!(self.bound(state), StateBound::Frame { similar: false, .. });
+        varies && self.connected[state.index()].is_some() && self.cover(state).is_some()
     }
 
     /// The bound of a state.

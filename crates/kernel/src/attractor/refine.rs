@@ -1,14 +1,12 @@
-//! Evaluation: cells refined, depth first and in address order, until what stands for each is within
-//! the tolerance.
+//! Evaluation: what stands for the cells of a walk, as a tessellation, whole or in pieces.
 
-use super::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared};
+use super::cell::{Point, Site, distance_squared};
+use super::walk::{Collector, Extent, walk};
 use super::{Attractor, complex};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::tessellation::Tessellation;
 use crate::tolerance::Tolerance;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Why an evaluation has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -23,6 +21,18 @@ pub enum RefineError {
         allowed: u64,
         /// What was asked.
         tolerance_mm: f64,
+        /// A tolerance that would pass, as far as the cells refined so far tell.
+        reachable_mm: f64,
+    },
+    /// More memory than allowed.
+    #[error("the tolerance of {tolerance_mm} mm needs more than {allowed_bytes} bytes for its {leaf_cells} cells and more")]
+    Memory {
+        /// The limit.
+        allowed_bytes: u64,
+        /// What was asked.
+        tolerance_mm: f64,
+        /// Leaf cells that filled it.
+        leaf_cells: u64,
         /// A tolerance that would pass, as far as the cells refined so far tell.
         reachable_mm: f64,
     },
@@ -44,7 +54,7 @@ impl RefineError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
-            Self::Cells { .. } | Self::Depth { .. } => Kind::Limit,
+            Self::Cells { .. } | Self::Memory { .. } | Self::Depth { .. } => Kind::Limit,
         }
     }
 
@@ -54,6 +64,7 @@ impl RefineError {
         match self {
             Self::Stopped(stopped) => stopped.code(),
             Self::Cells { .. } => "limit-cells",
+            Self::Memory { .. } => "limit-memory",
             Self::Depth { .. } => "limit-depth",
         }
     }
@@ -69,6 +80,12 @@ impl RefineError {
                 allowed: *allowed as f64,
                 remedy: Some(("tolerance_mm", *reachable_mm)),
             }),
+            Self::Memory { allowed_bytes, reachable_mm, .. } => Some(LimitFacts {
+                limit: "memory_bytes",
+                asked: *allowed_bytes as f64 + 1.0,
+                allowed: *allowed_bytes as f64,
+                remedy: Some(("tolerance_mm", *reachable_mm)),
+            }),
             Self::Depth { allowed, reached_mm, .. } => Some(LimitFacts {
                 limit: "depth",
                 asked: f64::from(*allowed) + 1.0,
@@ -77,106 +94,6 @@ impl RefineError {
             }),
         }
     }
-}
-
-/// Leaves of one task before the next look at the budget.
-const LEAVES_PER_CHECK: u64 = 4096;
-/// Tasks that evaluation is split into.
-const TASKS: usize = 256;
-
-struct Walker<'a> {
-    attractor: &'a Attractor,
-    budget: &'a Budget,
-    tolerance_mm: f64,
-    total: &'a AtomicU64,
-    /// Control points of the children on the current path, one buffer per depth.
-    buffers: Vec<Vec<ControlPoint>>,
-    leaves: u64,
-    deviation: f64,
-}
-
-impl<'a> Walker<'a> {
-    /// A walker that begins at cells of the given depth.
-    fn new(attractor: &'a Attractor, budget: &'a Budget, tolerance_mm: f64, total: &'a AtomicU64, depth: u32) -> Self {
-        Self { attractor, budget, tolerance_mm, total, buffers: vec![Vec::new(); depth as usize], leaves: 0, deviation: 0.0 }
-    }
-
-    fn descend(&mut self, cell: &Cell, points: &[ControlPoint], depth: u32, sink: &mut impl FnMut(Site)) -> Result<(), RefineError> {
-        let error = self.attractor.leaf_error(cell, points);
-        if error <= self.tolerance_mm {
-            self.leaves += 1;
-            self.deviation = self.deviation.max(error);
-            if self.leaves.is_multiple_of(LEAVES_PER_CHECK) {
-                self.check(error)?;
-            }
-            self.attractor.emit(cell, points, sink);
-            return Ok(());
-        }
-        if depth >= self.budget.limits.depth {
-            return Err(RefineError::Depth { allowed: self.budget.limits.depth, tolerance_mm: self.tolerance_mm, reached_mm: error });
-        }
-        if self.buffers.len() <= depth as usize {
-            self.buffers.push(Vec::new());
-        }
-        let state = self.attractor.state_of(cell);
-        for (index, transition) in state.transitions.iter().enumerate() {
-            let mut child = std::mem::take(&mut self.buffers[depth as usize]);
-            child.resize(transition.operator.columns(), [0.0; 4]);
-            child_points(points, &transition.operator, &mut child);
-            let child_cell = self.attractor.child_cell(cell, index, &child);
-            let result = self.descend(&child_cell, &child, depth + 1, sink);
-            self.buffers[depth as usize] = child;
-            result?;
-        }
-        Ok(())
-    }
-
-    fn check(&self, error: f64) -> Result<(), RefineError> {
-        self.budget.cancel.check()?;
-        let so_far = self.total.fetch_add(LEAVES_PER_CHECK, Ordering::Relaxed) + LEAVES_PER_CHECK;
-        let allowed = self.budget.limits.cells;
-        if so_far > allowed {
-            return Err(RefineError::Cells {
-                allowed,
-                tolerance_mm: self.tolerance_mm,
-                reachable_mm: (2.0 * error).max(2.0 * self.tolerance_mm),
-            });
-        }
-        if so_far.is_multiple_of(64 * LEAVES_PER_CHECK) {
-            self.budget.report("refine", 0.0, so_far);
-        }
-        Ok(())
-    }
-}
-
-/// Splits the roots into about [`TASKS`] cells, in address order.
-fn tasks(attractor: &Attractor, indices: &[usize], tolerance_mm: f64) -> Vec<(Cell, Vec<ControlPoint>, u32)> {
-    let roots = attractor.roots();
-    let mut level: Vec<_> = indices.iter().map(|&index| (attractor.root_cell(index), roots[index].points.clone(), 0)).collect();
-    for _ in 0..24 {
-        if level.len() >= TASKS {
-            break;
-        }
-        let mut next = Vec::with_capacity(level.len() * 2);
-        let mut split = false;
-        for (cell, points, depth) in level {
-            if attractor.leaf_error(&cell, &points) <= tolerance_mm {
-                next.push((cell, points, depth));
-                continue;
-            }
-            split = true;
-            for (index, transition) in attractor.state_of(&cell).transitions.iter().enumerate() {
-                let mut child = vec![[0.0; 4]; transition.operator.columns()];
-                child_points(&points, &transition.operator, &mut child);
-                next.push((attractor.child_cell(&cell, index, &child), child, depth + 1));
-            }
-        }
-        level = next;
-        if !split {
-            break;
-        }
-    }
-    level
 }
 
 /// Refines every cell until what stands for it is within the tolerance, and draws it.
@@ -189,35 +106,57 @@ fn tasks(attractor: &Attractor, indices: &[usize], tolerance_mm: f64) -> Vec<(Ce
 pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, RefineError> {
     let (with_brep, without): (Vec<usize>, Vec<usize>) = (0..attractor.roots().len()).partition(|&root| attractor.has_brep(root));
     let mut whole = Part { tessellation: complex::refine(attractor, &with_brep, tolerance, budget)?, ..Part::default() };
-    let total = AtomicU64::new(whole.tessellation.leaf_cells);
-    let tolerance_mm = tolerance.mm();
-    let parts: Vec<Result<Part, RefineError>> = tasks(attractor, &without, tolerance_mm)
-        .par_iter()
-        .with_max_len(1)
-        .map(|(cell, points, depth)| {
-            let mut walker = Walker::new(attractor, budget, tolerance.mm(), &total, *depth);
-            let mut part = Part::default();
-            walker.descend(cell, points, *depth, &mut |site| part.push(site))?;
-            part.tessellation.leaf_cells = walker.leaves;
-            part.tessellation.deviation_mm = walker.deviation;
-            Ok(part)
-        })
-        .collect();
-    for part in parts {
-        whole.append(part?);
-    }
-    let cells = whole.tessellation.leaf_cells;
-    if cells > budget.limits.cells {
-        return Err(RefineError::Cells { allowed: budget.limits.cells, tolerance_mm, reachable_mm: 2.0 * tolerance_mm });
-    }
-    budget.report("refine", 1.0, cells);
-    // Products of depth 60 lose less than 1e-12 relative; the bound declares ten times that.
-    whole.tessellation.deviation_mm += 1e-11 * largest_coordinate(&whole.tessellation.vertices);
+    let before = Extent { leaf_cells: whole.tessellation.leaf_cells, deviation_mm: whole.tessellation.deviation_mm };
+    let extent = walk(attractor, &without, before, tolerance, budget, &mut |part: Part| -> Result<(), RefineError> {
+        whole.append(part);
+        whole.check_memory(tolerance, budget)
+    })?;
+    whole.tessellation.leaf_cells = extent.leaf_cells;
+    whole.tessellation.deviation_mm = extent.deviation_mm + rounding_mm(largest_coordinate(&whole.tessellation.vertices));
     Ok(whole.tessellation)
 }
 
+/// What a streamed evaluation was, as a whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Streamed {
+    /// Leaf cells evaluated.
+    pub leaf_cells: u64,
+    /// Hausdorff bound reached, in mm.
+    pub deviation_mm: f64,
+}
+
+/// Refines as [`refine`] does, and hands the result over in pieces, in address order, without holding more than a
+/// few of them: memory stays flat, whatever the number of leaves.
+///
+/// A piece's indices refer to its own vertices: segments that meet at the border of two pieces have each their own
+/// vertex there. Its `leaf_cells` and `deviation_mm` (rounding not included) are its own. All pieces together hold
+/// what [`refine`] gives, in its order, for any number of threads; only cells with a B-rep are drawn one by one here,
+/// not as a complex.
+///
+/// # Errors
+/// [`RefineError`] when a limit is hit or somebody stops it, or what `sink` returns.
+pub fn stream<E: From<RefineError>>(
+    attractor: &Attractor,
+    tolerance: Tolerance,
+    budget: &Budget,
+    sink: &mut dyn FnMut(Tessellation) -> Result<(), E>,
+) -> Result<Streamed, E> {
+    let mut largest = 0.0_f64;
+    let all: Vec<usize> = (0..attractor.roots().len()).collect();
+    let extent = walk(attractor, &all, Extent::default(), tolerance, budget, &mut |part: Part| {
+        largest = largest.max(largest_coordinate(&part.tessellation.vertices));
+        sink(part.tessellation)
+    })?;
+    Ok(Streamed { leaf_cells: extent.leaf_cells, deviation_mm: extent.deviation_mm + rounding_mm(largest) })
+}
+
+/// Products of depth 60 lose less than 1e-12 relative; the bound declares ten times that.
+fn rounding_mm(largest_coordinate: f64) -> f64 {
+    1e-11 * largest_coordinate
+}
+
 fn largest_coordinate(vertices: &[glam::DVec3]) -> f64 {
-    vertices.par_iter().map(|vertex| vertex.abs().max_element()).reduce(|| 0.0, f64::max)
+    vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max)
 }
 
 /// Visits all leaf cells at the tolerance without storing them, and counts them: for benchmarks and plans.
@@ -225,23 +164,32 @@ fn largest_coordinate(vertices: &[glam::DVec3]) -> f64 {
 /// # Errors
 /// As [`refine`].
 pub fn count_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<u64, RefineError> {
-    let total = AtomicU64::new(0);
     let all: Vec<usize> = (0..attractor.roots().len()).collect();
-    tasks(attractor, &all, tolerance.mm())
-        .par_iter()
-        .with_max_len(1)
-        .map(|(cell, points, depth)| {
-            let mut walker = Walker::new(attractor, budget, tolerance.mm(), &total, *depth);
-            let mut sum = 0.0;
-            walker.descend(cell, points, *depth, &mut |site| {
-                if let Site::Point(point) = site {
-                    sum += point[0];
-                }
-            })?;
-            std::hint::black_box(sum);
-            Ok(walker.leaves)
-        })
-        .try_reduce(|| 0, |a, b| Ok(a + b))
+    let mut drop = |_: Unseen| -> Result<(), RefineError> { Ok(()) };
+    walk(attractor, &all, Extent::default(), tolerance, budget, &mut drop).map(|extent| extent.leaf_cells)
+}
+
+/// Sites that are computed and dropped.
+#[derive(Default)]
+struct Unseen;
+
+impl Collector for Unseen {
+    #[inline]
+    fn push(&mut self, site: Site) {
+        std::hint::black_box(site);
+    }
+}
+
+impl Collector for Part {
+    #[inline]
+    fn push(&mut self, site: Site) {
+        self.draw(site);
+    }
+
+    fn finish(&mut self, extent: Extent) {
+        self.tessellation.leaf_cells = extent.leaf_cells;
+        self.tessellation.deviation_mm = extent.deviation_mm;
+    }
 }
 
 /// A piece of a tessellation in the making.
@@ -269,7 +217,7 @@ impl Part {
         distance_squared(&vertex, point) <= (1e-12 * scale).powi(2)
     }
 
-    fn push(&mut self, site: Site) {
+    fn draw(&mut self, site: Site) {
         match site {
             Site::Point(point) => {
                 let index = self.vertex(&point);
@@ -296,7 +244,22 @@ impl Part {
         }
     }
 
+    /// Vectors grow to twice what they hold.
+    fn check_memory(&self, tolerance: Tolerance, budget: &Budget) -> Result<(), RefineError> {
+        let Tessellation { vertices, points, segments, triangles, .. } = &self.tessellation;
+        let bytes = 2 * (24 * vertices.len() + 4 * points.len() + 8 * segments.len() + 12 * triangles.len()) as u64;
+        let allowed_bytes = budget.limits.memory_bytes;
+        if bytes <= allowed_bytes {
+            return Ok(());
+        }
+        let leaf_cells = (points.len() + segments.len() + triangles.len()) as u64;
+        Err(RefineError::Memory { allowed_bytes, tolerance_mm: tolerance.mm(), leaf_cells, reachable_mm: 2.0 * tolerance.mm() })
+    }
+
     fn append(&mut self, other: Part) {
+        if other.tessellation.vertices.is_empty() {
+            return;
+        }
         let shared = match (self.open_end, other.open_start) {
             (Some(end), Some(0)) if self.same(end, &other.tessellation.vertices[0].to_array()) => Some(end),
             _ => None,
@@ -314,8 +277,6 @@ impl Part {
         self.tessellation.points.extend(other.tessellation.points.into_iter().map(place));
         self.tessellation.segments.extend(other.tessellation.segments.into_iter().map(|ends| ends.map(place)));
         self.tessellation.triangles.extend(other.tessellation.triangles.into_iter().map(|corners| corners.map(place)));
-        self.tessellation.leaf_cells += other.tessellation.leaf_cells;
-        self.tessellation.deviation_mm = self.tessellation.deviation_mm.max(other.tessellation.deviation_mm);
         self.open_end = other.open_end.map(place);
     }
 }

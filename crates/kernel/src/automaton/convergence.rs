@@ -47,6 +47,12 @@ impl Contraction {
         self.norms[state.index()].length(&difference)
     }
 
+    /// C y for a point y of an affine frame: coordinates in which the adapted norm is the Euclidean one.
+    pub(crate) fn rounded(&self, state: StateId, y: &[f64; 3]) -> [f64; 3] {
+        let factor = &self.norms[state.index()].factor;
+        std::array::from_fn(|row| (row..3).map(|column| factor.at(row, column) * y[column]).sum())
+    }
+
     /// Columns u_j of C^-1: the ellipsoid {sum_j u_j x_j, |x| <= 1} is the unit ball of the norm, in the
     /// coordinates of e_i - e_0.
     pub(crate) fn unit_ball(&self, state: StateId) -> Vec<Vec<f64>> {
@@ -112,8 +118,7 @@ pub fn contraction(automaton: &Automaton) -> Contraction {
     // A bound of norms is proven under rounding; a radius is computed, and gives way to it.
     let rate = upper.rate.max(lower.rate.min(if upper.rate < 1.0 { upper.rate } else { f64::INFINITY }));
     let cycle = lower.cycle.map_or((StateId::new(0), Vec::new()), |(state, word)| (StateId::new(state), word));
-    let mut result =
-        Contraction { lower: lower.rate.min(rate), upper: rate, cycle, depth: upper.depth, transient: 1.0, norms, step_norms };
+    let mut result = Contraction { lower: lower.rate.min(rate), upper: rate, cycle, depth: upper.depth, transient: 1.0, norms, step_norms };
     result.transient = transient(&result, &upper, &successors, &component);
     result
 }
@@ -134,7 +139,8 @@ fn bounds(
     let operators: Vec<Vec<Step>> = automaton.states().iter().enumerate().map(|(index, state)| operators(state, index, inner)).collect();
     let mut second = search(&operators, Norm::ColumnDifference, lower, FIRST_WORK);
     if second.rate < 1.0 {
-        let change = norms.iter().map(AdaptedNorm::sum_ratio).fold(0.0, f64::max) * norms.iter().map(AdaptedNorm::corner).fold(0.0, f64::max);
+        let change =
+            norms.iter().map(AdaptedNorm::sum_ratio).fold(0.0, f64::max) * norms.iter().map(AdaptedNorm::corner).fold(0.0, f64::max);
         second.largest.iter_mut().for_each(|norm| *norm *= change);
         return second;
     }

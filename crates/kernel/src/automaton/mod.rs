@@ -2,7 +2,7 @@
 
 mod connection;
 pub mod convergence;
-mod matrix;
+pub(crate) mod matrix;
 pub mod operator;
 pub mod topology;
 
@@ -11,6 +11,7 @@ pub use convergence::Contraction;
 pub use operator::{OperatorError, SubdivisionOperator};
 
 use crate::model::CellKind;
+use std::collections::BTreeMap;
 
 /// Index of a [`State`] in its [`Automaton`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -114,6 +115,8 @@ pub struct State {
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Automaton {
     states: Vec<State>,
+    /// Parameters that models claim for control points; see [`Self::claim_parameters`].
+    claims: BTreeMap<StateId, Vec<[f64; 2]>>,
 }
 
 /// Why states do not form an automaton.
@@ -173,7 +176,7 @@ impl Automaton {
                 check(format!("boundary {index}"), boundary.state, &boundary.incidence)?;
             }
         }
-        Ok(Self { states })
+        Ok(Self { states, claims: BTreeMap::new() })
     }
 
     /// The states, in order of their ids.
@@ -186,6 +189,16 @@ impl Automaton {
     #[must_use]
     pub fn state(&self, id: StateId) -> &State {
         &self.states[id.index()]
+    }
+
+    /// Notes, for some states, parameters of their control points with which their curves or faces have linear precision
+    /// at the ratio 1/2, over unit intervals or squares. Claims are verified before use, and save a search.
+    pub(crate) fn claim_parameters(&mut self, claims: BTreeMap<StateId, Vec<[f64; 2]>>) {
+        self.claims = claims;
+    }
+
+    pub(crate) fn claimed_parameters(&self) -> &BTreeMap<StateId, Vec<[f64; 2]>> {
+        &self.claims
     }
 
     /// Chooses chords for edges that are proven to be curves, and polygons for faces whose sides close.

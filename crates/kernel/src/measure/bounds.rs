@@ -162,7 +162,18 @@ fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axi
             let project = |point: &ControlPoint| sign * if rational { point[axis] / point[3] } else { point[axis] };
             ceiling = ceiling.min(points.iter().map(project).fold(f64::NEG_INFINITY, f64::max));
         }
-        StateBound::Hull { .. } => {}
+        StateBound::Hull { margin, .. } => {
+            // The proof of the margin holds in every coordinate: x lies within margin times their spread of the control
+            // points' interval. Flat shapes are exact at once here too.
+            if !attractor.roots()[cell.root as usize].rational {
+                let (least, most) = points
+                    .iter()
+                    .map(|point| sign * point[axis])
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
+                floor = floor.max(least - margin * (most - least));
+                ceiling = ceiling.min(most + margin * (most - least));
+            }
+        }
         StateBound::Frame { low, high, .. } => {
             let (mut least, mut most) = (sign * points[0][axis], sign * points[0][axis]);
             for j in 0..3 {

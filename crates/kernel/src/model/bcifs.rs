@@ -1,11 +1,14 @@
 //! Boundary controlled iterated function systems, stated in full.
 
 use super::lower::Draft;
+use super::solve::{GLUE_ALLOWED, SolveError, permutation_of};
 use crate::attractor::{Gluing, Root};
 use crate::automaton::topology::{Declared, Shared};
 use crate::automaton::{Boundary, LeafPrimitive, OperatorError, State, StateId, SubdivisionOperator, Transition};
+use crate::budget::CancelToken;
 use glam::DVec4;
-use std::collections::BTreeMap;
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Topological kind of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -83,7 +86,7 @@ pub struct Incidence {
     pub children: Vec<(usize, usize)>,
 }
 
-/// Two children share a boundary.
+/// Two children share a boundary. Without `reversed` or `permutation` the control points agree in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adjacency {
     /// Name of the state.
@@ -92,6 +95,28 @@ pub struct Adjacency {
     pub between: [(usize, usize); 2],
     /// Whether the second is seen from its other end.
     pub reversed: bool,
+    /// Control point j of the first boundary is control point `permutation[j]` of the second; `reversed` is the
+    /// permutation that reverses the order, and not both may be given.
+    pub permutation: Option<Vec<usize>>,
+}
+
+/// One side of a [`Relation`]: T_i T_j ... b_m b_p ..., the nested boundary of a descendant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Side {
+    /// Word i j ... of transitions from the relation's state.
+    pub path: Vec<usize>,
+    /// Word m p ... of boundaries from the descendant.
+    pub boundary: Vec<usize>,
+}
+
+/// Two products of operators and embeddings are equal: constraints over several levels, delays, coherence
+/// of nested boundaries.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Relation {
+    /// Name of the state where both sides begin.
+    pub state: String,
+    /// The two sides, which end in states of one dimension.
+    pub equal: [Side; 2],
 }
 
 /// A root cell: its state and its control points (x, y, z, w), w = 1 unless rational.
@@ -99,8 +124,8 @@ pub struct Adjacency {
 pub struct RootCell {
     /// Name of the state.
     pub state: String,
-    /// Points in mm with their weight: (x, y, z, w), not yet multiplied by w.
-    pub control_points: Vec<DVec4>,
+    /// Points in mm with their weight: (x, y, z, w), not yet multiplied by w; `None` is to be placed.
+    pub control_points: Vec<Option<DVec4>>,
 }
 
 /// Two boundaries of root cells that are one.
@@ -110,6 +135,9 @@ pub struct Glue {
     pub between: [(usize, usize); 2],
     /// Whether the second is seen from its other end.
     pub reversed: bool,
+    /// Control point j of the first boundary is control point `permutation[j]` of the second; `reversed` is the
+    /// permutation that reverses the order, and not both may be given.
+    pub permutation: Option<Vec<usize>>,
 }
 
 /// A BC-IFS with its control points.
@@ -121,6 +149,8 @@ pub struct Bcifs {
     pub incidences: Vec<Incidence>,
     /// Adjacency constraints.
     pub adjacencies: Vec<Adjacency>,
+    /// Longer constraints.
+    pub relations: Vec<Relation>,
     /// The root cells.
     pub cells: Vec<RootCell>,
     /// Root boundaries that are one.
@@ -131,7 +161,7 @@ pub struct Bcifs {
 
 /// Constraints may be violated by this much in barycentric coordinates: operators printed with few digits
 /// leave 1e-6.
-const RESIDUAL_ALLOWED: f64 = 1e-4;
+pub(super) const RESIDUAL_ALLOWED: f64 = 1e-4;
 
 impl Bcifs {
     pub(super) fn lower(&self, draft: &mut Draft) {
@@ -141,12 +171,21 @@ impl Bcifs {
         if self.cells.is_empty() {
             return draft.error("/cells", "automaton.empty", "the model has no root cell".into());
         }
+        if self.has_unknowns() {
+            // What is filled in has no unknown, so this happens once.
+            if let Some(filled) = self.determined(draft) {
+                filled.lower(draft);
+            }
+            return;
+        }
         let reader = Reader { model: self, offset: draft.states.len(), reachable: self.reachable(), index: self.index() };
         let errors_before = draft.findings.iter().filter(|finding| !finding.warning).count();
         let states: Vec<State> = (0..self.states.len()).map(|index| reader.state(index, draft)).collect();
+        let first_root = draft.roots.len();
         reader.roots(draft);
         if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
             reader.constraints(&states, draft);
+            reader.seams(&states, first_root, draft);
         }
         draft.declared.resize(draft.states.len(), Declared::default());
         draft.declared.extend(reader.declared());
@@ -156,12 +195,70 @@ impl Bcifs {
         }
     }
 
-    fn index(&self) -> BTreeMap<&str, usize> {
+    /// Whether something that matters is to be solved.
+    fn has_unknowns(&self) -> bool {
+        let unknown = |matrix: &Matrix| matrix.rows.iter().flatten().any(|entry| *entry == Entry::Unknown);
+        let of = |state: &BcifsState| {
+            state.transitions.iter().any(|t| unknown(&t.operator)) || state.boundaries.iter().any(|b| unknown(&b.incidence))
+        };
+        self.cells.iter().any(|cell| cell.control_points.contains(&None))
+            || self.states.iter().zip(self.reachable()).any(|(state, reached)| reached && of(state))
+    }
+
+    /// The model with its unknowns filled in, if the constraints leave one way and the declared parameters are kept.
+    fn determined(&self, draft: &mut Draft) -> Option<Self> {
+        let values: BTreeMap<String, f64> = self.used_parameters().into_iter().collect();
+        let solution = match self.solve(&values, &CancelToken::new()) {
+            Ok(solution) => solution,
+            Err(SolveError::Invalid(findings)) => {
+                findings.into_iter().for_each(|finding| draft.error(&finding.pointer, finding.code, finding.message));
+                return None;
+            }
+            Err(error) => {
+                let place = match &error {
+                    SolveError::Contradiction { constraints } => constraints.first().map_or("", |constraint| &constraint.pointer),
+                    _ => "/states",
+                };
+                draft.error(place, error.code(), error.to_string());
+                return None;
+            }
+        };
+        let ignored: Vec<String> =
+            self.reachable().iter().enumerate().filter(|(_, reached)| !**reached).map(|(s, _)| format!("/states/{s}/")).collect();
+        let free: Vec<_> = solution
+            .parameters
+            .iter()
+            .filter(|parameter| !parameter.declared && !ignored.iter().any(|place| parameter.pointer.starts_with(place)))
+            .collect();
+        let Some(first) = free.first() else { return Some(solution.model) };
+        let names = free.iter().take(8).map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");
+        let more = if free.len() > 8 { ", ..." } else { "" };
+        let message = format!(
+            "the constraints leave {} degrees of freedom: {names}{more}. Give these entries values, or let `lacuna solve` choose them",
+            free.len()
+        );
+        draft.error(&first.pointer, "automaton.underdetermined", message);
+        None
+    }
+
+    /// Declared parameters that entries name.
+    fn used_parameters(&self) -> Vec<(String, f64)> {
+        let matrices = self.states.iter().flat_map(|state| {
+            state.transitions.iter().map(|t| &t.operator).chain(state.boundaries.iter().map(|boundary| &boundary.incidence))
+        });
+        let used: BTreeSet<&str> = matrices
+            .flat_map(|matrix| matrix.rows.iter().flatten())
+            .filter_map(|entry| if let Entry::Parameter(name) = entry { Some(name.as_str()) } else { None })
+            .collect();
+        self.parameters.iter().filter(|(name, _)| used.contains(name.as_str())).cloned().collect()
+    }
+
+    pub(super) fn index(&self) -> BTreeMap<&str, usize> {
         self.states.iter().enumerate().map(|(index, state)| (state.name.as_str(), index)).collect()
     }
 
     /// States that a root cell reaches by transitions and boundaries.
-    fn reachable(&self) -> Vec<bool> {
+    pub(super) fn reachable(&self) -> Vec<bool> {
         let index = self.index();
         let mut reached = vec![false; self.states.len()];
         let mut stack: Vec<usize> = self.cells.iter().filter_map(|cell| index.get(cell.state.as_str()).copied()).collect();
@@ -310,20 +407,27 @@ impl Reader<'_> {
                 draft.error(&format!("{place}/control_points"), "automaton.dimension-mismatch", message);
                 continue;
             }
+            // Unknown points are solved before, so none is left here.
+            let control_points: Vec<DVec4> = cell.control_points.iter().copied().flatten().collect();
             for (k, point) in
-                cell.control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || !super::WEIGHTS.contains(&point.w))
+                control_points.iter().enumerate().filter(|(_, point)| !point.is_finite() || !super::WEIGHTS.contains(&point.w))
             {
                 let message = format!("control point {k} is {point}: coordinates must be finite and the weight positive");
                 draft.error(&format!("{place}/control_points/{k}"), "model.not-finite", message);
             }
-            let rational = cell.control_points.iter().any(|point| point.w != cell.control_points[0].w);
+            let rational = control_points.iter().any(|point| point.w != control_points[0].w);
             let homogeneous = |p: &glam::DVec4| {
                 let w = if rational { p.w } else { 1.0 };
                 [w * p.x, w * p.y, w * p.z, w]
             };
-            let points = cell.control_points.iter().map(homogeneous).collect();
+            let points = control_points.iter().map(homogeneous).collect();
             draft.roots.push(Root { state: StateId::new(self.offset + state), points, rational, solid: None });
         }
+    }
+
+    /// Whether the state of that name exists and nothing reaches it.
+    fn ignores(&self, state: &str) -> bool {
+        self.index.get(state).is_some_and(|&index| !self.reachable[index])
     }
 
     /// What the model says of every state's subdivision.
@@ -336,22 +440,24 @@ impl Reader<'_> {
         }
         for adjacency in &self.model.adjacencies {
             if let Some(&state) = self.index.get(adjacency.state.as_str()) {
-                let permutation = adjacency.reversed.then(|| self.reversal(state, adjacency.between[0])).flatten();
+                let permutation = self.order(state, adjacency);
                 declared[state].adjacencies.push(Shared { between: adjacency.between, permutation });
             }
         }
         declared
     }
 
-    /// The reversing permutation of boundary m of child i.
-    fn reversal(&self, state: usize, (child, boundary): (usize, usize)) -> Option<Vec<usize>> {
-        let target = self.index.get(self.model.states[state].transitions.get(child)?.to.as_str())?;
-        self.reversal_of(*target, boundary)
+    /// Control point j of the first boundary is control point `order[j]` of the second; `None` for the same order (or where
+    /// the constraint does not fit, which its check reports).
+    fn order(&self, state: usize, adjacency: &Adjacency) -> Option<Vec<usize>> {
+        let (child, boundary) = adjacency.between[0];
+        let target = *self.index.get(self.model.states[state].transitions.get(child)?.to.as_str())?;
+        self.order_of(target, boundary, adjacency.reversed, adjacency.permutation.as_deref())
     }
 
-    fn reversal_of(&self, state: usize, boundary: usize) -> Option<Vec<usize>> {
-        let edge = self.index.get(self.model.states[state].boundaries.get(boundary)?.state.as_str())?;
-        Some((0..self.model.states[*edge].dimension).rev().collect())
+    fn order_of(&self, state: usize, boundary: usize, reversed: bool, permutation: Option<&[usize]>) -> Option<Vec<usize>> {
+        let edge = *self.index.get(self.model.states[state].boundaries.get(boundary)?.state.as_str())?;
+        permutation_of(reversed, permutation, self.model.states[edge].dimension).ok().flatten()
     }
 
     /// Which boundaries of root cells are one.
@@ -359,7 +465,8 @@ impl Reader<'_> {
         let first = draft.roots.len() - self.model.cells.len().min(draft.roots.len());
         for glue in &self.model.glue {
             let root = |(cell, _): (usize, usize)| self.model.cells.get(cell).and_then(|cell| self.index.get(cell.state.as_str()));
-            let permutation = root(glue.between[0]).filter(|_| glue.reversed).and_then(|&state| self.reversal_of(state, glue.between[0].1));
+            let permutation = root(glue.between[0])
+                .and_then(|&state| self.order_of(state, glue.between[0].1, glue.reversed, glue.permutation.as_deref()));
             let between = glue.between.map(|(cell, boundary)| (first + cell, boundary));
             let side = |(cell, boundary): (usize, usize)| {
                 let root: &Root = draft.roots.get(cell)?;
@@ -379,18 +486,95 @@ impl Reader<'_> {
         }
     }
 
-    /// Checks the stated incidences and adjacencies; the residual is the largest difference of entries.
+    /// Checks the stated incidences, adjacencies and relations; the residual is the largest difference of entries.
     fn constraints(&self, states: &[State], draft: &mut Draft) {
-        for (index, incidence) in self.model.incidences.iter().enumerate() {
+        for (index, incidence) in self.model.incidences.iter().enumerate().filter(|(_, incidence)| !self.ignores(&incidence.state)) {
             let place = format!("/incidences/{index}");
             let sides = self.incidence(incidence, states);
             self.judge(draft, &place, "automaton.incidence-mismatch", sides);
         }
-        for (index, adjacency) in self.model.adjacencies.iter().enumerate() {
+        for (index, adjacency) in self.model.adjacencies.iter().enumerate().filter(|(_, adjacency)| !self.ignores(&adjacency.state)) {
             let place = format!("/adjacencies/{index}");
             let sides = self.adjacency(adjacency, states);
             self.judge(draft, &place, "automaton.adjacency-mismatch", sides);
         }
+        for (index, relation) in self.model.relations.iter().enumerate().filter(|(_, relation)| !self.ignores(&relation.state)) {
+            let sides = self.relation(relation, states);
+            self.judge(draft, &format!("/relations/{index}"), "automaton.relation-mismatch", sides);
+        }
+    }
+
+    /// The product along a side, column after column, and the state where it ends.
+    fn product<'s>(&self, states: &'s [State], state: &'s State, side: &Side) -> Result<(Columns, &'s State), String> {
+        let mut factors = Vec::new();
+        let mut current = state;
+        for &child in &side.path {
+            let found = current.transitions.get(child).ok_or_else(|| format!("state '{}' has no child {child}", current.name))?;
+            factors.push(&found.operator);
+            current = self.local(states, found.to);
+        }
+        for &boundary in &side.boundary {
+            let found = current.boundaries.get(boundary).ok_or_else(|| format!("state '{}' has no boundary {boundary}", current.name))?;
+            factors.push(&found.incidence);
+            current = self.local(states, found.state);
+        }
+        let (last, rest) = factors.split_last().ok_or("a side names neither a child nor a boundary")?;
+        let image = |j| rest.iter().rev().fold(last.column(j).to_vec(), |column, factor| factor.apply(&column));
+        Ok(((0..last.columns()).map(image).collect(), current))
+    }
+
+    fn relation(&self, relation: &Relation, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
+        let state = self.find(states, &relation.state)?;
+        let [(left, _), (right, _)] = [self.product(states, state, &relation.equal[0])?, self.product(states, state, &relation.equal[1])?];
+        let [first, second] = &relation.equal;
+        let words = |side: &Side| format!("(child {:?}, boundary {:?})", side.path, side.boundary);
+        Ok(vec![(format!("{} and {} of state '{}'", words(first), words(second), state.name), left, right)])
+    }
+
+    /// Checks that glued boundaries have the same control points: P_a b_m = P_b b_n, homogeneous.
+    fn seams(&self, states: &[State], first_root: usize, draft: &mut Draft) {
+        let size = extent(&draft.roots[first_root..]);
+        for (index, glue) in self.model.glue.iter().enumerate() {
+            let place = format!("/glue/{index}");
+            let [(c, m), (d, n)] = glue.between;
+            let words = format!("boundary {m} of root cell {c} and boundary {n} of root cell {d}");
+            let roots = &draft.roots[first_root..];
+            let sides = self.glued(states, roots, (c, m)).and_then(|(left, first)| {
+                let (right, second) = self.glued(states, roots, (d, n))?;
+                if first.name != second.name {
+                    return Err(format!("{words} are of different states, '{}' and '{}'", first.name, second.name));
+                }
+                let permutation = permutation_of(glue.reversed, glue.permutation.as_deref(), left.len())?;
+                Ok((left, permuted(right, permutation)))
+            });
+            let (left, right) = match sides {
+                Ok(sides) => sides,
+                Err(message) => {
+                    draft.error(&place, "automaton.glue-mismatch", message);
+                    continue;
+                }
+            };
+            let residual = left.iter().flatten().zip(right.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            draft.constraint_residual = draft.constraint_residual.max(residual / size);
+            let allowed = GLUE_ALLOWED * size;
+            // Written so that a residual that is not a number is refused.
+            if !matches!(residual.partial_cmp(&allowed), Some(Ordering::Less | Ordering::Equal)) {
+                let message = format!("{words} are {residual:.3e} mm apart, and may be {allowed:.1e} mm apart (1e-6 of the model's size)");
+                draft.error(&place, "automaton.glue-mismatch", message);
+            }
+        }
+    }
+
+    /// P b and the boundary's state.
+    fn glued<'s>(&self, states: &'s [State], roots: &[Root], (cell, boundary): (usize, usize)) -> Result<(Columns, &'s State), String> {
+        let root = roots.get(cell).ok_or_else(|| format!("there is no root cell {cell}"))?;
+        let state = self.local(states, root.state);
+        let found = state.boundaries.get(boundary).ok_or_else(|| format!("state '{}' has no boundary {boundary}", state.name))?;
+        let point = |j: usize| -> Vec<f64> {
+            let weights = found.incidence.column(j);
+            (0..4).map(|axis| weights.iter().zip(&root.points).map(|(weight, point)| weight * point[axis]).sum()).collect()
+        };
+        Ok(((0..found.incidence.columns()).map(point).collect(), self.local(states, found.state)))
     }
 
     fn judge(&self, draft: &mut Draft, place: &str, code: &'static str, sides: Result<Vec<(String, Columns, Columns)>, String>) {
@@ -456,25 +640,42 @@ impl Reader<'_> {
         Ok(sides)
     }
 
-    /// T_i b_m = T_j b_m2, the second side's control points in reverse order when `reversed`.
+    /// T_i b_m = T_j b_m2, the second side's control points in the stated order.
     fn adjacency(&self, adjacency: &Adjacency, states: &[State]) -> Result<Vec<(String, Columns, Columns)>, String> {
         let state = self.find(states, &adjacency.state)?;
         let [first, second] = adjacency.between;
         let (left, left_state) = self.child_boundary(states, state, first)?;
-        let (mut right, right_state) = self.child_boundary(states, state, second)?;
+        let (right, right_state) = self.child_boundary(states, state, second)?;
         if left_state != right_state {
             return Err(format!(
                 "boundary {} of child {} and boundary {} of child {} are of different states",
                 first.1, first.0, second.1, second.0
             ));
         }
-        if adjacency.reversed {
-            right.reverse();
-        }
+        let right = permuted(right, permutation_of(adjacency.reversed, adjacency.permutation.as_deref(), left.len())?);
         let paths =
             format!("boundary {} of child {} and boundary {} of child {} of state '{}'", first.1, first.0, second.1, second.0, state.name);
         Ok(vec![(paths, left, right)])
     }
+}
+
+/// Column j becomes column `permutation[j]`.
+fn permuted(columns: Columns, permutation: Option<Vec<usize>>) -> Columns {
+    match permutation {
+        None => columns,
+        Some(permutation) => permutation.into_iter().map(|j| columns[j].clone()).collect(),
+    }
+}
+
+/// The largest extent of the control points, 1 if there is none.
+fn extent(roots: &[Root]) -> f64 {
+    let range = |axis: usize| {
+        let values = roots.iter().flat_map(|root| root.points.iter().map(move |point| point[axis] / point[3]));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        high - low
+    };
+    let size = (0..3).map(range).fold(0.0, f64::max);
+    if size > 0.0 && size.is_finite() { size } else { 1.0 }
 }
 
 /// The point of space with these barycentric coordinates in a root.

@@ -5,6 +5,7 @@ use super::{AffineMap, CellKind, Model, Shape};
 use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
 use crate::automaton::topology::{Declared, Topology, TopologyError};
 use crate::automaton::{Automaton, Boundary, LeafPrimitive, State, StateId, SubdivisionOperator};
+use std::collections::BTreeMap;
 
 /// Something about a model that its author should know: an error, or a warning.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +43,14 @@ pub(super) struct Draft {
     pub(super) declared: Vec<Declared>,
     /// Boundaries of roots that are one.
     pub(super) gluings: Vec<Gluing>,
+    /// Boundaries of roots that are single points in space: (root, boundary).
+    pub(super) collapsed: Vec<(usize, usize)>,
     /// Largest distance between control points of glued boundaries.
     pub(super) seam_mm: f64,
+    /// States whose names tell their content, by name.
+    shared: BTreeMap<String, StateId>,
+    /// Parameters of states' control points; see [`Automaton::claim_parameters`].
+    pub(super) parameters: BTreeMap<StateId, Vec<[f64; 2]>>,
     /// Where every state's transitions are listed in the model.
     origins: Vec<String>,
     /// Where the family that is being lowered stands in the model.
@@ -98,6 +105,19 @@ impl Draft {
         Boundary { state, incidence: SubdivisionOperator::exact(point.len(), point) }
     }
 
+    /// The state of this name and number of control points, and whether it is new: then its content is to be filled in.
+    /// Names of shared states tell their content.
+    pub(super) fn shared_state(&mut self, name: &str, dimension: usize) -> (StateId, bool) {
+        if let Some(&id) = self.shared.get(name) {
+            return (id, false);
+        }
+        let (transitions, boundaries) = (Vec::new(), Vec::new());
+        let leaf = LeafPrimitive::Centre;
+        let id = self.state(State { name: name.into(), kind: None, dimension, transitions, boundaries, leaf, frame: false });
+        self.shared.insert(name.into(), id);
+        (id, true)
+    }
+
     /// Adds a state whose transitions are listed at `pointer` below the current place.
     pub(super) fn state_from(&mut self, state: State, pointer: &str) -> StateId {
         self.states.push(state);
@@ -116,7 +136,11 @@ impl Draft {
             Shape::BezierCurve(curve) => curve.lower(self),
             Shape::CornerCutting(curve) => curve.lower(self),
             Shape::Subdivision(surface) => surface.lower(self),
+            Shape::Curve(curve) => curve.lower(self),
+            Shape::TensorProduct(product) => product.lower(self),
+            Shape::Sum(sum) => sum.lower(self),
             Shape::Mesh(mesh) => mesh.lower(self),
+            Shape::Terrain(terrain) => terrain.lower(self),
             Shape::Group(group) => self.group(group),
         }
     }
@@ -199,12 +223,13 @@ impl Model {
             Err(error) => return Err(incoherent(draft.findings, &error)),
         };
         automaton.connect(&topology);
+        automaton.claim_parameters(std::mem::take(&mut draft.parameters));
         let warnings = draft.findings.iter().map(|finding| finding.message.clone()).collect();
         let attractor = match Attractor::new(automaton, draft.roots, draft.solids, warnings) {
             Ok(attractor) => attractor,
             Err(error) => return Err(fail(draft.findings, &error)),
         };
-        match attractor.with_topology(topology, &draft.gluings, draft.seam_mm) {
+        match attractor.with_topology(topology, &draft.gluings, &draft.collapsed, draft.seam_mm) {
             Ok(attractor) => Ok(Lowered { attractor, findings: draft.findings, constraint_residual: draft.constraint_residual }),
             Err(error) => Err(incoherent(draft.findings, &error)),
         }

@@ -5,19 +5,28 @@ mod bcifs;
 mod bezier;
 mod corner_cutting;
 mod group;
+mod half_edge;
 mod ifs;
 mod lower;
 mod mesh;
+mod scheme;
+pub mod solve;
 mod subdivision;
+mod terrain;
 
-pub use bcifs::{Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, RootCell, TransitionSpec};
+pub use bcifs::{
+    Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Glue, Incidence, Matrix, Relation, RootCell, Side, TransitionSpec,
+};
 pub use bezier::BezierCurve;
 pub use corner_cutting::CornerCutting;
 pub use group::{Group, Part};
+pub use half_edge::{HalfEdge, HalfEdgeMesh, MeshFault};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
+pub use scheme::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct};
 pub use subdivision::{BoundaryRule, Coefficients, Corner, Crease, INFINITE_SHARPNESS, Scheme, Subdivision};
+pub use terrain::{Terrain, TerrainBase};
 
 /// Weights of control points that double precision can project without overflow.
 pub const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
@@ -44,8 +53,16 @@ pub enum Shape {
     CornerCutting(CornerCutting),
     /// The limit surface of a subdivision scheme.
     Subdivision(Subdivision),
+    /// A curve of one of the schemes.
+    Curve(Curve),
+    /// A product of two or three schemes.
+    TensorProduct(TensorProduct),
+    /// The sum of two curves.
+    Sum(Sum),
     /// A polygon mesh.
     Mesh(PolygonMesh),
+    /// A surface of random midpoint displacement.
+    Terrain(Terrain),
     /// Several shapes.
     Group(Group),
 }

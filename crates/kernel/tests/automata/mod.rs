@@ -74,15 +74,16 @@ pub fn extended(rows: &[&[f64]]) -> Columns {
 /// and edges by the rules of Catmull and Clark (1978).
 pub fn catmull_clark(valence: usize) -> Automaton {
     let patch = Patch { valence };
-    let irregular: Vec<(i32, i32)> =
-        vec![(2, -1), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (-1, 2)];
+    let irregular: Vec<(i32, i32)> = vec![(2, -1), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (-1, 2)];
     let mut first: Columns = vec![patch.vertex(0)];
     for i in 0..valence {
         first.push(patch.edge(0, patch.spoke(i)));
         first.push(patch.face(&patch.ring(i)));
     }
     first.extend(irregular.iter().map(|&place| patch.refined(place)));
-    let grid = |x: i32, y: i32| -> Columns { (0..4).flat_map(|i| (0..4).map(move |j| (x + i, y + j))).map(|place| patch.refined(place)).collect() };
+    let grid = |x: i32, y: i32| -> Columns {
+        (0..4).flat_map(|i| (0..4).map(move |j| (x + i, y + j))).map(|place| patch.refined(place)).collect()
+    };
     let regular = tensor(&cubic(), &cubic()).into_iter().map(|columns| (1, columns)).collect();
     automaton(vec![(2 * valence + 8, vec![(0, first), (1, grid(0, -1)), (1, grid(0, 0)), (1, grid(-1, 0))]), (16, regular)])
 }

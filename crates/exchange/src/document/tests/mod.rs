@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod cases;
+mod files;
 mod properties;
 mod reading;
+mod schemes;

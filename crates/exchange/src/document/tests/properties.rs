@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, BoundarySpec, CellKind, Coefficients, Corner, CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence,
-    Interior, Matrix, Model, Part, PolygonMesh, Primitive, RootCell, Scheme, Shape, Subdivision, TransitionSpec,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, BoundarySpec, CellKind, Coefficients, Corner, CornerCutting,
+    Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model, Part, PolygonMesh, Primitive, Relation, RootCell, Scheme, Shape,
+    Side, Subdivision, Terrain, TerrainBase, TransitionSpec,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -97,28 +98,54 @@ fn bcifs() -> impl Strategy<Value = Shape> {
         let names: Vec<String> = parameters.iter().map(|(name, _)| name.clone()).collect();
         let states = [state(0, &names), state(1, &names), state(2, &names)];
         let child = || (0..CHILDREN, 0..BOUNDARIES);
-        let cell = (0..STATES, vec((point(), prop_oneof![Just(1.0), positive()]), 1..4)).prop_map(|(state, points)| RootCell {
-            state: state_name(state),
-            control_points: points.into_iter().map(|(point, weight): (DVec3, f64)| -> DVec4 { point.extend(weight) }).collect(),
-        });
+        let placed = (option::weighted(0.8, point()), prop_oneof![Just(1.0), positive()])
+            .prop_map(|(point, weight): (Option<DVec3>, f64)| -> Option<DVec4> { point.map(|point| point.extend(weight)) });
+        let cell = (0..STATES, vec(placed, 1..4)).prop_map(|(state, control_points)| RootCell { state: state_name(state), control_points });
         let incidence = (0..STATES, 0..BOUNDARIES, vec(child(), 0..3)).prop_map(|(state, boundary, children)| Incidence {
             state: state_name(state),
             boundary,
             children,
         });
-        let adjacency = (0..STATES, [child(), child()], any::<bool>()).prop_map(|(state, between, reversed)| Adjacency {
+        let adjacency = (0..STATES, [child(), child()], orientation()).prop_map(|(state, between, (reversed, permutation))| Adjacency {
             state: state_name(state),
             between,
             reversed,
+            permutation,
         });
-        let glue = ([(0..2_usize, 0..BOUNDARIES), (0..2_usize, 0..BOUNDARIES)], any::<bool>())
-            .prop_map(|(between, reversed)| Glue { between, reversed });
-        (states, vec(cell, 2), vec(incidence, 0..3), vec(adjacency, 0..3), vec(glue, 0..3)).prop_map(
-            move |(states, cells, incidences, adjacencies, glue)| {
-                Shape::Bcifs(Bcifs { states: states.to_vec(), incidences, adjacencies, cells, glue, parameters: parameters.clone() })
-            },
-        )
+        let side = || (vec(0..CHILDREN, 0..4), vec(0..BOUNDARIES, 0..3)).prop_map(|(path, boundary)| Side { path, boundary });
+        let relation = (0..STATES, [side(), side()]).prop_map(|(state, equal)| Relation { state: state_name(state), equal });
+        let glue = ([(0..2_usize, 0..BOUNDARIES), (0..2_usize, 0..BOUNDARIES)], orientation())
+            .prop_map(|(between, (reversed, permutation))| Glue { between, reversed, permutation });
+        let constraints = (vec(incidence, 0..3), vec(adjacency, 0..3), vec(relation, 0..3), vec(glue, 0..3));
+        (states, vec(cell, 2), constraints).prop_map(move |(states, cells, (incidences, adjacencies, relations, glue))| {
+            let parameters = parameters.clone();
+            let mut bcifs = Bcifs { states: states.to_vec(), incidences, adjacencies, relations, cells, glue, parameters };
+            fit_permutations(&mut bcifs);
+            Shape::Bcifs(bcifs)
+        })
     })
+}
+
+/// Reversed or not, or a rotation by so many control points; its length is set by [`fit_permutations`].
+fn orientation() -> impl Strategy<Value = (bool, Option<Vec<usize>>)> {
+    prop_oneof![any::<bool>().prop_map(|reversed| (reversed, None)), (0..9_usize).prop_map(|turn| (false, Some(vec![turn])))]
+}
+
+/// Makes permutations of the rotations that were drawn, as long as the boundaries have control points.
+fn fit_permutations(bcifs: &mut Bcifs) {
+    let find = |name: &str| bcifs.states.iter().find(|state| state.name == name).unwrap();
+    let size = |state: &BcifsState, boundary: usize| find(&state.boundaries[boundary].state).dimension;
+    let fit = |permutation: &mut Option<Vec<usize>>, size: usize| {
+        *permutation = permutation.take().map(|turn| (0..size).map(|index| (index + turn[0]) % size).collect());
+    };
+    for adjacency in &mut bcifs.adjacencies {
+        let (child, boundary) = adjacency.between[0];
+        fit(&mut adjacency.permutation, size(find(&find(&adjacency.state).transitions[child].to), boundary));
+    }
+    for glue in &mut bcifs.glue {
+        let (cell, boundary) = glue.between[0];
+        fit(&mut glue.permutation, size(find(&bcifs.cells[cell].state), boundary));
+    }
 }
 
 fn bezier() -> impl Strategy<Value = Shape> {
@@ -136,8 +163,8 @@ fn subdivision() -> impl Strategy<Value = Shape> {
     let scheme = proptest::sample::select(vec![Scheme::CatmullClark, Scheme::DooSabin, Scheme::Loop]);
     let boundary = proptest::sample::select(vec![BoundaryRule::Smooth, BoundaryRule::SharpCorners]);
     let sharpness = || prop_oneof![number(), Just(f64::INFINITY)];
-    let coefficients = (option::of(vec(0..1_u32, 0..3)), vec(vec(number(), 3..5), 1..3))
-        .prop_map(|(faces, weights)| Coefficients { faces, weights });
+    let coefficients =
+        (option::of(vec(0..1_u32, 0..3)), vec(vec(number(), 3..5), 1..3)).prop_map(|(faces, weights)| Coefficients { faces, weights });
     (mesh_data(), scheme, boundary, vec(sharpness(), 0..3), vec(sharpness(), 0..3), vec(coefficients, 0..2)).prop_map(
         |((vertices, faces), scheme, boundary, creases, corners, coefficients)| {
             let last = vertices.len() as u32 - 1;
@@ -154,12 +181,20 @@ fn subdivision() -> impl Strategy<Value = Shape> {
     )
 }
 
+fn terrain() -> impl Strategy<Value = Shape> {
+    let triangle = [point(), point(), point()].prop_map(TerrainBase::Triangle);
+    let grid = (2..4_usize).prop_flat_map(|columns| vec(vec(point(), columns), 2..4)).prop_map(TerrainBase::Grid);
+    let base = prop_oneof![triangle, grid];
+    (base, number(), 0..12_u32, 0..1_u64 << 53)
+        .prop_map(|(base, roughness, levels, random_seed)| Shape::Terrain(Terrain { base, roughness, levels, random_seed }))
+}
+
 fn shape() -> impl Strategy<Value = Shape> {
     let corner_cutting = (vec(point(), 3..6), number(), number(), any::<bool>())
         .prop_map(|(control_points, a, b, closed)| Shape::CornerCutting(CornerCutting { control_points, a, b, closed }));
     let interior = proptest::sample::select(vec![Interior::Auto, Interior::Solid, Interior::Surface]);
     let mesh = (mesh_data(), interior).prop_map(|((vertices, faces), interior)| Shape::Mesh(PolygonMesh { vertices, faces, interior }));
-    prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, subdivision(), mesh].prop_recursive(3, 8, 3, |shape| {
+    prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, subdivision(), mesh, terrain()].prop_recursive(3, 8, 3, |shape| {
         let part = (option::of(name()), option::of(map()), shape).prop_map(|(name, transform, shape)| Part { name, transform, shape });
         vec(part, 1..4).prop_map(|parts| Shape::Group(Group { parts }))
     })

@@ -2,10 +2,10 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, DVec4};
 use lacuna_fabrication::job::JobKind;
 use lacuna_kernel::budget::Limits;
-use lacuna_kernel::model::{Entry, Interior, Model, Shape};
+use lacuna_kernel::model::{Entry, Interior, Model, Relation, Shape, Side};
 
 use crate::diagnostic::{Diagnostic, code};
 use crate::document::{DocumentLimits, ModelSource, job_schema, model_schema, read_job, read_model, schemas, write_job, write_model};
@@ -103,7 +103,67 @@ fn entries_are_numbers_unknowns_and_parameters_in_order() {
     let rows = &bcifs.states[0].transitions[0].operator.rows;
     assert_eq!(rows[0], [Entry::Number(1.0), Entry::Parameter("a".into())]);
     assert_eq!(rows[1], [Entry::Number(0.0), Entry::Unknown]);
-    assert_eq!(bcifs.cells[0].control_points[1].w, 2.0);
+    assert_eq!(bcifs.cells[0].control_points[1].unwrap().w, 2.0);
+}
+
+/// Two arcs that meet in a loop: an end with two control points, so that orders matter.
+fn arcs(rest: &str) -> String {
+    format!(
+        r#"{{"lacuna": 1, "units": "cm", "shape": {{"family": "bcifs",
+            "states": [
+                {{"name": "arc", "cell": "edge", "dimension": 3, "boundaries": [
+                    {{"state": "end", "incidence": [[1, 0], [0, 1], [0, 0]]}}, {{"state": "end", "incidence": [[0, 0], [1, 0], [0, 1]]}}],
+                  "transitions": [{{"to": "arc", "operator": [[null, 0, 0], [0, 1, 0], [0, 0, 1]]}},
+                                  {{"to": "end", "operator": [[1, 0], [0, 1], [0, 0]]}}]}},
+                {{"name": "end", "cell": "vertex", "dimension": 2, "transitions": [{{"to": "end", "operator": [[1, 0], [0, 1]]}}]}}],
+            "cells": [{{"state": "arc", "control_points": [[0, 0, 0], null, [1, 0, 0, 2]]}}] {rest}}}}}"#
+    )
+}
+
+#[test]
+fn permutations_relations_and_points_to_be_placed() {
+    let text = arcs(
+        r#", "adjacencies": [{"state": "arc", "between": [[0, 1], [0, 0]], "permutation": [1, 0]}],
+            "glue": [{"between": [[0, 0], [0, 1]], "reversed": false, "permutation": [1, 0]}, [[0, 0], [0, 1]]],
+            "relations": [{"state": "arc", "equal": [{"path": [0, 0, 1], "boundary": []}, {"boundary": [1]}]}, {"state": "end", "equal": [{}, {"path": [0]}]}]"#,
+    );
+    let Shape::Bcifs(bcifs) = model(&text).shape else { panic!("a bcifs") };
+    assert_eq!(bcifs.adjacencies[0].permutation, Some(vec![1, 0]));
+    assert_eq!(bcifs.glue[0].permutation, Some(vec![1, 0]));
+    assert_eq!(bcifs.glue[1].permutation, None);
+    let side = |path: &[usize], boundary: &[usize]| Side { path: path.to_vec(), boundary: boundary.to_vec() };
+    assert_eq!(bcifs.relations[0], Relation { state: "arc".into(), equal: [side(&[0, 0, 1], &[]), side(&[], &[1])] });
+    assert_eq!(bcifs.relations[1], Relation { state: "end".into(), equal: [side(&[], &[]), side(&[0], &[])] });
+    let points = &bcifs.cells[0].control_points;
+    assert_eq!(points[..2], [Some(DVec4::new(0.0, 0.0, 0.0, 1.0)), None]);
+    assert_eq!(points[2], Some(DVec4::new(10.0, 0.0, 0.0, 2.0)));
+}
+
+#[test]
+fn constraints_that_point_nowhere_say_so() {
+    let told = |rest: &str| -> Vec<(String, &str)> {
+        faults(&arcs(rest)).into_iter().map(|fault| (fault.pointer.replacen("/shape", "", 1), fault.code)).collect()
+    };
+    let adjacency = |rest: &str| told(&format!(r#", "adjacencies": [{{"state": "arc", "between": [[0, 1], [0, 0]], {rest}}}]"#));
+    let place = |rest: &str| format!("/adjacencies/0/permutation{rest}");
+    assert_eq!(adjacency(r#""permutation": [0, 0]"#), [(place("/1"), code::REPEATED_ELEMENT)]);
+    assert_eq!(adjacency(r#""permutation": [0, 2]"#), [(place("/1"), code::INDEX_OUT_OF_RANGE)]);
+    assert_eq!(adjacency(r#""permutation": [0, -1]"#), [(place("/1"), code::NOT_AN_INDEX)]);
+    assert_eq!(adjacency(r#""permutation": [0, 1, 2]"#), [(place(""), code::WRONG_LENGTH)]);
+    assert_eq!(adjacency(r#""permutation": []"#), [(place(""), code::WRONG_LENGTH)]);
+    assert_eq!(adjacency(r#""permutation": null"#), [(place(""), code::WRONG_TYPE)]);
+    assert_eq!(adjacency(r#""permutation": [1, 0], "reversed": true"#), [(place(""), code::CONFLICTING_MEMBERS)]);
+    let relation = |sides: &str| told(&format!(r#", "relations": [{{"state": "arc", "equal": {sides}}}]"#));
+    let place = |rest: &str| format!("/relations/0/equal{rest}");
+    // child 1 of an arc is an end, which has one child and no boundary
+    assert_eq!(relation(r#"[{"path": [0, 1, 1]}, {"path": [2]}]"#).len(), 2);
+    assert_eq!(relation(r#"[{"path": [0, 1, 1]}, {}]"#), [(place("/0/path/2"), code::INDEX_OUT_OF_RANGE)]);
+    assert_eq!(relation(r#"[{"path": [1], "boundary": [0]}, {}]"#), [(place("/0/boundary/0"), code::INDEX_OUT_OF_RANGE)]);
+    assert_eq!(relation(r#"[{"path": null}, {}]"#), [(place("/0/path"), code::WRONG_TYPE)]);
+    assert_eq!(relation("[{}]"), [(place(""), code::WRONG_LENGTH)]);
+    assert_eq!(relation("null"), [(place(""), code::WRONG_TYPE)]);
+    let long = format!(r#"[{{"path": [{}0]}}, {{}}]"#, "0,".repeat(100_000));
+    assert_eq!(relation(&long), [(place("/0/path"), code::WRONG_LENGTH)]);
 }
 
 #[test]

@@ -267,8 +267,7 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
     };
     let mut facts = MeshFacts::of(Format::Ply, encoding);
     facts.unit = header.unit;
-    facts.polygons_fanned = builder.fanned;
-    Ok(MeshFile { mesh: builder.finish(), facts })
+    Ok(MeshFile::new(builder, facts))
 }
 
 /// A count that the rest of the file has no bytes for is a lie, or an endless loop over elements

@@ -46,12 +46,12 @@ fn threemf(root: &str, body: &str) -> Result<MeshFile, FormatError> {
 #[test]
 fn every_truncation_of_every_format_is_an_error_or_a_mesh() {
     let mesh = torus(5, 4, DVec3::ZERO);
-    for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off] {
+    for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off, Format::Vrml] {
         let bytes = written(format, &mesh, &Metadata::default());
         for length in 0..bytes.len() {
             // A text that ends between two lines may still be a mesh; nothing may panic.
             if let Ok(file) = read(&bytes[..length], Some(format), &ReadLimits::default()) {
-                assert!(matches!(format, Format::Obj | Format::Off), "{format} at {length}");
+                assert!(matches!(format, Format::Obj | Format::Off | Format::Vrml), "{format} at {length}");
                 assert!(file.mesh.triangles.iter().flatten().all(|&index| (index as usize) < file.mesh.vertices.len()));
             }
         }
@@ -62,7 +62,7 @@ fn every_truncation_of_every_format_is_an_error_or_a_mesh() {
 fn every_flipped_byte_is_an_error_or_a_mesh_in_range() {
     let mesh = torus(5, 4, DVec3::ZERO);
     let limits = ReadLimits { vertices: 1000, triangles: 1000, ..ReadLimits::default() };
-    for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off] {
+    for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off, Format::Vrml] {
         let bytes = written(format, &mesh, &Metadata::default());
         for place in 0..bytes.len() {
             for flip in [0x01, 0x10, 0x80, 0xff] {
@@ -124,7 +124,7 @@ fn errors_name_the_place() {
 #[test]
 fn limits_hold_in_every_format() {
     let mesh = torus(12, 8, DVec3::ZERO);
-    for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off] {
+    for format in [Format::Stl, Format::ThreeMf, Format::Obj, Format::Ply, Format::Off, Format::Vrml] {
         let bytes = written(format, &mesh, &Metadata::default());
         let default = ReadLimits::default();
         for limits in

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod hostile;
+mod polygons;
 mod round_trip;
 
 use super::*;

@@ -4,7 +4,7 @@ use super::*;
 use lacuna_kernel::error::Kind;
 use lacuna_kernel::tessellation::Tessellation;
 
-const MESH_FORMATS: [Format; 6] = [Format::Stl, Format::ThreeMf, Format::Glb, Format::Obj, Format::Ply, Format::Off];
+const MESH_FORMATS: [Format; 7] = [Format::Stl, Format::ThreeMf, Format::Glb, Format::Obj, Format::Ply, Format::Off, Format::Vrml];
 
 #[test]
 fn the_table_is_in_the_order_of_the_enum() {
@@ -91,6 +91,7 @@ fn parts_stay_apart_where_the_format_has_objects() {
             match format {
                 Format::ThreeMf => assert_eq!(file.facts.object_names, ["ring & \"x\"", "cube"]),
                 Format::Obj => assert_eq!(file.facts.object_names, ["1 ring & \"x\"", "2 cube"]),
+                Format::Vrml => assert_eq!(file.facts.object_names, ["part_1_ring____x_", "part_2_cube"]),
                 _ => {}
             }
         }
@@ -145,14 +146,14 @@ fn evaluations_go_where_there_is_room_for_them() {
         triangles: vec![[0, 1, 2]],
         ..Tessellation::default()
     };
-    for format in [Format::Glb, Format::Obj, Format::Ply, Format::Png] {
+    for format in [Format::Glb, Format::Obj, Format::Ply, Format::Vrml, Format::Png] {
         written(format, &sample, &Metadata::default());
     }
     let error = write(Format::ThreeMf, &sample, &Metadata::default(), &mut Cursor::new(Vec::new())).unwrap_err();
-    let expected = "3MF cannot carry surfaces and wires and points; GLB, OBJ, PLY, PNG can";
+    let expected = "3MF cannot carry surfaces and wires and points; GLB, OBJ, PLY, VRML, PNG can";
     assert_eq!((error.to_string().as_str(), error.kind()), (expected, Kind::Invalid));
     let error = write(Format::Off, &sample, &Metadata::default(), &mut Cursor::new(Vec::new())).unwrap_err();
-    assert_eq!(error.to_string(), "OFF cannot carry wires; GLB, OBJ, PLY, PNG can");
+    assert_eq!(error.to_string(), "OFF cannot carry wires; GLB, OBJ, PLY, VRML, PNG can");
     let text = String::from_utf8(written(Format::Obj, &sample, &Metadata::default())).unwrap();
     assert!(text.ends_with("f 1 2 3\nl 1 2\nl 2 4\np 4\n"), "{text}");
 }
@@ -183,7 +184,7 @@ fn polygons_become_fans_and_indices_count_back() {
     let text = b"# a square\nmtllib none\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4/1/2 -3// \\\n -2 4\n";
     let file = read(text, None, &ReadLimits::default()).unwrap();
     assert_eq!(file.mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-    assert_eq!((file.facts.polygons_fanned, file.facts.unit), (1, None));
+    assert_eq!((file.faces(), file.facts.unit), (vec![vec![0, 1, 2, 3]], None));
     let text = b"COFF 4 1 0 # colours\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1\n\n1 1 0 1 1 1 1\n0 1 0 1 1 1 1\n4 0 1 2 3 255 0 0\n";
     assert_eq!(read(text, None, &ReadLimits::default()).unwrap().mesh, file.mesh);
     let text = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty float y\nproperty uchar red\n\

@@ -11,6 +11,8 @@ mod read;
 mod verify;
 mod xml;
 
+pub(super) use xml::escape;
+
 pub(crate) use read::read;
 pub(crate) use verify::verify;
 

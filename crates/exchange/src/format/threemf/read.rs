@@ -76,7 +76,7 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
     if placing.builder.vertex_count() == 0 {
         return Err(malformed(&root_name, 0, "an object of type model in the build", b"none"));
     }
-    Ok(MeshFile { mesh: placing.builder.finish(), facts: placing.facts })
+    Ok(MeshFile::new(placing.builder, placing.facts))
 }
 
 fn open<'a>(bytes: &'a [u8], limits: &'a ReadLimits) -> Result<Package<'a>, FormatError> {
@@ -332,7 +332,7 @@ impl ModelReading<'_> {
             return Ok(());
         }
         if let Some((id, mut object, builder)) = self.object.take() {
-            object.mesh = builder.finish();
+            (object.mesh, _) = builder.finish();
             self.parsed.0 += object.mesh.vertices.len() as u64;
             self.parsed.1 += object.mesh.triangles.len() as u64;
             within(self.place(byte), "vertices", self.parsed.0, self.limits.vertices)?;

@@ -8,7 +8,7 @@ use std::io::{self, BufRead, BufReader, Read};
 
 /// Appends text with the five predefined entities, legal in content and in attributes. Characters
 /// that XML 1.0 has no form for become the replacement character.
-pub(super) fn escape(text: &str, into: &mut String) {
+pub(in crate::format) fn escape(text: &str, into: &mut String) {
     for character in text.chars() {
         match character {
             '&' => into.push_str("&amp;"),

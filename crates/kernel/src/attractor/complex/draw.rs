@@ -1,44 +1,52 @@
 //! From the cell complex to triangles and segments.
 
 use super::address::Origin;
-use super::{Builder, CellComplex, NONE};
+use super::{Builder, CellComplex, NONE, Side};
 use crate::attractor::cell::Point;
 use crate::tessellation::Tessellation;
 use glam::DVec3;
 use std::sync::Arc;
 
 impl Builder<'_> {
-    /// The leaf edges of an edge, each with whether it runs backwards: in order from its start to its end when it is
-    /// a curve.
-    fn leaf_edges(&self, edge: u32, backwards: bool, out: &mut Vec<(u32, bool)>) {
-        let own = &self.edges[edge as usize];
+    /// The leaf edges of an edge that is no single point: in order from its start to its end when it is a curve.
+    fn leaf_edges(&self, side: Side, out: &mut Vec<Side>) {
+        let own = &self.edges[side.edge()];
+        if own.collapsed {
+            return;
+        }
         if own.pieces == NONE {
-            out.push((edge, backwards));
+            out.push(side);
             return;
         }
         let topology = self.topology.state(own.state);
         let mut child = |(child, turned): (usize, bool)| {
-            self.leaf_edges(self.pieces[own.pieces as usize + child], turned != backwards, out);
+            self.leaf_edges(Side::new(self.pieces[own.pieces as usize + child], turned != side.backwards()), out);
         };
         match &topology.chain {
-            Some(chain) if backwards => chain.iter().rev().for_each(|&link| child(link)),
+            Some(chain) if side.backwards() => chain.iter().rev().for_each(|&link| child(link)),
             Some(chain) => chain.iter().for_each(|&link| child(link)),
             None => (0..topology.split.children.len()).for_each(|index| child((index, false))),
         }
     }
 
+    /// The vertices of an edge, by its state's closure.
+    fn vertices_of(&self, edge: usize) -> &[u32] {
+        let own = &self.edges[edge];
+        let first = own.vertices as usize;
+        &self.edge_vertices[first..first + self.topology.state(own.state).closure.cells.len()]
+    }
+
     /// What is drawn of a leaf edge: a segment, or one to every end but the first of a wire that branches.
-    fn arms(&self, edge: u32) -> impl Iterator<Item = [u32; 2]> {
-        let own = &self.edges[edge as usize];
-        let (first, rest) = own.vertices.split_first().map_or((NONE, &[][..]), |(first, rest)| (*first, rest));
+    fn arms(&self, edge: usize) -> impl Iterator<Item = [u32; 2]> {
+        let (first, rest) = self.vertices_of(edge).split_first().map_or((NONE, &[][..]), |(first, rest)| (*first, rest));
         rest.iter().map(move |&end| [first, end])
     }
 
     /// Start and end of a leaf edge.
-    fn ends(&self, (edge, backwards): (u32, bool)) -> [u32; 2] {
-        let own = &self.edges[edge as usize];
-        let [start, end] = self.topology.ends(own.state).map_or([0, 0], |[a, b]| [own.vertices[a], own.vertices[b]]);
-        if backwards { [end, start] } else { [start, end] }
+    fn ends(&self, side: Side) -> [u32; 2] {
+        let vertices = self.vertices_of(side.edge());
+        let [start, end] = self.topology.ends(self.edges[side.edge()].state).map_or([0, 0], |[a, b]| [vertices[a], vertices[b]]);
+        if side.backwards() { [end, start] } else { [start, end] }
     }
 
     /// The tessellation of all that was refined.
@@ -46,18 +54,18 @@ impl Builder<'_> {
         let loops = self.loops();
         let mut tally = Tally::new(self.vertices.len(), self.edges.len());
         let flips = orientations(&loops, self.edges.len());
-        for edges in &loops {
-            edges.iter().for_each(|&edge| tally.count(edge.0, [self.ends(edge)].into_iter(), true));
+        for &side in &loops.sides {
+            tally.count(side.edge(), [self.ends(side)].into_iter(), true);
         }
         let mut wires = Vec::new();
         for index in 0..self.wires.len() {
-            self.leaf_edges(self.wires[index], false, &mut wires);
+            self.leaf_edges(Side::new(self.wires[index], false), &mut wires);
         }
-        for &(edge, _) in &wires {
-            tally.count(edge, self.arms(edge), false);
-            self.edges[edge as usize].vertices.iter().for_each(|&vertex| tally.used[vertex as usize] = true);
+        for &side in &wires {
+            tally.count(side.edge(), self.arms(side.edge()), false);
+            self.vertices_of(side.edge()).iter().for_each(|&vertex| tally.used[vertex as usize] = true);
         }
-        let mut complex = tally.complex(loops.len());
+        let mut complex = tally.complex(self.faces.len());
         let mut tessellation = Tessellation { leaf_cells: self.leaves, deviation_mm: self.deviation, ..Tessellation::default() };
         let mut place = vec![NONE; self.vertices.len()];
         for (vertex, index) in place.iter_mut().enumerate().filter(|(vertex, _)| tally.used[*vertex]) {
@@ -66,24 +74,23 @@ impl Builder<'_> {
             complex.vertex_origins.push(self.vertex_origins[vertex]);
         }
         let mut outline = Vec::new();
-        for (index, edges) in loops.iter().enumerate() {
+        for (index, face) in self.faces.iter().enumerate() {
             outline.clear();
-            outline.extend(edges.iter().map(|&edge| place[self.ends(edge)[0] as usize]));
+            outline.extend(loops.of(index).iter().map(|&side| place[self.ends(side)[0] as usize]));
             if flips[index] {
                 outline.reverse();
             }
-            let face = &self.faces[index];
             fill(&outline, &face.middle, &mut tessellation);
             if tessellation.vertices.len() > complex.vertex_origins.len() {
                 complex.vertex_origins.push(Origin::Middle { node: face.node });
             }
             complex.triangle_nodes.resize(tessellation.triangles.len(), face.node);
         }
-        for &(edge, _) in &wires {
-            tessellation.segments.extend(self.arms(edge).map(|ends| ends.map(|vertex| place[vertex as usize])));
-            complex.segment_edges.resize(tessellation.segments.len(), edge);
-            if let [vertex] = self.edges[edge as usize].vertices[..] {
-                tessellation.points.push(place[vertex as usize]);
+        for &side in &wires {
+            tessellation.segments.extend(self.arms(side.edge()).map(|ends| ends.map(|vertex| place[vertex as usize])));
+            complex.segment_edges.resize(tessellation.segments.len(), side.edge() as u32);
+            if let [vertex] = self.vertices_of(side.edge()) {
+                tessellation.points.push(place[*vertex as usize]);
             }
         }
         complex.topology = Arc::clone(self.topology);
@@ -95,13 +102,29 @@ impl Builder<'_> {
     }
 
     /// The leaf edges around every face.
-    fn loops(&self) -> Vec<Vec<(u32, bool)>> {
-        let around = |face: &super::Face| {
-            let mut edges = Vec::with_capacity(face.outline.len());
-            face.outline.iter().for_each(|&(edge, backwards)| self.leaf_edges(edge, backwards, &mut edges));
-            edges
-        };
-        self.faces.iter().map(around).collect()
+    fn loops(&self) -> Loops {
+        let mut loops = Loops { starts: Vec::with_capacity(self.faces.len() + 1), sides: Vec::with_capacity(self.outlines.len()) };
+        loops.starts.push(0);
+        for (index, face) in self.faces.iter().enumerate() {
+            let end = self.faces.get(index + 1).map_or(self.outlines.len(), |next| next.outline as usize);
+            for &side in &self.outlines[face.outline as usize..end] {
+                self.leaf_edges(side, &mut loops.sides);
+            }
+            loops.starts.push(loops.sides.len());
+        }
+        loops
+    }
+}
+
+/// The leaf edges around every face, one face after the other.
+struct Loops {
+    starts: Vec<usize>,
+    sides: Vec<Side>,
+}
+
+impl Loops {
+    fn of(&self, face: usize) -> &[Side] {
+        &self.sides[self.starts[face]..self.starts[face + 1]]
     }
 }
 
@@ -132,22 +155,23 @@ fn fill(outline: &[u32], middle: &Point, tessellation: &mut Tessellation) {
 
 /// Which faces to turn round so that neighbours run along their common edge in opposite directions, as far as the
 /// surface is orientable. The first face of every piece stays.
-fn orientations(loops: &[Vec<(u32, bool)>], edges: usize) -> Vec<bool> {
+fn orientations(loops: &Loops, edges: usize) -> Vec<bool> {
+    let faces = loops.starts.len() - 1;
     // The two faces of every edge, with their directions; edges with more are no hinge.
     let mut sides: Vec<[(u32, bool); 2]> = vec![[(NONE, false); 2]; edges];
     let mut count = vec![0_u8; edges];
-    for (face, around) in loops.iter().enumerate() {
-        for &(edge, backwards) in around {
-            let used = &mut count[edge as usize];
+    for face in 0..faces {
+        for side in loops.of(face) {
+            let used = &mut count[side.edge()];
             if *used < 2 {
-                sides[edge as usize][*used as usize] = (face as u32, backwards);
+                sides[side.edge()][*used as usize] = (face as u32, side.backwards());
             }
             *used = used.saturating_add(1);
         }
     }
-    let mut flips: Vec<Option<bool>> = vec![None; loops.len()];
+    let mut flips: Vec<Option<bool>> = vec![None; faces];
     let mut stack = Vec::new();
-    for seed in 0..loops.len() {
+    for seed in 0..faces {
         if flips[seed].is_some() {
             continue;
         }
@@ -155,14 +179,11 @@ fn orientations(loops: &[Vec<(u32, bool)>], edges: usize) -> Vec<bool> {
         stack.push(seed);
         while let Some(face) = stack.pop() {
             let own = flips[face] == Some(true);
-            for &(edge, backwards) in &loops[face] {
-                if count[edge as usize] != 2 {
-                    continue;
-                }
-                let [first, second] = sides[edge as usize];
+            for side in loops.of(face).iter().filter(|side| count[side.edge()] == 2) {
+                let [first, second] = sides[side.edge()];
                 let (other, direction) = if first.0 as usize == face { second } else { first };
                 if flips[other as usize].is_none() {
-                    flips[other as usize] = Some(own != (direction == backwards));
+                    flips[other as usize] = Some(own != (direction == side.backwards()));
                     stack.push(other as usize);
                 }
             }
@@ -185,16 +206,16 @@ impl Tally {
         Self { used: vec![false; vertices], faces: vec![0; edges], edge_used: vec![false; edges], ends: Vec::new() }
     }
 
-    fn count(&mut self, edge: u32, arms: impl Iterator<Item = [u32; 2]>, of_face: bool) {
+    fn count(&mut self, edge: usize, arms: impl Iterator<Item = [u32; 2]>, of_face: bool) {
         if of_face {
-            self.faces[edge as usize] = self.faces[edge as usize].saturating_add(1);
+            self.faces[edge] = self.faces[edge].saturating_add(1);
         }
-        if std::mem::replace(&mut self.edge_used[edge as usize], true) {
+        if std::mem::replace(&mut self.edge_used[edge], true) {
             return;
         }
         for ends in arms {
             ends.iter().for_each(|&end| self.used[end as usize] = true);
-            self.ends.push((edge, ends));
+            self.ends.push((edge as u32, ends));
         }
     }
 

@@ -38,21 +38,41 @@ struct Seen {
     view: View,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Edge {
     state: StateId,
-    /// Its vertices, by its state's closure.
-    vertices: Vec<u32>,
+    /// Where its vertices begin, in the order of its state's closure.
+    vertices: u32,
     /// Where its pieces begin: children (edges), then fresh vertices. [`NONE`] while it is whole.
     pieces: u32,
+    /// Whether it is a single point in space, and all its vertices one: then it is no side of a face.
+    collapsed: bool,
+}
+
+/// An edge walked along, forwards or backwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Side(u32);
+
+impl Side {
+    fn new(edge: u32, backwards: bool) -> Self {
+        Self(edge << 1 | u32::from(backwards))
+    }
+
+    fn edge(self) -> usize {
+        (self.0 >> 1) as usize
+    }
+
+    fn backwards(self) -> bool {
+        self.0 & 1 == 1
+    }
 }
 
 /// A face of the final complex.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Face {
     node: u32,
-    /// Its edges in order, each with whether it runs backwards.
-    outline: Vec<(u32, bool)>,
+    /// Where its sides begin.
+    outline: u32,
     middle: Point,
 }
 
@@ -63,15 +83,18 @@ pub(crate) struct Start {
     roots: Vec<Vec<Seen>>,
     /// The first root and closure cell that show each cell.
     cells: Vec<(usize, usize)>,
+    /// Of every cell, whether it is an edge that is a single point in space.
+    collapsed: Vec<bool>,
 }
 
 impl Start {
-    /// Glues roots along the given boundaries, and tabulates the topology's views.
+    /// Glues roots along the given boundaries, makes the ends of collapsed edges one, and tabulates the topology's views.
     pub(super) fn new(
         topology: &mut Topology,
         automaton: &Automaton,
         roots: &[super::Root],
         gluings: &[Gluing],
+        collapsed: &[(usize, usize)],
     ) -> Result<Self, TopologyError> {
         let mut union = Union::new(topology, automaton);
         let mut first = Vec::with_capacity(roots.len());
@@ -105,6 +128,18 @@ impl Start {
                 }
             })?;
         }
+        let mut points = Vec::new();
+        for &(root, boundary) in collapsed {
+            let Some(&(cell, _)) = union.topology.state(roots[root].state).closure.boundaries.get(boundary) else { continue };
+            let edge = first[root] + cell;
+            points.push(edge);
+            // All vertices are of the state of single points, which has one view.
+            let ends: Vec<usize> = union.list[edge].cells.iter().map(|&(end, _)| end).collect();
+            for pair in ends.windows(2) {
+                let united = union.unite((pair[0], View::SAME), (pair[1], View::SAME));
+                debug_assert!(united.is_ok(), "single points are never twisted");
+            }
+        }
         let mut whole = Self::default();
         let mut index = vec![NONE; union.list.len()];
         let mut next = 0;
@@ -121,6 +156,11 @@ impl Start {
                 seen.push(Seen { id: index[top], view });
             }
             whole.roots.push(seen);
+        }
+        whole.collapsed = vec![false; whole.cells.len()];
+        for edge in points {
+            let (top, _) = union.find(edge)?;
+            whole.collapsed[index[top] as usize] = true;
         }
         topology.tabulate(automaton)?;
         Ok(whole)
@@ -175,10 +215,13 @@ pub(super) struct Builder<'a> {
     vertex_origins: Vec<Origin>,
     edges: Vec<Edge>,
     edge_origins: Vec<Origin>,
+    edge_vertices: Vec<u32>,
     pieces: Vec<u32>,
     /// Cells that were subdivided or drawn: the parent (or [`NONE`]) and the transition (or root).
     nodes: Vec<(u32, u32)>,
     faces: Vec<Face>,
+    /// Sides of the faces, one face after the other.
+    outlines: Vec<Side>,
     /// Root edges: all their leaves are drawn.
     wires: Vec<u32>,
     /// Buffers by depth.
@@ -205,9 +248,11 @@ impl<'a> Builder<'a> {
             vertex_origins: Vec::new(),
             edges: Vec::new(),
             edge_origins: Vec::new(),
+            edge_vertices: Vec::new(),
             pieces: Vec::new(),
             nodes: Vec::new(),
             faces: Vec::new(),
+            outlines: Vec::new(),
             wires: Vec::new(),
             spare: Vec::new(),
             leaves: 0,
@@ -233,10 +278,12 @@ impl<'a> Builder<'a> {
                         let point = self.place(&self.attractor.roots()[root].points, &sub.point, root as u32);
                         self.vertex(point, origin)
                     } else {
-                        let inner = |&(inner, _): &(usize, View)| made[start.roots[root][inner].id as usize];
                         // The cell itself is what its first sighting shows.
-                        let vertices = sub.cells.iter().map(inner).collect();
-                        self.edge(sub.state, vertices, origin)
+                        let first = self.edge_vertices.len();
+                        self.edge_vertices.extend(sub.cells.iter().map(|&(inner, _)| made[start.roots[root][inner].id as usize]));
+                        let edge = self.edge(sub.state, first, origin);
+                        self.edges[edge as usize].collapsed = start.collapsed[seen.id as usize];
+                        edge
                     };
                 }
             }
@@ -254,8 +301,9 @@ impl<'a> Builder<'a> {
         if self.topology.state(cell.state).dimension == 2 {
             return self.face(&cell, points, seen, 0, node);
         }
-        let vertices = seen.iter().map(|seen| seen.id).collect();
-        let edge = self.edge(cell.state, vertices, Origin::Root { root: index as u32, cell: NONE });
+        let first = self.edge_vertices.len();
+        self.edge_vertices.extend(seen.iter().map(|seen| seen.id));
+        let edge = self.edge(cell.state, first, Origin::Root { root: index as u32, cell: NONE });
         self.wires.push(edge);
         self.wire(&cell, points, edge, 0)
     }
@@ -266,8 +314,9 @@ impl<'a> Builder<'a> {
         self.vertices.len() as u32 - 1
     }
 
-    fn edge(&mut self, state: StateId, vertices: Vec<u32>, origin: Origin) -> u32 {
-        self.edges.push(Edge { state, vertices, pieces: NONE });
+    /// An edge whose vertices were put down from `first` on.
+    fn edge(&mut self, state: StateId, first: usize, origin: Origin) -> u32 {
+        self.edges.push(Edge { state, vertices: first as u32, pieces: NONE, collapsed: false });
         self.edge_origins.push(origin);
         self.edges.len() as u32 - 1
     }
@@ -283,6 +332,7 @@ impl<'a> Builder<'a> {
         if self.leaves.is_multiple_of(1024) {
             self.budget.cancel.check()?;
             self.budget.report("refine", 0.0, self.leaves);
+            self.check_memory(error)?;
         }
         let allowed = self.budget.limits.cells;
         if self.leaves > allowed {
@@ -290,6 +340,20 @@ impl<'a> Builder<'a> {
             return Err(RefineError::Cells { allowed, tolerance_mm: self.tolerance_mm, reachable_mm });
         }
         Ok(())
+    }
+
+    /// Growing vectors, and what drawing them takes, need about twice what they hold.
+    fn check_memory(&self, error: f64) -> Result<(), RefineError> {
+        let (vertices, edges, faces) = (self.vertices.len(), self.edges.len(), self.faces.len());
+        let held = 36 * vertices + 32 * edges + 4 * self.pieces.len() + 8 * self.nodes.len() + 36 * faces + 4 * self.outlines.len();
+        let drawn = 24 * (vertices + faces) + 28 * faces + 8 * edges;
+        let allowed_bytes = self.budget.limits.memory_bytes;
+        // Beyond 2^31 edges a side has no room for its direction.
+        if 2 * (held + drawn) as u64 <= allowed_bytes && edges < 1 << 31 {
+            return Ok(());
+        }
+        let reachable_mm = (2.0 * error).max(2.0 * self.tolerance_mm);
+        Err(RefineError::Memory { allowed_bytes, tolerance_mm: self.tolerance_mm, leaf_cells: self.leaves, reachable_mm })
     }
 
     fn check_depth(&self, depth: u32, reached_mm: f64) -> Result<(), RefineError> {
@@ -309,13 +373,13 @@ impl<'a> Builder<'a> {
         let error = self.attractor.leaf_error(cell, points);
         if error <= self.tolerance_mm {
             if let Some(outline) = &own.outline {
-                let edges = outline.iter().map(|&(position, backwards)| {
-                    let Seen { id, view } = seen[position];
-                    (id, backwards != self.turned(self.edges[id as usize].state, view))
-                });
                 let middle = if own.middle.is_empty() { cell.ball.centre } else { self.place(points, &own.middle, cell.root) };
-                let face = Face { node, outline: edges.collect(), middle };
-                self.faces.push(face);
+                self.faces.push(Face { node, outline: self.outlines.len() as u32, middle });
+                for &(position, backwards) in outline {
+                    let Seen { id, view } = seen[position];
+                    let side = Side::new(id, backwards != self.turned(self.edges[id as usize].state, view));
+                    self.outlines.push(side);
+                }
             }
             return self.leaf(error);
         }
@@ -363,9 +427,12 @@ impl<'a> Builder<'a> {
                 match (pass, piece.point.is_empty()) {
                     (0, false) => fresh[index] = self.vertex(self.place(points, &piece.point, cell.root), origin),
                     (1, true) => {
-                        let inner = split.fresh[index].iter();
-                        let vertices = inner.map(|&source| self.resolve(cell.state, source, seen, fresh).id).collect();
-                        fresh[index] = self.edge(piece.state, vertices, origin);
+                        let first = self.edge_vertices.len();
+                        for &source in &split.fresh[index] {
+                            let vertex = self.resolve(cell.state, source, seen, fresh).id;
+                            self.edge_vertices.push(vertex);
+                        }
+                        fresh[index] = self.edge(piece.state, first, origin);
                     }
                     _ => {}
                 }
@@ -396,7 +463,7 @@ impl<'a> Builder<'a> {
         if self.edges[id as usize].pieces != NONE {
             return;
         }
-        let state = self.edges[id as usize].state;
+        let Edge { state, collapsed, .. } = self.edges[id as usize];
         let split = &self.topology.state(state).split;
         let (children, start) = (split.children.len(), self.pieces.len());
         if children == 0 {
@@ -406,18 +473,26 @@ impl<'a> Builder<'a> {
         self.edges[id as usize].pieces = start as u32;
         for (position, place) in places.iter().enumerate().filter(|(_, place)| !place.is_empty()) {
             let (actual, _) = self.topology.piece_seen(state, view, position);
+            if collapsed {
+                self.pieces[start + actual] = self.edge_vertices[self.edges[id as usize].vertices as usize];
+                continue;
+            }
             let origin = Origin::Edge { edge: id, piece: actual as u32 };
             let point = self.place(points, place, root);
             self.pieces[start + actual] = self.vertex(point, origin);
         }
         for child in 0..children {
-            let vertices = split.children[child].iter().map(|source| match source {
-                Source::Vertex { cell } => self.edges[id as usize].vertices[*cell],
-                Source::Fresh { index, .. } => self.pieces[start + children + index],
-                Source::Piece { .. } => NONE,
-            });
-            let vertices = vertices.collect();
-            let edge = self.edge(split.pieces[child].state, vertices, Origin::Edge { edge: id, piece: child as u32 });
+            let first = self.edge_vertices.len();
+            for source in &split.children[child] {
+                let vertex = match source {
+                    Source::Vertex { cell } => self.edge_vertices[self.edges[id as usize].vertices as usize + cell],
+                    Source::Fresh { index, .. } => self.pieces[start + children + index],
+                    Source::Piece { .. } => NONE,
+                };
+                self.edge_vertices.push(vertex);
+            }
+            let edge = self.edge(split.pieces[child].state, first, Origin::Edge { edge: id, piece: child as u32 });
+            self.edges[edge as usize].collapsed = collapsed;
             self.pieces[start + child] = edge;
         }
     }

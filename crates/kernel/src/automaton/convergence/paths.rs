@@ -134,8 +134,7 @@ struct Search<'a> {
 
 /// Searches until the bounds meet, or `allowed` multiplications are done, or memory is used up.
 pub(super) fn search(steps: &[Vec<Step>], norm: Norm, lower: &mut Lower, allowed: f64) -> Upper {
-    let mut search =
-        Search { steps, norm, lower, work: 0.0, allowed, numbers: 0, heap: BinaryHeap::new(), serial: 0, largest: Vec::new() };
+    let mut search = Search { steps, norm, lower, work: 0.0, allowed, numbers: 0, heap: BinaryHeap::new(), serial: 0, largest: Vec::new() };
     let many = steps.iter().map(Vec::len).sum::<usize>() > MAXIMUM_STEPS;
     for (state, outgoing) in steps.iter().enumerate() {
         for step in outgoing.iter().filter(|step| !many || step.to == state) {

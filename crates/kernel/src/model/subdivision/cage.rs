@@ -164,7 +164,8 @@ fn edges(host: &Host, report: &mut Report) {
             let message = format!("edge ({a}, {b}) belongs to {} faces, {faces:?}, and to two at most on a manifold", group.len());
             report.error(&pointer, "mesh.nonmanifold-edge", message);
         } else if group.len() == 2 && host.origin[first as usize] == host.origin[group[1].2 as usize] {
-            let message = format!("faces {} and {} run along edge ({a}, {b}) in the same direction; turn one of them round", faces[0], faces[1]);
+            let message =
+                format!("faces {} and {} run along edge ({a}, {b}) in the same direction; turn one of them round", faces[0], faces[1]);
             report.error(&pointer, "mesh.orientation", message);
         }
     }
@@ -176,7 +177,8 @@ fn vertices(host: &Host, scheme: Scheme, report: &mut Report) {
     host.origin.iter().for_each(|&vertex| count[vertex as usize] += 1);
     let (mut ahead, mut behind) = (Vec::new(), Vec::new());
     for (vertex, &count) in count.iter().enumerate() {
-        let mut fault = |code, message: String| report.error(&format!("/mesh/vertices/{vertex}"), code, format!("vertex {vertex} {message}"));
+        let mut fault =
+            |code, message: String| report.error(&format!("/mesh/vertices/{vertex}"), code, format!("vertex {vertex} {message}"));
         if count == 0 {
             fault("mesh.isolated-vertex", "belongs to no face; remove it".into());
             continue;

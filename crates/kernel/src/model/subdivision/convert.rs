@@ -78,8 +78,7 @@ fn roots(scheme: &Scheme, host: &Host, cells: &[u32], bounded: bool) -> Option<R
     let mut known: HashMap<Stencil, u32> = HashMap::new();
     let mut roots = Roots::default();
     for batch in cells.chunks(BATCH) {
-        let seen: Vec<Seen> =
-            batch.par_iter().map_init(|| Walker::new(scheme, host), |walker, &h| walker.see(Cell::Patch(h))).collect();
+        let seen: Vec<Seen> = batch.par_iter().map_init(|| Walker::new(scheme, host), |walker, &h| walker.see(Cell::Patch(h))).collect();
         for seen in seen {
             let index = match known.get(&seen.stencil) {
                 Some(&index) => index,

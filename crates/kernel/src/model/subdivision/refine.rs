@@ -8,8 +8,8 @@
 //! character animation", SIGGRAPH 1998): sharpness falls by 1 each step, and where a vertex changes its rule in
 //! between, its two positions are mixed by the mean fraction that was left.
 
-use super::{Coefficients, Scheme};
 use super::host::{Host, NONE, Sharpness, Side, decayed};
+use super::{Coefficients, Scheme};
 use std::f64::consts::TAU;
 
 /// For every refined vertex its weights on the vertices before; empty where a neighbour is missing.
@@ -262,7 +262,8 @@ fn vertex_mask(scheme: &Scheme, host: &Host, vertex: u32) -> Vec<(u32, f64)> {
     if old.is_empty() || (new.is_empty() && share < 1.0) {
         return Vec::new();
     }
-    let mixed = old.into_iter().map(|(v, weight)| (v, weight * share)).chain(new.into_iter().map(|(v, weight)| (v, weight * (1.0 - share))));
+    let mixed =
+        old.into_iter().map(|(v, weight)| (v, weight * share)).chain(new.into_iter().map(|(v, weight)| (v, weight * (1.0 - share))));
     mixed.filter(|entry| entry.1 != 0.0).collect()
 }
 

@@ -322,5 +322,4 @@ impl Stencil {
         debug_assert!(*scheme != Scheme::DooSabin || own == 0);
         (host, cell)
     }
-
 }

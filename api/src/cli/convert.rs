@@ -1,0 +1,44 @@
+//! `lacuna convert`: a mesh file in other formats.
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
+
+use super::args::ConvertArgs;
+use super::inspect::{mesh_file, topology};
+use super::output::{Target, finish, start, target};
+use crate::problem::{Problem, ProblemKind};
+use crate::production::{format_problem, guarded};
+
+/// Reads a mesh and writes it; nothing is repaired. All files are written before the first one takes its place.
+pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
+    let named = |path: &Path| target(path, args.format.as_deref().filter(|_| path == Path::new("-")));
+    let targets: Vec<Target> = args.outputs.iter().map(|path| named(path)).collect::<Result<_, _>>()?;
+    let (file, _) = mesh_file(&args.file)?;
+    for (word, count) in &file.facts.left_out {
+        // With stderr gone there is nobody left to tell.
+        let _ = writeln!(std::io::stderr(), "warning: {count} shapes of the kind {word} hold no polygons and were left out");
+    }
+    let closed = topology(&args.file, &file)?.is_closed_manifold();
+    let mut pending = Vec::with_capacity(targets.len());
+    for target in &targets {
+        let mut part = start(&target.path)?;
+        write(target.format, &file, closed, &mut part)?;
+        pending.push((part, &target.path));
+    }
+    pending.into_iter().try_for_each(|(part, path)| finish(part, path))
+}
+
+fn write(format: Format, file: &MeshFile, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
+    let title = file.facts.object_names.first().map(String::as_str);
+    let metadata = Metadata { title, ..Metadata::default() };
+    let mut sink = BufWriter::with_capacity(1 << 16, part);
+    let written = guarded(|| format::write(format, Geometry::Polygons { file, closed }, &metadata, &mut sink))?;
+    written.map_err(|error| match error {
+        // The file is at fault, not a model.
+        format::FormatError::CannotCarry { .. } => Problem { kind: ProblemKind::InvalidFile, ..format_problem(&error) },
+        error => format_problem(&error),
+    })?;
+    sink.flush().map_err(|error| Problem::io("the file could not be written", &error))
+}

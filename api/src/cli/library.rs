@@ -1,0 +1,21 @@
+//! `lacuna library`: classics as model documents.
+
+use std::path::Path;
+
+use super::args::LibraryArgs;
+use super::{print, print_json};
+use crate::files;
+use crate::problem::{Problem, ProblemKind};
+use crate::routes::library::{classic, page};
+
+/// Lists the library, or gives a document of it.
+pub(super) fn library(args: &LibraryArgs) -> Result<(), Problem> {
+    let Some(name) = &args.name else { return print_json(&page()) };
+    // On the command line a wrong name is a wrong argument.
+    let found = classic(name).map_err(|problem| Problem { kind: ProblemKind::Usage, ..problem })?;
+    let document = found.document.as_bytes();
+    match &args.output {
+        Some(path) if path != Path::new("-") => files::write_whole(path, document).map_err(|error| Problem::io(path.display(), &error)),
+        _ => print(document),
+    }
+}
