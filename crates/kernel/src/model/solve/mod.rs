@@ -2,8 +2,8 @@
 //!
 //! Constraints are polynomial equations between the entries of operators and embeddings and the coordinates of
 //! control points. While each of their terms has one unknown factor they are linear, and are eliminated exactly
-//! ([`linear`]); products become linear when a factor is found and substituted. What stays nonlinear is solved near
-//! deterministic starts ([`local`]). The result is affine, T = T0 + sum p_k N_k, with the free parameters p_k named
+//! (`linear`); products become linear when a factor is found and substituted. What stays nonlinear is solved near
+//! deterministic starts (`local`). The result is affine, T = T0 + sum p_k N_k, with the free parameters p_k named
 //! after the entries that stay free.
 
 mod choose;
