@@ -589,7 +589,10 @@ impl Reader<'_> {
                     let residual = left.iter().flatten().zip(right.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                     draft.constraint_residual = draft.constraint_residual.max(residual);
                     if residual > RESIDUAL_ALLOWED {
-                        draft.error(place, code, format!("{paths} differ by {residual:.3e}, and may differ by {RESIDUAL_ALLOWED:.0e}"));
+                        let message = format!(
+                            "{paths} differ by {residual:.3e}, and may differ by {RESIDUAL_ALLOWED:.0e}; correct the operators there, or write null for entries that solve is to find"
+                        );
+                        draft.error(place, code, message);
                     }
                 }
             }
