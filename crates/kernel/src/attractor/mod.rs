@@ -259,8 +259,8 @@ impl Attractor {
     pub fn is_drawn_as_points(&self) -> bool {
         let apart = (0..self.roots.len()).all(|root| !self.has_brep(root));
         apart
-            && self.automaton.states().iter().all(|state| match &state.leaf {
-                LeafPrimitive::Centre => true,
+            && self.automaton.states().iter().enumerate().all(|(index, state)| match &state.leaf {
+                LeafPrimitive::Centre => !self.has_needles(StateId::new(index)),
                 LeafPrimitive::Drawn(drawing) => drawing.segments.is_empty() && drawing.triangles.is_empty(),
                 LeafPrimitive::Simplex => state.dimension == 1,
                 LeafPrimitive::Chord(_) | LeafPrimitive::Star(_) | LeafPrimitive::Polygon(_) => false,

@@ -206,6 +206,23 @@ impl Automaton {
         connection::connect(self, topology);
     }
 
+    /// What holds for a state and, as far as they are reached, for all its descendants: states with a child for which
+    /// it does not hold are struck out, until none is left.
+    pub(crate) fn hereditary(&self, mut holds: Vec<bool>) -> Vec<bool> {
+        loop {
+            let mut changed = false;
+            for (index, state) in self.states.iter().enumerate() {
+                if holds[index] && state.transitions.iter().any(|transition| !holds[transition.to.index()]) {
+                    holds[index] = false;
+                    changed = true;
+                }
+            }
+            if !changed {
+                return holds;
+            }
+        }
+    }
+
     /// Replaces what stands for a leaf cell of a state.
     pub(crate) fn set_leaf(&mut self, id: StateId, leaf: LeafPrimitive) {
         self.states[id.index()].leaf = leaf;

@@ -85,6 +85,8 @@ pub(crate) struct Start {
     cells: Vec<(usize, usize)>,
     /// Of every cell, whether it is an edge that is a single point in space.
     collapsed: Vec<bool>,
+    /// For every state, whether its cells are drawn as part of the complex.
+    drawn: Vec<bool>,
 }
 
 impl Start {
@@ -163,6 +165,7 @@ impl Start {
             whole.collapsed[index[top] as usize] = true;
         }
         topology.tabulate(automaton)?;
+        whole.drawn = drawn(topology, automaton);
         Ok(whole)
     }
 }
@@ -183,26 +186,21 @@ impl Attractor {
     /// Whether a root's cells are drawn as one complex: curves between two vertices, wires that branch, or a
     /// face that its edges surround, and so all its descendants.
     pub(super) fn has_brep(&self, root: usize) -> bool {
-        let Some((topology, _)) = &self.brep else { return false };
-        let mut seen = vec![false; self.automaton.states().len()];
-        let mut stack = vec![self.roots[root].state];
-        while let Some(id) = stack.pop() {
-            if std::mem::replace(&mut seen[id.index()], true) {
-                continue;
-            }
-            let own = topology.state(id);
-            let drawn = match own.dimension {
-                1 => own.chain.is_some() || matches!(self.automaton.state(id).leaf, LeafPrimitive::Star(_)),
-                2 => own.outline.is_some(),
-                _ => false,
-            };
-            if !drawn {
-                return false;
-            }
-            stack.extend(self.automaton.state(id).transitions.iter().map(|transition| transition.to));
-        }
-        true
+        self.brep.as_ref().is_some_and(|(_, start)| start.drawn[self.roots[root].state.index()])
     }
+}
+
+/// For every state, whether cells of it and of all its descendants are drawn; see [`Attractor::has_brep`].
+fn drawn(topology: &Topology, automaton: &Automaton) -> Vec<bool> {
+    let alone = automaton.states().iter().enumerate().map(|(index, state)| {
+        let own = topology.state(StateId::new(index));
+        match own.dimension {
+            1 => own.chain.is_some() || matches!(state.leaf, LeafPrimitive::Star(_)),
+            2 => own.outline.is_some(),
+            _ => false,
+        }
+    });
+    automaton.hereditary(alone.collect())
 }
 
 /// The complex in the making.

@@ -174,7 +174,7 @@ impl Topology {
                 topology.states[id.index()].chain = chain;
                 topology.states[id.index()].outline = outline;
             }
-            topology.keep_true_curves(automaton, &states);
+            topology.keep_true_curves(automaton);
             topology.find_connected(automaton, &states);
             for &id in &states {
                 topology.states[id.index()].middle = topology.build_middle(automaton, id);
@@ -195,20 +195,10 @@ impl Topology {
     }
 
     /// Edges are chains only if all their descendants are.
-    fn keep_true_curves(&mut self, automaton: &Automaton, states: &[StateId]) {
-        loop {
-            let broken: Vec<StateId> = states
-                .iter()
-                .copied()
-                .filter(|id| {
-                    let children = || automaton.state(*id).transitions.iter();
-                    self.state(*id).chain.is_some() && children().any(|t| self.state(t.to).chain.is_none())
-                })
-                .collect();
-            if broken.is_empty() {
-                return;
-            }
-            broken.iter().for_each(|id| self.states[id.index()].chain = None);
+    fn keep_true_curves(&mut self, automaton: &Automaton) {
+        let curves = self.states.iter().map(|state| state.chain.is_some()).collect();
+        for (state, curve) in self.states.iter_mut().zip(automaton.hereditary(curves)) {
+            state.chain = state.chain.take().filter(|_| curve);
         }
     }
 
@@ -229,16 +219,9 @@ impl Topology {
             }
             self.states[id.index()].connected = group.iter().all(|&own| own == group[0]);
         }
-        loop {
-            let broken: Vec<StateId> = states
-                .iter()
-                .copied()
-                .filter(|id| self.state(*id).connected && automaton.state(*id).transitions.iter().any(|t| !self.state(t.to).connected))
-                .collect();
-            if broken.is_empty() {
-                return;
-            }
-            broken.iter().for_each(|id| self.states[id.index()].connected = false);
+        let connected = self.states.iter().map(|state| state.connected).collect();
+        for (state, connected) in self.states.iter_mut().zip(automaton.hereditary(connected)) {
+            state.connected = connected;
         }
     }
 
