@@ -42,40 +42,49 @@ enum Choice {
 pub(crate) struct SiteRule<'a> {
     attractor: &'a Attractor,
     radius: f64,
-    /// Allowed errors, inner and outer.
-    inner: f64,
-    outer: f64,
+    tolerance: f64,
     choices: Vec<Choice>,
+    /// Whether some sites may lie off the attractor.
+    reserved: bool,
 }
 
-/// Shares of a dilation's tolerance that sites may use, inner and outer: the outer share is taken from the
-/// lattice, whose error is outer and of first order, so it is spent only on sites that need it.
-const INNER_SHARE: f64 = 0.4;
-const OUTER_SHARE: f64 = 0.15;
+/// The share of (r + e)^2 - (r - e)^2 = 4 r e that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
+/// needs a finer lattice.
+const SITE_SHARE: f64 = 0.3;
 
 impl<'a> SiteRule<'a> {
     /// The rule for a dilation by `radius` to `tolerance`, both in mm.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
-        let (inner, outer) = (INNER_SHARE * tolerance, OUTER_SHARE * tolerance);
-        let mut rule = Self { attractor, radius, inner, outer, choices: Vec::new() };
+        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new(), reserved: true };
         choose(&mut rule);
+        rule.reserved = rule.errs_outwards();
         rule
     }
 
-    /// The share of the tolerance that must be kept from the lattice's outer error.
-    pub(crate) fn outer_reserve(&self) -> f64 {
-        let exact = |(index, choice): (usize, &Choice)| {
-            *choice == Choice::Cover || self.attractor.automaton().states()[index].leaf == LeafPrimitive::Simplex
-        };
-        if self.choices.iter().enumerate().all(exact) { 0.0 } else { self.outer }
+    /// Whether all sites are cells themselves, without error.
+    fn exact(&self) -> bool {
+        self.attractor.automaton().states().iter().all(|state| state.leaf == LeafPrimitive::Simplex)
     }
 
-    /// The share that must be kept from the lattice's inner error.
-    pub(crate) fn inner_reserve(&self) -> f64 {
-        if self.attractor.automaton().states().iter().all(|state| state.leaf == LeafPrimitive::Simplex) { 0.0 } else { self.inner }
+    /// The share of 4 r e that is the lattice's.
+    pub(crate) fn lattice_share(&self) -> f64 {
+        if self.exact() { 1.0 } else { 1.0 - SITE_SHARE }
+    }
+
+    /// How far sites may be from the attractor: the share of the tolerance that must be kept from the lattice's outer error.
+    pub(crate) fn outer_reserve(&self) -> f64 {
+        if self.reserved { SITE_SHARE * self.tolerance } else { 0.0 }
+    }
+
+    fn errs_outwards(&self) -> bool {
+        let states = self.attractor.automaton().states();
+        self.choices.iter().zip(states).any(|(choice, state)| *choice != Choice::Cover && state.leaf != LeafPrimitive::Simplex)
     }
 
     /// The errors of a cell if it is small enough to be replaced.
+    ///
+    /// Either what it takes is inner alone, (r - e + inner)^2 + inner_square - (r - e)^2 <= share 4 r e; or it may err by the share of e
+    /// both ways, which takes as much of (r + e)^2 and (r - e)^2 together.
     #[inline]
     pub(crate) fn leaf(&self, cell: &Cell, points: &[ControlPoint]) -> Option<SiteError> {
         let error = match self.choices[cell.state.index()] {
@@ -89,9 +98,10 @@ impl<'a> SiteRule<'a> {
                 SiteError { inner_square: square, inner: cover.halo.image(&columns).radius(), outer: 0.0 }
             }
         };
-        let rest = self.radius * self.radius - error.inner_square;
-        let inner = if rest > 0.0 { self.radius - rest.sqrt() + error.inner } else { f64::INFINITY };
-        (inner <= self.inner && error.outer <= self.outer).then_some(error)
+        let (reserve, least) = (SITE_SHARE * self.tolerance, self.radius - self.tolerance);
+        let taken = (least + error.inner).powi(2) + error.inner_square - least * least;
+        let allowed = if self.reserved { (least + reserve).powi(2) - least * least } else { 4.0 * self.radius * reserve };
+        (taken <= allowed && error.outer <= reserve).then_some(error)
     }
 
     /// Emits the sites of a leaf.
@@ -152,6 +162,7 @@ fn choose(rule: &mut SiteRule<'_>) {
                 continue;
             }
             below.iter().for_each(|&state| rule.choices[state] = choice);
+            rule.reserved = choice != Choice::Cover;
             // Sites that are exact leave the lattice a larger share.
             let work = expected_sites(rule, index) * if choice == Choice::Cover { 1.0 } else { INEXACT };
             if work < best.0 {

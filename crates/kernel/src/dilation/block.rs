@@ -1,31 +1,26 @@
-//! One block of the lattice: signs, the piece of surface, and its certificate.
+//! One block of the lattice: which sites matter in each tetrahedron, what they leave of it, and the piece of surface.
 //!
-//! Lattice vertices are inside when d <= r. The surface cuts an edge from an inside vertex v0 to an outside
-//! vertex v1 at p, the outermost of: the root of the linear interpolation of d^2, the exit of v0's nearest
-//! site's ball, and the exit of v1's nearest site's ball if it continues the former. Then, with R the
-//! radius of the tetrahedron's smallest enclosing ball:
+//! Let K be a tetrahedron of circumradius R, S_i convex sites, theta > 0, and L_i the affine function with the values of d(., S_i)^2 at K's
+//! vertices. The solid's part of K is where some L_i < theta. For a convex site d^2 is convex, and d^2 - |x|^2, a minimum of affine
+//! functions, is concave; so
 //!
-//! *Inner.* d^2 - |x|^2 is a minimum of affine functions, hence concave. p is no nearer to v0 than the linear
-//! root, so the linear interpolant of d^2 is at least r^2 at every corner of the part of the tetrahedron
-//! outside the solid, and d^2 >= r^2 - R^2 there: the solid contains D(sqrt(r^2 - R^2)).
+//! d(x, S_i)^2 <= L_i(x) <= d(x, S_i)^2 + (interpolant of |x|^2 minus |x|^2) <= d(x, S_i)^2 + R^2:
 //!
-//! *Outer, a priori.* A point x of the part inside the solid is a convex combination of points y_k of the
-//! tetrahedron, lattice vertices or points of balls, with sum w_k d(y_k)^2 <= r^2; so sum w_k d(y_k) <= r,
-//! sum w_k |x - y_k| <= R, and d(x) <= r + R since d is 1-Lipschitz.
-//!
-//! *Outer, measured.* The distance to a convex site is convex, so on that part it is largest at a corner:
-//! d <= min over sites of the largest corner distance.
-//!
-//! Roots are clamped to [t, 1 - t] of the edge, so that rounding to single precision keeps triangles apart
-//! and not degenerate; the clamping and the rounding are added to both bounds.
+//! the solid lies within D(sqrt(theta)) and contains D(sqrt(theta - R^2)). No crease is cut off: the bound is of second order
+//! in the pitch everywhere, whatever sites compete. What is outside is a convex polytope in every tetrahedron, see [`Outside`]; a face's polygon
+//! depends on the face's values alone, so that neighbours fit, and the surface is a manifold: around a point inside a
+//! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
-use super::Setting;
-use super::lattice::{CUTS, EDGE_ENDS, EDGES, Tetrahedron};
-use super::tree::{Candidates, Hit, NodeId, SiteId, Tree};
+use super::plan::Setting;
+use super::lattice::{LatticeVertex, Tetrahedron};
+use super::outside::{Cut, FACES, HalfSpace, MOST, Outside};
+use super::tree::{Candidates, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
-use crate::attractor::cell::{Point, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::measure::triangle::{Feature, closest_feature};
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Cubes along a block's side.
 pub(super) const SIDE: usize = 16;
@@ -35,58 +30,64 @@ const LAYER: usize = SIDE + 1;
 const VERTICES: usize = LAYER * LAYER * LAYER;
 /// Value of a vertex not evaluated yet.
 const UNKNOWN: f64 = f64::NAN;
-/// Value of a vertex deeper than the band around the surface.
+/// Value of a vertex so near to a site that it covers every tetrahedron there.
 const DEEP: f64 = f64::NEG_INFINITY;
-/// Value of a vertex beyond the band.
+/// Value of a vertex that no site covers.
 const FAR: f64 = f64::INFINITY;
-const NONE: u32 = u32::MAX;
-/// Steps of a walk away from nearest sites.
-const WALK: usize = 12;
-/// Where the surface passes a filled vertex, as a share of the edge.
-const FILLED_CUT: f64 = 0.125;
-
-/// On which side of the surface a lattice vertex is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Label {
-    Unknown,
-    Outside,
-    Inside,
-    /// Outside D_r, where no ball outside fits: see [`Workshop::label`].
-    Filled,
-}
 
 /// The surface in one block, ready to be joined with its neighbours.
 #[derive(Debug, Default)]
 pub(super) struct BlockSurface {
     /// Index of the block's first cube.
     pub(super) first_cube: [i64; 3],
-    /// Vertices on edges that the block owns, rounded to single precision.
-    pub(super) vertices: Vec<[f32; 3]>,
-    /// Corners: below `vertices.len()` own vertices, else entries of `foreign`.
+    /// Vertices in mm.
+    pub(super) vertices: Vec<Point>,
+    /// Corners.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Vertices on edges of following blocks.
-    pub(super) foreign: Vec<ForeignVertex>,
-    /// Own vertices that preceding blocks may use, by key: sorted.
-    pub(super) shared: Vec<(u32, u32)>,
-    /// max of d - r over the solid's part of the block, at most.
-    pub(super) outer: f64,
-    /// max of r^2 - (linear interpolant of d^2) over cut points: from clamping.
-    pub(super) inner_square: f64,
+    /// Names of vertices that other blocks may have too.
+    pub(super) shared: Vec<(VertexName, u32)>,
     /// Leaf cells met.
     pub(super) leaves: u64,
     /// Largest errors of leaves met.
     pub(super) site_error: SiteError,
 }
 
-/// A vertex on an edge that belongs to a following block.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ForeignVertex {
-    /// Where that block lies: a bit per axis.
-    pub(super) block: u8,
-    /// The edge's key there.
-    pub(super) key: u32,
-    /// Position, the same whoever computes it.
-    pub(super) position: [f32; 3],
+/// What a vertex on an edge or a face of the lattice is called by every tetrahedron there.
+pub(super) type VertexName = u128;
+
+/// Names are mixed already.
+#[derive(Default)]
+pub(super) struct NameHasher(u64);
+
+impl Hasher for NameHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u128(u128::from(byte));
+        }
+    }
+    fn write_u128(&mut self, name: u128) {
+        self.0 = mix(self.0 ^ name as u64 ^ mix((name >> 64) as u64));
+    }
+}
+
+/// A bijection of 64 bits that spreads every bit (the finaliser of SplitMix64).
+fn mix(mut x: u64) -> u64 {
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
+
+/// The four vertices of a tetrahedron in the order of their numbers.
+struct Frame {
+    numbers: [u64; 4],
+    positions: [Point; 4],
+    /// The nearest site of every vertex that one covers.
+    nearest: [Option<SiteId>; 4],
+    /// Whether the order turned the tetrahedron inside out.
+    mirrored: bool,
 }
 
 /// Working memory of a thread, reused from block to block.
@@ -96,17 +97,16 @@ pub(super) struct Workshop<'a> {
     tetrahedra: Vec<Tetrahedron>,
     /// Squared distances at corner and centre vertices.
     values: [Vec<f64>; 2],
-    closest: [Vec<Point>; 2],
     sites: [Vec<SiteId>; 2],
-    /// Labels of corner and centre vertices.
-    labels: [Vec<Label>; 2],
-    edges: Vec<u32>,
-    touched: Vec<u32>,
     near: Vec<NodeId>,
-    cut_points: Vec<Point>,
     /// Starts of every solid's own triangles among the near nodes.
     solid_nodes: Vec<(u32, Vec<NodeId>)>,
     seed: Option<NodeId>,
+    outside: Outside,
+    found: Vec<SiteId>,
+    polygon: Vec<u16>,
+    corners: Vec<u32>,
+    names: HashMap<VertexName, u32, BuildHasherDefault<NameHasher>>,
 }
 
 impl<'a> Workshop<'a> {
@@ -116,24 +116,22 @@ impl<'a> Workshop<'a> {
             tree: Tree::new(rule, setting.slack, 4 * setting.cells),
             tetrahedra: super::lattice::tetrahedra(),
             values: [vec![UNKNOWN; VERTICES], vec![UNKNOWN; VERTICES]],
-            closest: [vec![[0.0; 3]; VERTICES], vec![[0.0; 3]; VERTICES]],
             sites: [vec![SiteId::Listed(0); VERTICES], vec![SiteId::Listed(0); VERTICES]],
-            labels: [vec![Label::Unknown; VERTICES], vec![Label::Unknown; VERTICES]],
-            edges: vec![NONE; VERTICES * EDGES],
-            touched: Vec::new(),
             near: Vec::new(),
-            cut_points: Vec::new(),
             solid_nodes: Vec::new(),
             seed: None,
+            outside: Outside::default(),
+            found: Vec::new(),
+            polygon: Vec::new(),
+            corners: Vec::new(),
+            names: HashMap::default(),
         }
     }
 
     /// The surface in the block whose first cube is given; `open` lists the solids whose surface meets it.
     pub(super) fn surface(&mut self, setting: &Setting, first_cube: [i64; 3], candidates: &Candidates, open: &[u32]) -> BlockSurface {
         self.values.iter_mut().for_each(|values| values.fill(UNKNOWN));
-        self.labels.iter_mut().for_each(|labels| labels.fill(Label::Unknown));
-        self.touched.drain(..).for_each(|edge| self.edges[edge as usize] = NONE);
-        self.cut_points.clear();
+        self.names.clear();
         self.seed = None;
         let starts: Vec<NodeId> = self.tree.reset(candidates).collect();
         let mut surface = BlockSurface { first_cube, ..BlockSurface::default() };
@@ -144,6 +142,7 @@ impl<'a> Workshop<'a> {
                 }
             }
         }
+        surface.shared.sort_unstable();
         surface.leaves = self.tree.leaves;
         surface.site_error = self.tree.largest_error;
         surface
@@ -160,37 +159,32 @@ impl<'a> Workshop<'a> {
         let half = 0.5 * (SUB as f64 + 0.5);
         let corner = setting.lattice.corner(std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64));
         let middle: Point = corner.map(|x| x + half * setting.lattice.pitch);
-        let reach = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001 + setting.gap;
-        let solid = !open.is_empty();
-        let band = setting.band;
-        // Sites farther than this from the middle are nearest to no vertex that matters.
-        let horizon = setting.radius + band + reach;
-        let enough = setting.radius - half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
-        let hit =
-            self.tree.nearest(&middle, starts, self.seed, if solid { f64::INFINITY } else { horizon }, if solid { 0.0 } else { enough });
+        let half = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+        let horizon = setting.reach + half;
+        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.reach - half);
         let Some(hit) = hit else { return };
-        let distance = hit.distance_squared.sqrt();
-        let own = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
-        if distance - setting.radius > own + setting.gap || setting.radius - distance > own {
+        if hit.distance_squared.sqrt() + half < setting.reach {
+            // One site covers every vertex.
             return;
         }
         self.seed = Some(hit.node);
-        let gathered = if solid { distance + 2.0 * reach } else { (distance + 2.0 * reach).min(horizon) };
         let mut near = std::mem::take(&mut self.near);
-        self.tree.gather(&middle, starts, gathered, &mut near);
+        self.tree.gather(&middle, starts, horizon, &mut near);
         self.near = near;
-        self.gather_solids(starts, open, &middle, reach);
+        self.gather_solids(starts, open, &middle, half);
         for k in first[2]..first[2] + SUB {
             for j in first[1]..first[1] + SUB {
                 for i in first[0]..first[0] + SUB {
-                    self.cube(setting, [i, j, k], surface);
+                    for number in 0..self.tetrahedra.len() {
+                        self.tetrahedron(setting, number, [i, j, k], surface);
+                    }
                 }
             }
         }
     }
 
     /// For every solid whose surface is among the candidates: its nodes near the sub-block.
-    fn gather_solids(&mut self, starts: &[NodeId], open: &[u32], middle: &Point, reach: f64) {
+    fn gather_solids(&mut self, starts: &[NodeId], open: &[u32], middle: &Point, half: f64) {
         self.solid_nodes.clear();
         for &solid in open {
             let own = |id: &NodeId| self.attractor.roots()[self.tree.root_of(*id) as usize].solid == Some(solid);
@@ -200,7 +194,7 @@ impl<'a> Workshop<'a> {
             }
             if let Some(hit) = self.tree.nearest(middle, &nodes, None, f64::INFINITY, 0.0) {
                 let mut near = Vec::new();
-                self.tree.gather(middle, &nodes, hit.distance_squared.sqrt() + 2.0 * reach, &mut near);
+                self.tree.gather(middle, &nodes, hit.distance_squared.sqrt() + 2.0 * half, &mut near);
                 self.solid_nodes.push((solid, near));
             }
         }
@@ -217,7 +211,7 @@ impl<'a> Workshop<'a> {
         if centre { setting.lattice.centre(index) } else { setting.lattice.corner(index) }
     }
 
-    /// The value of a vertex: d^2 within the band, else DEEP or FAR.
+    /// The value of a vertex: d^2 where a site covers it, else FAR; DEEP where that is sure to cover all around.
     fn value(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> f64 {
         let (kind, index) = (usize::from(centre), Self::index(cube));
         let known = self.values[kind][index];
@@ -225,23 +219,17 @@ impl<'a> Workshop<'a> {
             return known;
         }
         let x = Self::position(setting, surface, centre, cube);
-        let hit = self.tree.nearest(&x, &self.near, self.seed, setting.radius + setting.band, setting.deep);
-        let value = match hit {
-            None => {
-                if self.inside_solid(&x) {
+        let value = match self.tree.nearest(&x, &self.near, self.seed, setting.reach, setting.deep) {
+            None => FAR,
+            Some(hit) => {
+                self.seed = Some(hit.node);
+                self.sites[kind][index] = hit.site;
+                if hit.distance_squared.sqrt() < setting.deep {
                     DEEP
+                } else if setting.integer(hit.distance_squared) < 0 {
+                    hit.distance_squared
                 } else {
                     FAR
-                }
-            }
-            Some(Hit { distance_squared, closest, site, node }) => {
-                self.seed = Some(node);
-                self.closest[kind][index] = closest;
-                self.sites[kind][index] = site;
-                if distance_squared < setting.deep_square || (distance_squared > setting.square && self.inside_solid(&x)) {
-                    DEEP
-                } else {
-                    distance_squared
                 }
             }
         };
@@ -261,299 +249,203 @@ impl<'a> Workshop<'a> {
         inside
     }
 
-    /// The side of a vertex: inside D_r closed by a ball of radius `gap`.
-    ///
-    /// Where two walls of a crease come closer than a lattice edge, edges from wall to wall close the gap with no
-    /// vertex in it, and a vertex left open deeper in the gap would be the inside of a false tunnel. Closing
-    /// fills such gaps as a whole and leaves an outside as smooth as the lattice can follow. It adds points within
-    /// `gap` of D_r; they are certified like everything else.
-    fn label(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> Label {
-        let (kind, index) = (usize::from(centre), Self::index(cube));
-        if self.labels[kind][index] != Label::Unknown {
-            return self.labels[kind][index];
+    /// The vertices of a tetrahedron, if some are covered and none is deep.
+    fn frame(&mut self, setting: &Setting, number: usize, cube: [usize; 3], surface: &BlockSurface) -> Option<Frame> {
+        let tetrahedron = self.tetrahedra[number];
+        let mut covered = false;
+        for vertex in &tetrahedron.vertices {
+            let value = self.value(setting, surface, vertex.centre, shifted(cube, vertex.offset));
+            if value == DEEP {
+                return None;
+            }
+            covered |= value != FAR;
         }
-        let value = self.value(setting, surface, centre, cube);
-        let label = if value <= setting.square {
-            Label::Inside
-        } else if value <= setting.gap_square && self.in_gap(setting, surface, centre, cube) {
-            Label::Filled
-        } else {
-            Label::Outside
+        if !covered {
+            return None;
+        }
+        let number_of = |vertex: &LatticeVertex| -> u64 {
+            let at = shifted(cube, vertex.offset);
+            (0..3).fold(0, |code, axis| {
+                let fine = 2 * (surface.first_cube[axis] + at[axis] as i64) as u64 + u64::from(vertex.centre);
+                code << 21 | fine
+            })
         };
-        self.labels[kind][index] = label;
-        label
+        let mut order = [0, 1, 2, 3];
+        let numbers = tetrahedron.vertices.map(|vertex| number_of(&vertex));
+        order.sort_unstable_by_key(|&k| numbers[k]);
+        let inversions = (0..4).flat_map(|k| (0..k).map(move |l| (k, l))).filter(|&(k, l)| order[l] > order[k]).count();
+        let vertices = order.map(|k| tetrahedron.vertices[k]);
+        Some(Frame {
+            numbers: order.map(|k| numbers[k]),
+            positions: vertices.map(|vertex| Self::position(setting, surface, vertex.centre, shifted(cube, vertex.offset))),
+            nearest: vertices.map(|vertex| {
+                let (kind, index) = (usize::from(vertex.centre), Self::index(shifted(cube, vertex.offset)));
+                (self.values[kind][index] != FAR).then(|| self.sites[kind][index])
+            }),
+            mirrored: inversions % 2 == 1,
+        })
     }
 
-    /// Whether no ball of radius `gap` outside D_r was found that contains the vertex. Its centre is sought by
-    /// walking away from the nearest site, as far as the vertex allows. In a crease the walk leads out of the
-    /// gap and is held by the vertex; where it comes to rest before, it is in a neck between two parts of the
-    /// outside, which stays open if it is wide enough for the lattice.
-    fn in_gap(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> bool {
-        let (kind, index) = (usize::from(centre), Self::index(cube));
-        let x = Self::position(setting, surface, centre, cube);
-        let free = setting.radius + setting.gap;
-        let mut nearest = self.closest[kind][index];
-        let mut y = x;
-        let (mut clearance, mut held) = (0.0, false);
-        for _ in 0..WALK {
-            let away = subtract(&y, &nearest);
-            let scale = free / dot(&away, &away).sqrt();
-            let target: Point = std::array::from_fn(|axis| nearest[axis] + scale * away[axis]);
-            let offset = subtract(&target, &x);
-            let length = dot(&offset, &offset).sqrt();
-            let share = if length > setting.gap { setting.gap / length } else { 1.0 };
-            y = std::array::from_fn(|axis| x[axis] + share * offset[axis]);
-            match self.tree.nearest(&y, &self.near, self.seed, free * (1.0 - 1e-3), 0.0) {
-                None => return false,
-                Some(hit) => {
-                    nearest = hit.closest;
-                    clearance = hit.distance_squared.sqrt() - setting.radius;
+    /// Cuts what all sites cover out of a tetrahedron and emits the surface of the rest.
+    fn tetrahedron(&mut self, setting: &Setting, number: usize, cube: [usize; 3], surface: &mut BlockSurface) {
+        let Some(frame) = self.frame(setting, number, cube, surface) else { return };
+        self.outside.reset();
+        let mut tried: [Option<SiteId>; 4] = [None; 4];
+        for k in 0..4 {
+            let Some(site) = frame.nearest[k] else { continue };
+            if !tried.contains(&Some(site)) {
+                tried[k] = Some(site);
+                if self.cut(setting, &frame, site) == Cut::Empty {
+                    return;
                 }
             }
-            held = share < 1.0;
         }
-        held || clearance < setting.neck
-    }
-
-    /// The twelve tetrahedra of a cube, unless its centre is so far from the surface that none is cut.
-    fn cube(&mut self, setting: &Setting, cube: [usize; 3], surface: &mut BlockSurface) {
-        if !self.value(setting, surface, true, cube).is_finite() {
+        let (centre, radius) = self.ball(&frame);
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        self.tree.collect(&centre, &self.near, setting.reach + radius, &mut found);
+        let mut empty = false;
+        for &site in &found {
+            if !tried.contains(&Some(site)) && self.cut(setting, &frame, site) == Cut::Empty {
+                empty = true;
+                break;
+            }
+        }
+        self.found = found;
+        if empty {
             return;
         }
-        for number in 0..self.tetrahedra.len() {
-            let tetrahedron = self.tetrahedra[number];
-            let mut inside = 0;
-            for (position, vertex) in tetrahedron.vertices.iter().enumerate() {
-                let label = self.label(setting, surface, vertex.centre, shifted(cube, vertex.offset));
-                inside |= usize::from(label != Label::Outside) << position;
-            }
-            match inside {
-                0 => {}
-                15 => self.certify_full(setting, surface, &tetrahedron, cube),
-                _ => self.cut(setting, surface, &tetrahedron, cube, inside),
-            }
-        }
-    }
-
-    /// Emits the triangles of a tetrahedron that the surface cuts, and certifies its part of the solid.
-    fn cut(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3], inside: usize) {
-        let cuts = CUTS[inside];
-        let mut corners = [0_u32; 4];
-        let mut part = [[0.0; 3]; 7];
-        let mut count = 0;
-        for (corner, &edge) in corners.iter_mut().zip(cuts) {
-            *corner = self.edge_vertex(setting, surface, tetrahedron, cube, inside, edge);
-            part[count] = self.cut_points[*corner as usize];
-            count += 1;
-        }
-        let quadrilateral = [part[0], part[1], part[2], part[3]];
-        if cuts.len() == 3 {
-            surface.triangles.push([corners[0], corners[1], corners[2]]);
-        } else if distance_squared(&quadrilateral[0], &quadrilateral[2]) <= distance_squared(&quadrilateral[1], &quadrilateral[3]) {
-            surface.triangles.push([corners[0], corners[1], corners[2]]);
-            surface.triangles.push([corners[0], corners[2], corners[3]]);
-        } else {
-            surface.triangles.push([corners[1], corners[2], corners[3]]);
-            surface.triangles.push([corners[1], corners[3], corners[0]]);
-        }
-        for (position, vertex) in tetrahedron.vertices.iter().enumerate() {
-            if inside >> position & 1 == 1 {
-                let at = shifted(cube, vertex.offset);
-                part[count] = Self::position(setting, surface, vertex.centre, at);
-                count += 1;
-            }
-        }
-        self.certify(setting, surface, tetrahedron, cube, &part[..count]);
-    }
-
-    /// A tetrahedron inside the solid may still reach beyond D(r): where creases meet over its middle.
-    fn certify_full(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3]) {
-        let mut largest = DEEP;
-        for vertex in &tetrahedron.vertices {
-            let value = self.values[usize::from(vertex.centre)][Self::index(shifted(cube, vertex.offset))];
-            if value == DEEP {
+        // What is left is far from all surfaces, so it is on one side of them.
+        if !self.solid_nodes.is_empty() {
+            let (centre, _) = self.ball(&frame);
+            if self.inside_solid(&centre) {
                 return;
             }
-            largest = largest.max(value);
         }
-        let enough = setting.radius + surface.outer - setting.enclosing;
-        if enough > 0.0 && largest <= enough * enough {
-            return;
-        }
-        let part = tetrahedron.vertices.map(|vertex| Self::position(setting, surface, vertex.centre, shifted(cube, vertex.offset)));
-        self.certify(setting, surface, tetrahedron, cube, &part);
+        self.emit(&frame, surface);
     }
 
-    /// Raises the block's outer bound to that of a convex part of a tetrahedron, given by its corners p_k.
-    ///
-    /// For sites c_i: d(x) - r <= e_i(x) = sum w_k (|p_k - c_i| - r) for x = sum w_k p_k, by convexity, so
-    /// d(x) - r <= sum m_i e_i(x) for all weights m_i that sum to 1, and the largest entry of the combined row
-    /// sum m_i (|p_k - c_i| - r) bounds the part. [`game_value`] looks for good weights.
-    fn certify(&mut self, setting: &Setting, surface: &mut BlockSurface, tetrahedron: &Tetrahedron, cube: [usize; 3], part: &[Point]) {
-        let mut excess = [[0.0_f64; 7]; 4];
-        let mut sites = 0;
-        let mut best = f64::INFINITY;
-        let mut filled = false;
-        for vertex in &tetrahedron.vertices {
-            let (kind, index) = (usize::from(vertex.centre), Self::index(shifted(cube, vertex.offset)));
-            filled |= self.labels[kind][index] == Label::Filled;
-            if !self.values[kind][index].is_finite() {
+    fn cut(&mut self, setting: &Setting, frame: &Frame, site: SiteId) -> Cut {
+        let site = self.tree.site(site);
+        let values = frame.positions.map(|x| setting.integer(site.distance_squared(&x)));
+        // A site that is farther than reach + pitch from a vertex covers nothing of the tetrahedron.
+        if values.iter().any(|&value| value > MOST) || values.iter().all(|&value| value > 0) {
+            return Cut::Missed;
+        }
+        self.outside.cut(HalfSpace { values, name: name_of(&site) })
+    }
+
+    /// A ball around what is left.
+    fn ball(&self, frame: &Frame) -> (Point, f64) {
+        let corners = self.outside.corners();
+        let mut centre = [0.0; 3];
+        for corner in corners {
+            let at = place(&frame.positions, &corner.weights);
+            centre = std::array::from_fn(|axis| centre[axis] + at[axis] / corners.len() as f64);
+        }
+        let square = corners.iter().map(|corner| distance_squared(&place(&frame.positions, &corner.weights), &centre)).fold(0.0, f64::max);
+        (centre, square.sqrt())
+    }
+
+    /// Emits the polygons of the sites' facets.
+    fn emit(&mut self, frame: &Frame, surface: &mut BlockSurface) {
+        let outside = std::mem::take(&mut self.outside);
+        self.corners.clear();
+        self.corners.resize(outside.corners().len(), u32::MAX);
+        for facet in FACES..outside.facets() {
+            outside.polygon(facet, &mut self.polygon);
+            if self.polygon.is_empty() {
                 continue;
             }
-            let site = self.tree.site(self.sites[kind][index]);
-            let row = &mut excess[sites];
-            for (entry, corner) in row.iter_mut().zip(part) {
-                *entry = site.distance_squared(corner).sqrt() - setting.radius;
+            for index in 0..self.polygon.len() {
+                let corner = usize::from(self.polygon[index]);
+                if self.corners[corner] == u32::MAX {
+                    self.corners[corner] = self.vertex(&outside, frame, corner, surface);
+                }
             }
-            best = best.min(row[..part.len()].iter().copied().fold(f64::NEG_INFINITY, f64::max));
-            if best <= surface.outer {
-                return;
+            let polygon = &self.polygon;
+            let at = |k: usize| self.corners[usize::from(polygon[k])];
+            for k in 1..polygon.len() - 1 {
+                // Counter-clockwise seen from the polytope's outside is clockwise seen from the solid's.
+                surface.triangles.push(if frame.mirrored { [at(0), at(k), at(k + 1)] } else { [at(0), at(k + 1), at(k)] });
             }
-            sites += 1;
         }
-        best = best.min(game_value(&mut excess[..sites], part.len(), surface.outer));
-        if best <= surface.outer {
-            return;
-        }
-        // Without filled vertices the bound a priori holds too.
-        surface.outer = surface.outer.max(if filled { best } else { best.min(setting.enclosing) });
+        self.outside = outside;
     }
 
-    /// The vertex where the surface cuts an edge: made once.
-    fn edge_vertex(
-        &mut self,
-        setting: &Setting,
-        surface: &mut BlockSurface,
-        tetrahedron: &Tetrahedron,
-        cube: [usize; 3],
-        inside: usize,
-        edge: usize,
-    ) -> u32 {
-        let lattice_edge = tetrahedron.edges[edge];
-        let owner = shifted(cube, lattice_edge.offset);
-        let key = Self::index(owner) * EDGES + lattice_edge.number as usize;
-        if self.edges[key] != NONE {
-            return self.edges[key];
-        }
-        let (p, q) = EDGE_ENDS[edge];
-        let (from, to) = if inside >> p & 1 == 1 { (p, q) } else { (q, p) };
-        let end = |position: usize| {
-            let vertex = tetrahedron.vertices[position];
-            let at = shifted(cube, vertex.offset);
-            let (kind, index) = (usize::from(vertex.centre), Self::index(at));
-            End {
-                at: Self::position(setting, surface, vertex.centre, at),
-                square: self.values[kind][index],
-                closest: self.closest[kind][index],
-            }
+    /// The number of a corner in the block's list, made when first met.
+    fn vertex(&mut self, outside: &Outside, frame: &Frame, index: usize, surface: &mut BlockSurface) -> u32 {
+        let corner = &outside.corners()[index];
+        let make = |surface: &mut BlockSurface| {
+            surface.vertices.push(place(&frame.positions, &corner.weights));
+            surface.vertices.len() as u32 - 1
         };
-        let (start, stop) = (end(from), end(to));
-        // A filled vertex is beyond r already: the surface passes close to it.
-        let (point, slack) = if start.square > setting.square {
-            (std::array::from_fn(|axis| start.at[axis] + FILLED_CUT * (stop.at[axis] - start.at[axis])), 0.0)
+        let faces = corner.facets.iter().filter(|&&facet| facet < FACES).fold(0_u8, |bits, facet| bits | 1 << facet);
+        if faces == 0 {
+            return make(surface);
+        }
+        let mut names = corner.facets.iter().filter(|&&facet| facet >= FACES).map(|&facet| outside.name(facet));
+        let on = (0..4).filter(|k| faces >> k & 1 == 0).map(|k| frame.numbers[k]);
+        let name = if faces.count_ones() == 2 {
+            // An edge: named by its vertices and which of them is covered from here.
+            let mut ends = (0..4).filter(|k| faces >> k & 1 == 0);
+            let (first, second) = (ends.next().unwrap_or(0), ends.next().unwrap_or(0));
+            let values = outside.values(corner.facets.iter().copied().find(|&facet| facet >= FACES).unwrap_or(0));
+            let from_first = values[first] < values[second];
+            (u128::from(frame.numbers[first]) << 63 | u128::from(frame.numbers[second])) << 1 | u128::from(from_first)
         } else {
-            crossing(setting, &start, &stop)
+            let (p, q) = (names.next().unwrap_or(0), names.next().unwrap_or(0));
+            let mut low = mix(p.min(q));
+            let mut high = mix(p.max(q) ^ 0x9E37_79B9_7F4A_7C15);
+            for number in on {
+                low = mix(low ^ number);
+                high = mix(high.rotate_left(17) ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ p.wrapping_add(q));
+            }
+            u128::from(high) << 64 | u128::from(low) | 1 << 127
         };
-        surface.inner_square = surface.inner_square.max(slack);
-        let local = self.cut_points.len() as u32;
-        self.cut_points.push(point);
-        self.edges[key] = local;
-        self.touched.push(key as u32);
-        local
+        if let Some(&known) = self.names.get(&name) {
+            return known;
+        }
+        let number = make(surface);
+        self.names.insert(name, number);
+        if self.is_shared(frame, faces, surface) {
+            surface.shared.push((name, number));
+        }
+        number
     }
 
-    /// Renumbers the corners so that own vertices come first, and lists what others need.
-    pub(super) fn finish(&mut self, surface: &mut BlockSurface) {
-        let mut renumbered = vec![0_u32; self.cut_points.len()];
-        let mut foreign = Vec::new();
-        for &key in &self.touched {
-            let local = self.edges[key as usize] as usize;
-            let (cube, number) = (key as usize / EDGES, key as usize % EDGES);
-            let at = [cube % LAYER, cube / LAYER % LAYER, cube / (LAYER * LAYER)];
-            let block = (0..3).fold(0_u8, |bits, axis| bits | u8::from(at[axis] == SIDE) << axis);
-            let own = at.map(|x| x % SIDE);
-            let own_key = (Self::index(own) * EDGES + number) as u32;
-            if block != 0 {
-                foreign.push((local, block, own_key));
-                continue;
-            }
-            renumbered[local] = surface.vertices.len() as u32;
-            if at.contains(&0) {
-                surface.shared.push((own_key, renumbered[local]));
-            }
-            surface.vertices.push(self.cut_points[local].map(|x| x as f32));
-        }
-        for (local, block, key) in foreign {
-            renumbered[local] = (surface.vertices.len() + surface.foreign.len()) as u32;
-            surface.foreign.push(ForeignVertex { block, key, position: self.cut_points[local].map(|x| x as f32) });
-        }
-        for triangle in &mut surface.triangles {
-            *triangle = triangle.map(|corner| renumbered[corner as usize]);
-        }
-        surface.shared.sort_unstable();
+    /// Whether tetrahedra of other blocks may have the edge or face.
+    fn is_shared(&self, frame: &Frame, faces: u8, surface: &BlockSurface) -> bool {
+        let mask = (1_u64 << 21) - 1;
+        (0..3).any(|axis| {
+            let first = 2 * surface.first_cube[axis] as u64;
+            let mut on = (0..4).filter(|k| faces >> k & 1 == 0).map(|k| (frame.numbers[k] >> (21 * (2 - axis)) & mask) - first);
+            let (mut low, mut high) = (true, true);
+            on.all(|fine| {
+                low &= fine <= 1;
+                high &= fine >= 2 * SIDE as u64;
+                low || high
+            })
+        })
+    }
+}
+
+fn place(positions: &[Point; 4], weights: &[f64; 4]) -> Point {
+    std::array::from_fn(|axis| (0..4).map(|k| weights[k] * positions[k][axis]).sum())
+}
+
+/// What a site is called in every block: its coordinates, mixed. Sites with the same coordinates are one.
+fn name_of(site: &Site) -> u64 {
+    let add = |code: u64, point: &Point| point.iter().fold(code, |code, x| mix(code.rotate_left(5) ^ x.to_bits()));
+    match site {
+        Site::Point(a) => add(1, a),
+        Site::Segment(ends) => ends.iter().fold(2, add),
+        Site::Triangle(corners) => corners.iter().fold(3, add),
     }
 }
 
 fn shifted(cube: [usize; 3], offset: [u8; 3]) -> [usize; 3] {
     std::array::from_fn(|axis| cube[axis] + offset[axis] as usize)
-}
-
-/// A small value of `max_k sum_i m_i rows[i][k]` over weights m: the best pair of rows, then the best
-/// combination of that with each other row. Stops at `enough`. Every value that it meets is a bound.
-fn game_value(rows: &mut [[f64; 7]], corners: usize, enough: f64) -> f64 {
-    let mut best = f64::INFINITY;
-    let mut combined = [0.0; 7];
-    for first in 0..rows.len() {
-        for second in 0..first {
-            let (value, row) = best_combination(&rows[first], &rows[second], corners);
-            if value < best {
-                (best, combined) = (value, row);
-                if best <= enough {
-                    return best;
-                }
-            }
-        }
-    }
-    for _ in 0..2 {
-        for row in rows.iter() {
-            let (value, next) = best_combination(&combined, row, corners);
-            if value < best {
-                (best, combined) = (value, next);
-                if best <= enough {
-                    return best;
-                }
-            }
-        }
-    }
-    best
-}
-
-/// min over m in [0, 1] of the largest entry of m a + (1 - m) b, with the combination: at an end, or where two
-/// entries, one falling and one rising, meet.
-fn best_combination(a: &[f64; 7], b: &[f64; 7], corners: usize) -> (f64, [f64; 7]) {
-    let combine = |m: f64| -> [f64; 7] { std::array::from_fn(|k| m * a[k] + (1.0 - m) * b[k]) };
-    let largest = |row: &[f64; 7]| row[..corners].iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // By duality the value is the largest, over pairs of corners, of where their two lines meet; its m is
-    // the minimiser.
-    let (mut value, mut at) = (f64::NEG_INFINITY, 0.0);
-    for k in 0..corners {
-        let lesser = a[k].min(b[k]);
-        if lesser > value {
-            (value, at) = (lesser, if a[k] < b[k] { 1.0 } else { 0.0 });
-        }
-        for l in 0..k {
-            let (dk, dl) = (a[k] - b[k], a[l] - b[l]);
-            if dk * dl < 0.0 {
-                let m = (b[l] - b[k]) / (dk - dl);
-                let meet = m * a[k] + (1.0 - m) * b[k];
-                if (0.0..=1.0).contains(&m) && meet > value {
-                    (value, at) = (meet, m);
-                }
-            }
-        }
-    }
-    let row = combine(at);
-    (largest(&row), row)
 }
 
 /// The offset of x from the nearest point of a solid's triangle, along the pseudo-normal: negative inside.
@@ -569,39 +461,4 @@ pub(super) fn signed_side(attractor: &Attractor, solid: u32, root: u32, x: &Poin
         Feature::Corner(k) => normals[4 + k as usize],
     };
     dot(&subtract(x, &closest), &normal.to_array())
-}
-
-struct End {
-    at: Point,
-    square: f64,
-    closest: Point,
-}
-
-/// Where the surface cuts the edge between an inside and an outside vertex, and by how much the linear
-/// interpolant of d^2 is below r^2 there (only clamping does that).
-fn crossing(setting: &Setting, from: &End, to: &End) -> (Point, f64) {
-    let along = subtract(&to.at, &from.at);
-    let length_squared = dot(&along, &along);
-    let square = setting.square;
-    let linear = (square - from.square) / (to.square - from.square);
-    // |v0 + s e - c|^2 = r^2 for the two nearest points c.
-    let exits = |closest: &Point| {
-        let offset = subtract(&from.at, closest);
-        let half = dot(&along, &offset) / length_squared;
-        let rest = (dot(&offset, &offset) - square) / length_squared;
-        let discriminant = half * half - rest;
-        (discriminant >= 0.0).then(|| (-half - discriminant.sqrt(), -half + discriminant.sqrt()))
-    };
-    let mut at = linear;
-    if let Some((_, exit)) = exits(&from.closest) {
-        at = at.max(exit);
-    }
-    if let Some((enter, exit)) = exits(&to.closest)
-        && enter <= at
-    {
-        at = at.max(exit);
-    }
-    let at = at.clamp(setting.clamp, 1.0 - setting.clamp);
-    let interpolated = from.square + at * (to.square - from.square);
-    (std::array::from_fn(|axis| from.at[axis] + at * along[axis]), (square - interpolated).max(0.0))
 }

@@ -3,14 +3,15 @@
 
 use super::block::{BlockSurface, SIDE, Workshop, signed_side};
 use super::tree::{Candidate, Candidates};
-use super::{DilationError, Setting};
+use super::DilationError;
+use super::plan::Setting;
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, child_points, distance_squared};
 use crate::attractor::sites::SiteRule;
 use crate::budget::Budget;
 use rayon::prelude::*;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What all tasks of one pass share.
 pub(super) struct Pass<'a> {
@@ -18,9 +19,6 @@ pub(super) struct Pass<'a> {
     pub(super) rule: &'a SiteRule<'a>,
     pub(super) setting: &'a Setting,
     pub(super) budget: &'a Budget,
-    /// Largest outer bound that is acceptable: beyond it the pass is given up and a finer one begins.
-    pub(super) outer_allowed: f64,
-    pub(super) too_coarse: AtomicBool,
     pub(super) triangles: AtomicU64,
     /// Cubes of the lattice that are done, of those of the whole space.
     pub(super) done: AtomicU64,
@@ -48,9 +46,6 @@ impl<'a> Pass<'a> {
 
     fn node(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Vec<BlockSurface>, DilationError> {
         self.budget.cancel.check()?;
-        if self.too_coarse.load(Ordering::Relaxed) {
-            return Ok(Vec::new());
-        }
         let Some((kept, open)) = self.reduce(node, candidates, open)? else {
             self.finish(node);
             return Ok(Vec::new());
@@ -85,17 +80,16 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Middle and half diagonal of all lattice vertices that the cube's tetrahedra use, and of closing balls around
-    /// them.
+    /// Middle and half diagonal of all lattice vertices that the cube's tetrahedra use.
     fn extent(&self, node: Node) -> (Point, f64) {
         let lattice = &self.setting.lattice;
         let cubes = node.blocks as f64 * SIDE as f64 + 0.5;
         let corner = lattice.corner(node.first_block.map(|block| block * SIDE as i64));
         let half = 0.5 * cubes * lattice.pitch;
-        (corner.map(|x| x + half), half * 3.0_f64.sqrt() * 1.000_001 + self.setting.gap)
+        (corner.map(|x| x + half), half * 3.0_f64.sqrt() * 1.000_001)
     }
 
-    /// The cells that may hold the nearest site of a vertex of the cube that matters, and the solids whose
+    /// The cells that may cover something of the cube, and the solids whose
     /// surface meets the cube, of those that are still `open`; `None` when the result's surface cannot meet
     /// the cube.
     fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<(Candidates, Vec<u32>)>, DilationError> {
@@ -104,17 +98,18 @@ impl<'a> Pass<'a> {
         let mut brackets = Vec::with_capacity(candidates.cells.len());
         let mut expanded = Candidates::default();
         let mut upper = f64::INFINITY;
-        // Distances above this matter to no vertex of the cube, except to tell the inside of a solid.
-        let horizon = self.setting.radius + self.setting.band + half;
+        // Sites farther than this cover nothing of the cube, but may tell the inside of a solid.
+        let horizon = self.setting.reach + half;
         for candidate in &candidates.cells {
             self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded)?;
         }
-        if upper + half < self.setting.radius {
+        // One site covers all of the cube.
+        if upper + half < self.setting.reach {
             return Ok(None);
         }
         let Some(reaches) = self.solids(&middle, half, &brackets, &expanded, open) else { return Ok(None) };
         let slack = self.setting.slack;
-        let threshold = (upper + 2.0 * half).min(horizon) + slack;
+        let threshold = horizon + slack;
         let mut kept = Candidates::default();
         let mut lowest = f64::INFINITY;
         for ((lower, _), candidate) in brackets.iter().zip(&expanded.cells) {
@@ -126,7 +121,7 @@ impl<'a> Pass<'a> {
             }
         }
         let still_open = open.iter().copied().filter(|&solid| reaches[solid as usize] > f64::NEG_INFINITY).collect();
-        Ok((lowest <= self.setting.radius + self.setting.gap + half + slack).then_some((kept, still_open)))
+        Ok((lowest <= threshold).then_some((kept, still_open)))
     }
 
     /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances.
@@ -224,18 +219,13 @@ impl<'a> Pass<'a> {
         open: &[u32],
     ) -> Result<Option<BlockSurface>, DilationError> {
         let first_cube = node.first_block.map(|block| block * SIDE as i64);
-        let mut surface = workshop.surface(self.setting, first_cube, candidates, open);
+        let surface = workshop.surface(self.setting, first_cube, candidates, open);
         if workshop.is_exhausted() {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }
-        if surface.triangles.is_empty() && surface.outer <= 0.0 {
+        if surface.triangles.is_empty() {
             return Ok(None);
         }
-        if surface.outer > self.outer_allowed {
-            self.too_coarse.store(true, Ordering::Relaxed);
-            return Ok(None);
-        }
-        workshop.finish(&mut surface);
         let made = surface.triangles.len() as u64;
         let total = self.triangles.fetch_add(made, Ordering::Relaxed) + made;
         let allowed = self.budget.limits.triangles;

@@ -286,6 +286,34 @@ impl<'a> Tree<'a> {
         }
     }
 
+    /// All sites below `starts` that are within `reach` of x, and perhaps some more.
+    pub(super) fn collect(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<SiteId>) {
+        let mut stack = std::mem::take(&mut self.stack);
+        stack.clear();
+        stack.extend_from_slice(starts);
+        while let Some(id) = stack.pop() {
+            let node = &self.nodes[id as usize];
+            let threshold = reach + node.radius + self.slack;
+            if distance_squared(x, &node.centre) > threshold * threshold {
+                continue;
+            }
+            match node.content {
+                Content::Points(first, count) => {
+                    let square = (reach + self.slack).powi(2);
+                    let near = |&index: &u32| distance_squared(x, &self.point_sites[index as usize]) <= square;
+                    found.extend((first..first + count).filter(near).map(SiteId::Point));
+                }
+                Content::Sites(first, count) => found.extend((first..first + count).map(SiteId::Listed)),
+                Content::Open(first, count) => stack.extend(first..first + count),
+                Content::Closed(points) => {
+                    let (first, count) = self.expand(id, points);
+                    stack.extend(first..first + count);
+                }
+            }
+        }
+        self.stack = stack;
+    }
+
     /// Nodes that may hold a site within `reach` of x: as small as possible without becoming many.
     pub(super) fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
         let may = |tree: &Self, id: NodeId| {

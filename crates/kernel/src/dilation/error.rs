@@ -1,0 +1,144 @@
+//! Why there is no solid.
+
+use super::plan::Setting;
+use crate::budget::Stopped;
+use crate::error::{Kind, LimitFacts};
+use crate::solid::SolidError;
+
+/// Why there is no solid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DilationError {
+    /// Somebody stopped it.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// More triangles than allowed.
+    #[error(
+        "the tolerance of {tolerance_mm} mm needs about {asked:.0} triangles, and {allowed} are allowed; {reachable_mm:.4} mm would pass"
+    )]
+    Triangles {
+        /// What was asked.
+        tolerance_mm: f64,
+        /// Triangles predicted or made so far.
+        asked: f64,
+        /// The limit.
+        allowed: u64,
+        /// A tolerance that would pass.
+        reachable_mm: f64,
+    },
+    /// More memory than allowed.
+    #[error("the tolerance of {tolerance_mm} mm needs about {asked:.0} bytes, and {allowed} are allowed; {reachable_mm:.4} mm would pass")]
+    Memory {
+        /// What was asked.
+        tolerance_mm: f64,
+        /// Bytes predicted.
+        asked: f64,
+        /// The limit.
+        allowed: u64,
+        /// A tolerance that would pass.
+        reachable_mm: f64,
+    },
+    /// Single precision cannot carry the tolerance at these coordinates.
+    #[error(
+        "single-precision files cannot carry a tolerance of {tolerance_mm} mm at coordinates up to {extent_mm:.1} mm; {reachable_mm:.6} mm can be carried, or a shape nearer to the origin"
+    )]
+    Precision {
+        /// What was asked.
+        tolerance_mm: f64,
+        /// Largest coordinate.
+        extent_mm: f64,
+        /// The finest tolerance that can be carried.
+        reachable_mm: f64,
+    },
+    /// The tolerance cannot be reached with cells of the allowed depth.
+    #[error(
+        "cells of depth {allowed} are still {reached_mm:.3e} mm large, and the tolerance of {tolerance_mm} mm needs {needed_mm:.3e} mm: the maps contract too slowly"
+    )]
+    Depth {
+        /// The limit.
+        allowed: u32,
+        /// What was asked.
+        tolerance_mm: f64,
+        /// Error that leaves must have.
+        needed_mm: f64,
+        /// Error of a cell at the limit.
+        reached_mm: f64,
+    },
+    /// Cells overlap so much that too many matter at one place.
+    #[error(
+        "the cells overlap so much that more than {allowed} of them matter at one place; use fewer maps, maps that contract more, or a larger tolerance"
+    )]
+    Cells {
+        /// The limit, from the memory that is allowed.
+        allowed: usize,
+    },
+    /// A closed mesh given as a solid has no well-defined inside.
+    #[error(
+        "a closed mesh is taken as a solid, and crosses itself or has faces without area, so that its inside is not defined; mend it, or say \"interior\": \"surface\""
+    )]
+    Inside,
+    /// The mesh is no closed manifold: our bug.
+    #[error("the extracted surface is not a closed manifold: {0}")]
+    Defect(SolidError),
+}
+
+impl From<SolidError> for DilationError {
+    fn from(error: SolidError) -> Self {
+        match error {
+            SolidError::Stopped(stopped) => Self::Stopped(stopped),
+            other => Self::Defect(other),
+        }
+    }
+}
+
+impl DilationError {
+    /// How to react.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Stopped(stopped) => stopped.kind(),
+            Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
+            Self::Precision { .. } => Kind::Unreachable,
+            Self::Inside => Kind::Invalid,
+            Self::Defect(_) => Kind::Defect,
+        }
+    }
+
+    /// Stable code.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Stopped(stopped) => stopped.code(),
+            Self::Triangles { .. } => "limit-triangles",
+            Self::Memory { .. } => "limit-memory",
+            Self::Precision { .. } => "tolerance-unreachable",
+            Self::Inside => "mesh.inside-undefined",
+            Self::Depth { .. } => "limit-depth",
+            Self::Cells { .. } => "limit-cells",
+            Self::Defect(_) => "nonmanifold",
+        }
+    }
+
+    /// The limit that was hit.
+    #[must_use]
+    pub fn limit(&self) -> Option<LimitFacts> {
+        let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
+        match *self {
+            Self::Stopped(_) | Self::Defect(_) | Self::Inside => None,
+            Self::Cells { allowed } => {
+                Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
+            }
+            Self::Triangles { asked, allowed, reachable_mm, .. } => Some(facts("triangles", asked, allowed as f64, reachable_mm)),
+            Self::Memory { asked, allowed, reachable_mm, .. } => Some(facts("memory_bytes", asked, allowed as f64, reachable_mm)),
+            Self::Precision { tolerance_mm, reachable_mm, .. } => Some(facts("tolerance_mm", tolerance_mm, reachable_mm, reachable_mm)),
+            Self::Depth { allowed, .. } => {
+                Some(LimitFacts { limit: "depth", asked: f64::from(allowed) + 1.0, allowed: f64::from(allowed), remedy: None })
+            }
+        }
+    }
+
+    pub(super) fn triangles(setting: &Setting, asked: f64, allowed: u64) -> Self {
+        // As many triangles to an area of pitch^2, which grows like the tolerance.
+        let reachable_mm = setting.tolerance * 1.2 * asked / allowed as f64;
+        Self::Triangles { tolerance_mm: setting.tolerance, asked, allowed, reachable_mm }
+    }
+}

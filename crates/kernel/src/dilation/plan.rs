@@ -1,0 +1,229 @@
+//! Pitch, thresholds and bounds of a dilation.
+
+use super::block::{self, BlockSurface};
+use super::lattice::{ENCLOSING, Lattice};
+use super::octree::Pass;
+use super::outside::MOST;
+use super::tree::Candidates;
+use super::{Dilation, DilationError, Prediction, stitch};
+use crate::attractor::Attractor;
+use crate::attractor::sites::{SiteError, SiteRule};
+use crate::budget::Budget;
+use crate::measure::bounds::{AxisBox, bounding_box};
+use crate::solid::{Solid, SolidError};
+use crate::tolerance::{Radius, Tolerance};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicU64;
+
+/// Numbers that all blocks share, in mm or mm^2.
+#[derive(Clone, Debug)]
+pub(crate) struct Setting {
+    pub(super) lattice: Lattice,
+    /// sqrt(theta): sites nearer than this cover a vertex.
+    pub(super) reach: f64,
+    /// theta.
+    square: f64,
+    /// A site nearer than this to a vertex covers all tetrahedra there.
+    pub(super) deep: f64,
+    /// 1 / q, with q the unit in which squared distances are compared.
+    inverse_unit: f64,
+    /// Rounding of positions and distances: far above what double precision loses, far below everything else.
+    pub(super) slack: f64,
+    /// What was asked.
+    pub(super) tolerance: f64,
+    /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
+    pub(super) cells: usize,
+}
+
+/// A pitch above this share of r would not see the shape.
+const COARSEST: f64 = 1.0;
+/// A pitch finer than this many roundings of single precision cannot be carried.
+const LEAST_ROUNDINGS: f64 = 64.0;
+/// Bytes of a cell with its control points, nodes and sites.
+const BYTES_PER_CELL: u64 = 400;
+/// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
+const BYTES_PER_TRIANGLE: f64 = 120.0;
+/// Triangles that a prediction may make to be surer.
+const PREDICTION_WORK: f64 = 300_000.0;
+
+impl Setting {
+    fn new(reach: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
+        let extent = extent(bounds, reach + 2.0 * pitch);
+        let margin = reach + 1.5 * pitch;
+        // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
+        let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
+        let square = reach * reach;
+        // Values of sites that cover something are within -theta and (reach + a)^2 - theta.
+        let largest = square.max((reach + 1.000_1 * pitch).powi(2) - square);
+        Self {
+            lattice: Lattice { origin, pitch },
+            reach,
+            square,
+            deep: (reach - pitch * 1.000_1).max(0.0),
+            inverse_unit: (MOST - 1) as f64 / largest,
+            slack: 1e-13 * extent,
+            tolerance,
+            cells,
+        }
+    }
+
+    /// A squared distance less theta as an integer, never 0.
+    #[inline]
+    pub(super) fn integer(&self, distance_squared: f64) -> i64 {
+        let scaled = (distance_squared - self.square) * self.inverse_unit;
+        // Saturates; far sites cover nothing.
+        let value = scaled.round() as i64;
+        if value == 0 { 1 } else { value }
+    }
+}
+
+/// Largest coordinate of the box grown by `margin`.
+fn extent(bounds: &AxisBox, margin: f64) -> f64 {
+    (0..3).map(|axis| bounds.low[axis].low.abs().max(bounds.high[axis].high.abs()) + margin).fold(0.0, f64::max)
+}
+
+/// Half a unit in the last place of single precision, times sqrt(3), at coordinates up to `extent`.
+fn rounding(extent: f64) -> f64 {
+    extent * f64::from(f32::EPSILON) * 0.5 * 3.0_f64.sqrt()
+}
+
+/// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
+/// shrinks by the automaton's rate (its proven lower bound) at every step.
+fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: &Budget) -> Result<(), DilationError> {
+    let rate = attractor.contraction().lower;
+    let size = (0..attractor.roots().len())
+        .filter(|&index| !attractor.automaton().state(attractor.roots()[index].state).transitions.is_empty())
+        .map(|index| attractor.root_cell(index).ball.radius)
+        .fold(0.0, f64::max);
+    let needed_mm = 0.1 * aimed;
+    let allowed = budget.limits.depth;
+    let reached_mm = size * rate.powf(f64::from(allowed));
+    if reached_mm > needed_mm {
+        return Err(DilationError::Depth { allowed, tolerance_mm: tolerance.mm(), needed_mm, reached_mm });
+    }
+    Ok(())
+}
+
+/// Pitch and bounds of a dilation before it begins.
+pub(super) struct Plan<'a> {
+    radius: f64,
+    /// The tolerance that is aimed at: smaller than asked when the radius is.
+    tolerance: f64,
+    pitch: f64,
+    /// Lengths beyond the lattice's own bounds: rounding to single precision, the unit of values and double precision.
+    extra: f64,
+    bounds: AxisBox,
+    rule: SiteRule<'a>,
+}
+
+impl<'a> Plan<'a> {
+    pub(super) fn new(attractor: &'a Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Self, DilationError> {
+        let bounds = bounding_box(attractor, budget)?;
+        let radius = radius.mm();
+        // A tolerance of the radius' order would allow an empty result.
+        let aimed = tolerance.mm().min(0.5 * radius);
+        let rounding = rounding(extent(&bounds, 3.0 * radius));
+        check_depth(attractor, aimed, tolerance, budget)?;
+        // The unit of values is below 4 r^2 / MOST, and moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^22.
+        let extra = rounding + radius * (0.5_f64).powi(22) + 1e-12 * extent(&bounds, radius);
+        let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
+        let pitch = Self::pitch(&rule, radius, aimed - extra).min(COARSEST * radius);
+        if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
+            let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (4.0 * radius * rule.lattice_share());
+            let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
+            return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
+        }
+        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule })
+    }
+
+    /// a = R / 0.559 with R^2 the lattice's share of (r + e)^2 - (r - e)^2 = 4 r e.
+    fn pitch(rule: &SiteRule<'_>, radius: f64, tolerance: f64) -> f64 {
+        (4.0 * radius * tolerance.max(0.0) * rule.lattice_share()).sqrt() / ENCLOSING
+    }
+
+    fn setting(&self, pitch: f64, budget: &Budget) -> Setting {
+        // The roots are there anyway; what grows beyond them may take a fair share of the memory.
+        let roots = self.rule.attractor().roots().len();
+        let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
+        let reach = self.radius + self.tolerance - self.extra - self.rule.outer_reserve();
+        Setting::new(reach, self.tolerance, pitch, cells, &self.bounds)
+    }
+
+    /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
+    pub(super) fn predict(&self, attractor: &Attractor, budget: &Budget) -> Result<Prediction, DilationError> {
+        let unlimited = Budget {
+            limits: crate::budget::Limits { triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
+            progress: None,
+            ..budget.clone()
+        };
+        let prediction = |triangles: f64| Prediction { triangles, memory_bytes: triangles * BYTES_PER_TRIANGLE, pitch_mm: self.pitch };
+        let coarsest = (COARSEST * self.radius).max(self.pitch);
+        let mut pitch = coarsest;
+        loop {
+            let surfaces = self.surfaces(attractor, &self.setting(pitch, &unlimited), &unlimited)?;
+            let made = surfaces.iter().map(|surface| surface.triangles.len() as f64).sum::<f64>();
+            let expected = |finer: f64| made * (pitch / finer).powi(2);
+            if pitch <= self.pitch || expected((0.5 * pitch).max(self.pitch)) > PREDICTION_WORK {
+                return Ok(prediction(expected(self.pitch)));
+            }
+            pitch = (0.5 * pitch).max(self.pitch);
+        }
+    }
+
+    /// The dilation.
+    pub(super) fn run(&self, attractor: &Attractor, budget: &Budget) -> Result<Dilation, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let surfaces = self.surfaces(attractor, &setting, budget)?;
+        let triangles: usize = surfaces.iter().map(|surface| surface.triangles.len()).sum();
+        budget.report("dilate", 1.0, triangles as u64);
+        self.certify(&setting, surfaces, budget)
+    }
+
+    fn surfaces(&self, attractor: &Attractor, setting: &Setting, budget: &Budget) -> Result<Vec<BlockSurface>, DilationError> {
+        let (blocks, candidates) = self.space(attractor, setting);
+        let pass = Pass {
+            attractor,
+            rule: &self.rule,
+            setting,
+            budget,
+            triangles: AtomicU64::new(0),
+            done: AtomicU64::new(0),
+            space: (blocks as f64).powi(3),
+            workshops: Mutex::new(Vec::new()),
+        };
+        pass.run([0; 3], blocks, &candidates)
+    }
+
+    /// The cube of space to refine, and the roots as its candidates.
+    fn space(&self, attractor: &Attractor, setting: &Setting) -> (i64, Candidates) {
+        let size = (0..3)
+            .map(|axis| self.bounds.high[axis].high + setting.reach + 1.5 * setting.lattice.pitch - setting.lattice.origin[axis])
+            .fold(0.0, f64::max);
+        let blocks = (size / (setting.lattice.pitch * block::SIDE as f64)).ceil().max(1.0) as u64;
+        let mut candidates = Candidates::default();
+        for (index, root) in attractor.roots().iter().enumerate() {
+            let cell = attractor.root_cell(index);
+            let leaf = self.rule.leaf(&cell, &root.points).is_some();
+            candidates.push(cell, &root.points, leaf);
+        }
+        (blocks.next_power_of_two() as i64, candidates)
+    }
+
+    fn certify(&self, setting: &Setting, surfaces: Vec<BlockSurface>, budget: &Budget) -> Result<Dilation, DilationError> {
+        let site = surfaces.iter().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
+        let enclosing = ENCLOSING * setting.lattice.pitch;
+        // x is in the solid if d(x, S)^2 <= theta - R^2, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
+        let inside = (setting.reach.powi(2) - enclosing.powi(2) - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
+        let outside = setting.reach + site.outer + self.extra;
+        let (inner, outer) = (self.radius - inside, outside - self.radius);
+        let leaf_cells = surfaces.iter().map(|surface| surface.leaves).sum();
+        let mesh = stitch::join(surfaces, budget)?;
+        // Signs from pseudo-normals are right for embedded surfaces only; elsewhere they tear the result.
+        let has_solids = !self.rule.attractor().solids().is_empty();
+        let solid = Solid::new(mesh, budget).map_err(|error| match error {
+            SolidError::NotManifold(_) if has_solids => DilationError::Inside,
+            other => other.into(),
+        })?;
+        Ok(Dilation { solid, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds })
+    }
+}
