@@ -30,7 +30,8 @@ fn main() {
     let mut out = None;
     for _ in 0..a[5].parse::<usize>().unwrap() {
         let (c, w) = (cpu(), std::time::Instant::now());
-        let d = dilate(&attractor, r, t, &Budget { limits: lacuna_kernel::budget::Limits { triangles: u64::MAX, memory_bytes: 12 << 30, ..Default::default() }, ..Default::default() }).unwrap();
+        let d = dilate(&attractor, r, t, &Budget { limits: lacuna_kernel::budget::Limits { triangles: u64::MAX, memory_bytes: 12 << 30, ..Default::default() }, ..Default::default() }); if let Err(e) = &d { eprintln!("{e} {} s wall {} cpu", w.elapsed().as_secs_f64(), cpu() - c); }
+        let d = d.unwrap();
         walls.push(w.elapsed().as_secs_f64());
         cpus.push(cpu() - c);
         out = Some(d);
