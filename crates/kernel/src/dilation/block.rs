@@ -12,8 +12,8 @@
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
 use super::plan::Setting;
-use super::lattice::{LatticeVertex, Tetrahedron};
-use super::outside::{Cut, FACES, HalfSpace, MOST, Outside};
+use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
+use super::outside::{Cut, FACES, HalfSpace, Outside};
 use super::tree::{Candidates, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
@@ -50,6 +50,8 @@ pub(super) struct BlockSurface {
     pub(super) leaves: u64,
     /// Largest errors of leaves met.
     pub(super) site_error: SiteError,
+    /// Leaves where the distance may have a critical point with a value that their size does not tell from r.
+    pub(super) critical: Vec<Cube>,
 }
 
 /// What a vertex on an edge or a face of the lattice is called by every tetrahedron there.
@@ -82,55 +84,92 @@ fn mix(mut x: u64) -> u64 {
 
 /// The four vertices of a tetrahedron in the order of their numbers.
 struct Frame {
-    numbers: [u64; 4],
+    numbers: [Number; 4],
     positions: [Point; 4],
-    /// The nearest site of every vertex that one covers.
+    /// theta at the vertices.
+    squares: [f64; 4],
+    /// The nearest site of every vertex that is near one.
     nearest: [Option<SiteId>; 4],
+    /// Whether a site covers a vertex.
+    covered: bool,
+    /// The finer level of the two cubes.
+    level: u32,
     /// Whether the order turned the tetrahedron inside out.
     mirrored: bool,
+}
+
+/// A site that matters in a tetrahedron.
+#[derive(Clone, Copy)]
+struct Nearby {
+    site: SiteId,
+    half_space: HalfSpace,
 }
 
 /// Working memory of a thread, reused from block to block.
 pub(super) struct Workshop<'a> {
     attractor: &'a Attractor,
     tree: Tree<'a>,
-    tetrahedra: Vec<Tetrahedron>,
-    /// Squared distances at corner and centre vertices.
-    values: [Vec<f64>; 2],
-    sites: [Vec<SiteId>; 2],
+    /// Squared distances at the vertices of level 0, corners and centres, and their nearest sites.
+    values: [Vec<Value>; 2],
+    /// Those of other vertices.
+    fine: HashMap<Number, Value>,
     near: Vec<NodeId>,
     /// Starts of every solid's own triangles among the near nodes.
     solid_nodes: Vec<(u32, Vec<NodeId>)>,
     seed: Option<NodeId>,
     outside: Outside,
     found: Vec<SiteId>,
+    nearby: Vec<Nearby>,
     polygon: Vec<u16>,
     corners: Vec<u32>,
+    closest: Vec<Point>,
+    rest: Vec<Point>,
+    leaves: Vec<Cube>,
     names: HashMap<VertexName, u32, BuildHasherDefault<NameHasher>>,
 }
+
+/// What is known of a vertex.
+#[derive(Clone, Copy)]
+struct Value {
+    square: f64,
+    site: SiteId,
+}
+
+const NOTHING: Value = Value { square: UNKNOWN, site: SiteId::Listed(0) };
 
 impl<'a> Workshop<'a> {
     pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
         Self {
             attractor: rule.attractor(),
             tree: Tree::new(rule, setting.slack, 4 * setting.cells),
-            tetrahedra: super::lattice::tetrahedra(),
-            values: [vec![UNKNOWN; VERTICES], vec![UNKNOWN; VERTICES]],
-            sites: [vec![SiteId::Listed(0); VERTICES], vec![SiteId::Listed(0); VERTICES]],
+            values: [vec![NOTHING; VERTICES], vec![NOTHING; VERTICES]],
+            fine: HashMap::new(),
             near: Vec::new(),
             solid_nodes: Vec::new(),
             seed: None,
             outside: Outside::default(),
             found: Vec::new(),
+            nearby: Vec::new(),
             polygon: Vec::new(),
             corners: Vec::new(),
+            closest: Vec::new(),
+            rest: Vec::new(),
+            leaves: Vec::new(),
             names: HashMap::default(),
         }
     }
 
     /// The surface in the block whose first cube is given; `open` lists the solids whose surface meets it.
-    pub(super) fn surface(&mut self, setting: &Setting, first_cube: [i64; 3], candidates: &Candidates, open: &[u32]) -> BlockSurface {
-        self.values.iter_mut().for_each(|values| values.fill(UNKNOWN));
+    pub(super) fn surface(
+        &mut self,
+        setting: &Setting,
+        grading: &Grading,
+        first_cube: [i64; 3],
+        candidates: &Candidates,
+        open: &[u32],
+    ) -> BlockSurface {
+        self.values.iter_mut().for_each(|values| values.fill(NOTHING));
+        self.fine.clear();
         self.names.clear();
         self.seed = None;
         let starts: Vec<NodeId> = self.tree.reset(candidates).collect();
@@ -138,11 +177,13 @@ impl<'a> Workshop<'a> {
         for k in (0..SIDE).step_by(SUB) {
             for j in (0..SIDE).step_by(SUB) {
                 for i in (0..SIDE).step_by(SUB) {
-                    self.sub_block(setting, &starts, open, [i, j, k], &mut surface);
+                    self.sub_block(setting, grading, &starts, open, [i, j, k], &mut surface);
                 }
             }
         }
         surface.shared.sort_unstable();
+        surface.critical.sort_unstable();
+        surface.critical.dedup();
         surface.leaves = self.tree.leaves;
         surface.site_error = self.tree.largest_error;
         surface
@@ -154,17 +195,25 @@ impl<'a> Workshop<'a> {
     }
 
     /// A sub-block: skipped when its middle is too far from the surface for any of its tetrahedra.
-    fn sub_block(&mut self, setting: &Setting, starts: &[NodeId], open: &[u32], first: [usize; 3], surface: &mut BlockSurface) {
-        // Its vertices span the corners 0 to SUB and centres 1/2 to SUB + 1/2.
-        let half = 0.5 * (SUB as f64 + 0.5);
-        let corner = setting.lattice.corner(std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64));
-        let middle: Point = corner.map(|x| x + half * setting.lattice.pitch);
-        let half = half * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
-        let horizon = setting.reach + half;
-        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.reach - half);
+    fn sub_block(
+        &mut self,
+        setting: &Setting,
+        grading: &Grading,
+        starts: &[NodeId],
+        open: &[u32],
+        first: [usize; 3],
+        surface: &mut BlockSurface,
+    ) {
+        // Its vertices span the corners 0 to SUB and centres -1/2 to SUB + 1/2.
+        let half = 0.5 * SUB as f64;
+        let first: [i64; 3] = std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64);
+        let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
+        let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+        let horizon = setting.near + half;
+        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.least - half);
         let Some(hit) = hit else { return };
-        if hit.distance_squared.sqrt() + half < setting.reach {
-            // One site covers every vertex.
+        if hit.distance_squared.sqrt() + half < setting.least {
+            // One site covers every vertex, and nothing is near the surface.
             return;
         }
         self.seed = Some(hit.node);
@@ -172,15 +221,19 @@ impl<'a> Workshop<'a> {
         self.tree.gather(&middle, starts, horizon, &mut near);
         self.near = near;
         self.gather_solids(starts, open, &middle, half);
-        for k in first[2]..first[2] + SUB {
-            for j in first[1]..first[1] + SUB {
-                for i in first[0]..first[0] + SUB {
-                    for number in 0..self.tetrahedra.len() {
-                        self.tetrahedron(setting, number, [i, j, k], surface);
+        let mut leaves = std::mem::take(&mut self.leaves);
+        for k in 0..SUB as i64 {
+            for j in 0..SUB as i64 {
+                for i in 0..SUB as i64 {
+                    leaves.clear();
+                    grading.leaves(Cube { level: 0, index: [first[0] + i, first[1] + j, first[2] + k] }, &mut leaves);
+                    for &leaf in &leaves {
+                        grading.tetrahedra(leaf, &mut |numbers, other| self.tetrahedron(setting, grading, numbers, leaf, other, surface));
                     }
                 }
             }
         }
+        self.leaves = leaves;
     }
 
     /// For every solid whose surface is among the candidates: its nodes near the sub-block.
@@ -200,41 +253,40 @@ impl<'a> Workshop<'a> {
         }
     }
 
-    /// Position of a cube in the working arrays.
-    #[inline]
-    fn index(cube: [usize; 3]) -> usize {
-        (cube[2] * LAYER + cube[1]) * LAYER + cube[0]
-    }
-
-    fn position(setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> Point {
-        let index = std::array::from_fn(|axis| surface.first_cube[axis] + cube[axis] as i64);
-        if centre { setting.lattice.centre(index) } else { setting.lattice.corner(index) }
-    }
-
-    /// The value of a vertex: d^2 where a site covers it, else FAR; DEEP where that is sure to cover all around.
-    fn value(&mut self, setting: &Setting, surface: &BlockSurface, centre: bool, cube: [usize; 3]) -> f64 {
-        let (kind, index) = (usize::from(centre), Self::index(cube));
-        let known = self.values[kind][index];
-        if !known.is_nan() {
+    /// What is known of a vertex: its squared distance if a site is so near that it may matter around it, else FAR; DEEP where
+    /// a site is sure to cover all around.
+    fn value(&mut self, setting: &Setting, surface: &BlockSurface, number: Number) -> Value {
+        const HALF: i64 = UNITS / 2;
+        let local: [i64; 3] = std::array::from_fn(|axis| i64::from(number[axis]) - UNITS * surface.first_cube[axis]);
+        let centre = local[0] % UNITS == HALF;
+        let whole = local.iter().all(|x| x % UNITS == if centre { HALF } else { 0 } && *x >= 0);
+        if !whole {
+            if let Some(&known) = self.fine.get(&number) {
+                return known;
+            }
+            let value = self.measured(setting, number);
+            self.fine.insert(number, value);
+            return value;
+        }
+        let cube = local.map(|x| (x / UNITS) as usize);
+        let index = (cube[2] * LAYER + cube[1]) * LAYER + cube[0];
+        let known = self.values[usize::from(centre)][index];
+        if !known.square.is_nan() {
             return known;
         }
-        let x = Self::position(setting, surface, centre, cube);
-        let value = match self.tree.nearest(&x, &self.near, self.seed, setting.reach, setting.deep) {
-            None => FAR,
-            Some(hit) => {
-                self.seed = Some(hit.node);
-                self.sites[kind][index] = hit.site;
-                if hit.distance_squared.sqrt() < setting.deep {
-                    DEEP
-                } else if setting.integer(hit.distance_squared) < 0 {
-                    hit.distance_squared
-                } else {
-                    FAR
-                }
-            }
-        };
-        self.values[kind][index] = value;
+        let value = self.measured(setting, number);
+        self.values[usize::from(centre)][index] = value;
         value
+    }
+
+    fn measured(&mut self, setting: &Setting, number: Number) -> Value {
+        let x = setting.lattice.position(number);
+        let Some(hit) = self.tree.nearest(&x, &self.near, self.seed, setting.near, setting.deep) else {
+            return Value { square: FAR, ..NOTHING };
+        };
+        self.seed = Some(hit.node);
+        let square = if hit.distance_squared < setting.deep * setting.deep { DEEP } else { hit.distance_squared };
+        Value { square, site: hit.site }
     }
 
     /// Whether a point lies in a solid: the sign of its offset from the nearest point of the surface along
@@ -249,71 +301,68 @@ impl<'a> Workshop<'a> {
         inside
     }
 
-    /// The vertices of a tetrahedron, if some are covered and none is deep.
-    fn frame(&mut self, setting: &Setting, number: usize, cube: [usize; 3], surface: &BlockSurface) -> Option<Frame> {
-        let tetrahedron = self.tetrahedra[number];
-        let mut covered = false;
-        for vertex in &tetrahedron.vertices {
-            let value = self.value(setting, surface, vertex.centre, shifted(cube, vertex.offset));
-            if value == DEEP {
+    /// The vertices of a tetrahedron, if sites are near and none covers all of it for sure.
+    fn frame(
+        &mut self,
+        setting: &Setting,
+        grading: &Grading,
+        mut numbers: [Number; 4],
+        level: u32,
+        surface: &BlockSurface,
+    ) -> Option<Frame> {
+        numbers.sort_unstable();
+        let mut values = [NOTHING; 4];
+        let mut near = false;
+        for (value, &number) in values.iter_mut().zip(&numbers) {
+            *value = self.value(setting, surface, number);
+            if value.square == DEEP {
                 return None;
             }
-            covered |= value != FAR;
+            near |= value.square != FAR;
         }
-        if !covered {
+        if !near {
             return None;
         }
-        let number_of = |vertex: &LatticeVertex| -> u64 {
-            let at = shifted(cube, vertex.offset);
-            (0..3).fold(0, |code, axis| {
-                let fine = 2 * (surface.first_cube[axis] + at[axis] as i64) as u64 + u64::from(vertex.centre);
-                code << 21 | fine
-            })
-        };
-        let mut order = [0, 1, 2, 3];
-        let numbers = tetrahedron.vertices.map(|vertex| number_of(&vertex));
-        order.sort_unstable_by_key(|&k| numbers[k]);
-        let inversions = (0..4).flat_map(|k| (0..k).map(move |l| (k, l))).filter(|&(k, l)| order[l] > order[k]).count();
-        let vertices = order.map(|k| tetrahedron.vertices[k]);
+        let squares = numbers.map(|number| setting.square(grading.coarsest(number)));
+        let covered = values.iter().zip(squares).any(|(value, square)| setting.integer(value.square, square) < 0);
         Some(Frame {
-            numbers: order.map(|k| numbers[k]),
-            positions: vertices.map(|vertex| Self::position(setting, surface, vertex.centre, shifted(cube, vertex.offset))),
-            nearest: vertices.map(|vertex| {
-                let (kind, index) = (usize::from(vertex.centre), Self::index(shifted(cube, vertex.offset)));
-                (self.values[kind][index] != FAR).then(|| self.sites[kind][index])
-            }),
-            mirrored: inversions % 2 == 1,
+            numbers,
+            positions: numbers.map(|number| setting.lattice.position(number)),
+            squares,
+            nearest: values.map(|value| (value.square != FAR).then_some(value.site)),
+            covered,
+            level,
+            mirrored: is_mirrored(&numbers),
         })
     }
 
-    /// Cuts what all sites cover out of a tetrahedron and emits the surface of the rest.
-    fn tetrahedron(&mut self, setting: &Setting, number: usize, cube: [usize; 3], surface: &mut BlockSurface) {
-        let Some(frame) = self.frame(setting, number, cube, surface) else { return };
-        self.outside.reset();
-        let mut tried: [Option<SiteId>; 4] = [None; 4];
-        for k in 0..4 {
-            let Some(site) = frame.nearest[k] else { continue };
-            if !tried.contains(&Some(site)) {
-                tried[k] = Some(site);
-                if self.cut(setting, &frame, site) == Cut::Empty {
-                    return;
-                }
-            }
-        }
-        let (centre, radius) = self.ball(&frame);
-        let mut found = std::mem::take(&mut self.found);
-        found.clear();
-        self.tree.collect(&centre, &self.near, setting.reach + radius, &mut found);
-        let mut empty = false;
-        for &site in &found {
-            if !tried.contains(&Some(site)) && self.cut(setting, &frame, site) == Cut::Empty {
-                empty = true;
-                break;
-            }
-        }
-        self.found = found;
-        if empty {
+    /// Cuts what all sites cover out of a tetrahedron and emits the surface of the rest; notes the cubes if the distance may
+    /// have a critical point there.
+    fn tetrahedron(
+        &mut self,
+        setting: &Setting,
+        grading: &Grading,
+        numbers: [Number; 4],
+        leaf: Cube,
+        other: Option<Cube>,
+        surface: &mut BlockSurface,
+    ) {
+        let Some(frame) = self.frame(setting, grading, numbers, leaf.level, surface) else { return };
+        if self.find_sites(setting, &frame) == Cut::Empty {
             return;
+        }
+        if self.may_be_critical(setting, &frame) {
+            surface.critical.push(leaf);
+            surface.critical.extend(other);
+        }
+        if !frame.covered {
+            return;
+        }
+        self.outside.reset();
+        for nearby in &self.nearby {
+            if nearby.half_space.values.iter().any(|&value| value < 0) && self.outside.cut(nearby.half_space) == Cut::Empty {
+                return;
+            }
         }
         // What is left is far from all surfaces, so it is on one side of them.
         if !self.solid_nodes.is_empty() {
@@ -325,14 +374,79 @@ impl<'a> Workshop<'a> {
         self.emit(&frame, surface);
     }
 
-    fn cut(&mut self, setting: &Setting, frame: &Frame, site: SiteId) -> Cut {
-        let site = self.tree.site(site);
-        let values = frame.positions.map(|x| setting.integer(site.distance_squared(&x)));
-        // A site that is farther than reach + pitch from a vertex covers nothing of the tetrahedron.
-        if values.iter().any(|&value| value > MOST) || values.iter().all(|&value| value > 0) {
+    /// Lists the sites that matter in a tetrahedron, and leaves in `outside` the part where the distance may be above the lower end
+    /// of the level's band.
+    fn find_sites(&mut self, setting: &Setting, frame: &Frame) -> Cut {
+        self.outside.reset();
+        self.nearby.clear();
+        for k in 0..4 {
+            let Some(site) = frame.nearest[k] else { continue };
+            if self.nearby.iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
+                return Cut::Empty;
+            }
+        }
+        let (centre, radius) = self.ball(frame);
+        let first = self.nearby.len();
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        self.tree.collect(&centre, &self.near, setting.reach + radius, &mut found);
+        let mut cut = Cut::Changed;
+        for &site in &found {
+            if self.nearby[..first].iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
+                cut = Cut::Empty;
+                break;
+            }
+        }
+        self.found = found;
+        cut
+    }
+
+    fn consider(&mut self, setting: &Setting, frame: &Frame, id: SiteId) -> Cut {
+        let site = self.tree.site(id);
+        let values = std::array::from_fn(|k| setting.integer(site.distance_squared(&frame.positions[k]), frame.squares[k]));
+        // A site that is farther than near + pitch from a vertex does not matter in the tetrahedron.
+        if values.iter().any(|&value| value > setting.most) {
             return Cut::Missed;
         }
-        self.outside.cut(HalfSpace { values, name: name_of(&site) })
+        let half_space = HalfSpace { values, name: name_of(&site) };
+        self.nearby.push(Nearby { site: id, half_space });
+        let band = setting.bands[frame.level as usize];
+        self.outside.cut(HalfSpace { values: values.map(|value| value + band), ..half_space })
+    }
+
+    /// Whether the distance to the sites may have a critical point in the tetrahedron, with a value that the level does not tell from r.
+    ///
+    /// A point x is critical when it lies in the convex hull of its closest points. What is left in `outside` contains all x with a
+    /// distance in the band; the closest point of a convex site to a point of the tetrahedron lies among the hull of those of its
+    /// vertices for points and segments (on a segment, the parameter is a clamped affine function), and near it for triangles. So if a plane parts the two hulls, there is none.
+    fn may_be_critical(&mut self, setting: &Setting, frame: &Frame) -> bool {
+        if self.nearby.len() < 2 {
+            return false;
+        }
+        let slope = setting.slopes[frame.level as usize];
+        let corners = self.outside.corners();
+        let least = |values: &[i64; 4]| -> f64 {
+            corners.iter().map(|corner| (0..4).map(|k| corner.weights[k] * values[k] as f64).sum()).fold(f64::INFINITY, f64::min)
+        };
+        self.closest.clear();
+        let mut active = 0;
+        for nearby in &self.nearby {
+            if least(&nearby.half_space.values) <= slope {
+                active += 1;
+                let site = self.tree.site(nearby.site);
+                if let Site::Point(point) = site {
+                    self.closest.push(point);
+                } else {
+                    self.closest.extend(frame.positions.iter().map(|x| site.closest(x)));
+                }
+            }
+        }
+        if active < 2 {
+            return false;
+        }
+        self.rest.clear();
+        self.rest.extend(corners.iter().map(|corner| place(&frame.positions, &corner.weights)));
+        !are_parted(&self.rest, &self.closest)
     }
 
     /// A ball around what is left.
@@ -385,49 +499,81 @@ impl<'a> Workshop<'a> {
             return make(surface);
         }
         let mut names = corner.facets.iter().filter(|&&facet| facet >= FACES).map(|&facet| outside.name(facet));
-        let on = (0..4).filter(|k| faces >> k & 1 == 0).map(|k| frame.numbers[k]);
         let name = if faces.count_ones() == 2 {
             // An edge: named by its vertices and which of them is covered from here.
             let mut ends = (0..4).filter(|k| faces >> k & 1 == 0);
             let (first, second) = (ends.next().unwrap_or(0), ends.next().unwrap_or(0));
             let values = outside.values(corner.facets.iter().copied().find(|&facet| facet >= FACES).unwrap_or(0));
             let from_first = values[first] < values[second];
-            (u128::from(frame.numbers[first]) << 63 | u128::from(frame.numbers[second])) << 1 | u128::from(from_first)
+            named(frame.numbers[first].iter().chain(&frame.numbers[second]).copied(), u64::from(from_first), 0)
         } else {
             let (p, q) = (names.next().unwrap_or(0), names.next().unwrap_or(0));
-            let mut low = mix(p.min(q));
-            let mut high = mix(p.max(q) ^ 0x9E37_79B9_7F4A_7C15);
-            for number in on {
-                low = mix(low ^ number);
-                high = mix(high.rotate_left(17) ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ p.wrapping_add(q));
-            }
-            u128::from(high) << 64 | u128::from(low) | 1 << 127
+            let on = (0..4).filter(|k| faces >> k & 1 == 0).flat_map(|k| frame.numbers[k]);
+            named(on, p.min(q), p.max(q))
         };
         if let Some(&known) = self.names.get(&name) {
             return known;
         }
         let number = make(surface);
         self.names.insert(name, number);
-        if self.is_shared(frame, faces, surface) {
+        if Self::is_shared(frame, faces, surface) {
             surface.shared.push((name, number));
         }
         number
     }
 
     /// Whether tetrahedra of other blocks may have the edge or face.
-    fn is_shared(&self, frame: &Frame, faces: u8, surface: &BlockSurface) -> bool {
-        let mask = (1_u64 << 21) - 1;
+    fn is_shared(frame: &Frame, faces: u8, surface: &BlockSurface) -> bool {
         (0..3).any(|axis| {
-            let first = 2 * surface.first_cube[axis] as u64;
-            let mut on = (0..4).filter(|k| faces >> k & 1 == 0).map(|k| (frame.numbers[k] >> (21 * (2 - axis)) & mask) - first);
+            let first = UNITS * surface.first_cube[axis];
+            let mut on = (0..4).filter(|k| faces >> k & 1 == 0).map(|k| i64::from(frame.numbers[k][axis]) - first);
             let (mut low, mut high) = (true, true);
             on.all(|fine| {
-                low &= fine <= 1;
-                high &= fine >= 2 * SIDE as u64;
+                low &= fine <= UNITS / 2;
+                high &= fine >= UNITS * SIDE as i64;
                 low || high
             })
         })
     }
+}
+
+/// The name of a vertex on an edge or face: lattice vertices and what tells it from others there, mixed to 128 bits.
+fn named(coordinates: impl Iterator<Item = i32>, first: u64, second: u64) -> VertexName {
+    let (mut low, mut high) = (mix(first ^ 1), mix(second ^ 0x9E37_79B9_7F4A_7C15));
+    for coordinate in coordinates {
+        low = mix(low.rotate_left(7) ^ coordinate as u64);
+        high = mix(high.rotate_left(11) ^ low ^ (coordinate as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    }
+    u128::from(high) << 64 | u128::from(low)
+}
+
+/// Steps of the search for a plane.
+const STEPS: usize = 32;
+
+/// Whether a plane was found that parts two sets of points: Gilbert's search for the shortest difference (1966). When it gives up, there may be one yet.
+fn are_parted(points: &[Point], others: &[Point]) -> bool {
+    let mean = |points: &[Point]| -> Point {
+        std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / points.len().max(1) as f64)
+    };
+    let mut shortest = subtract(&mean(points), &mean(others));
+    for _ in 0..STEPS {
+        let along = |point: &&Point| dot(&shortest, point);
+        let first = points.iter().min_by(|a, b| along(a).total_cmp(&along(b)));
+        let second = others.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
+        let (Some(first), Some(second)) = (first, second) else { return true };
+        let support = subtract(first, second);
+        let square = dot(&shortest, &shortest);
+        if dot(&shortest, &support) > 1e-9 * square {
+            return true;
+        }
+        let step = subtract(&support, &shortest);
+        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
+        if dot(&shortest, &shortest) <= 1e-18 * dot(&support, &support) {
+            return false;
+        }
+    }
+    false
 }
 
 fn place(positions: &[Point; 4], weights: &[f64; 4]) -> Point {
@@ -442,10 +588,6 @@ fn name_of(site: &Site) -> u64 {
         Site::Segment(ends) => ends.iter().fold(2, add),
         Site::Triangle(corners) => corners.iter().fold(3, add),
     }
-}
-
-fn shifted(cube: [usize; 3], offset: [u8; 3]) -> [usize; 3] {
-    std::array::from_fn(|axis| cube[axis] + offset[axis] as usize)
 }
 
 /// The offset of x from the nearest point of a solid's triangle, along the pseudo-normal: negative inside.

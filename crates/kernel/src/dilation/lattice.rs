@@ -1,18 +1,193 @@
-//! The body-centred cubic lattice and its tetrahedra.
+//! The body-centred cubic lattice, graded: cubes that are subdivided where that is asked, and the tetrahedra between.
 //!
-//! Cube (i, j, k) has edge a, its corner vertex at `origin + a (i, j, k)` and its centre vertex half a cube
-//! farther. Every tetrahedron joins two centres that are neighbours along an axis with two neighbouring
-//! corners of the square between them: two edges of length a, four of sqrt(3)/2 a, twelve tetrahedra to a
-//! cube. Its smallest enclosing ball has radius sqrt(5)/4 a, with its centre inside (the middle of the
-//! segment between the middles of the two long edges).
+//! A cube of level l has edge a / 2^l. Vertices are the corners and centres of leaves (cubes that are not subdivided). Between
+//! two leaves of one size that share a face lie the tetrahedra of the body-centred lattice: both centres and an edge of the face, or half of it where the
+//! edge's middle is a vertex. Between a leaf and a larger one lie, on either side, the two halves of the smaller
+//! face, joined to the leaf's centre. Leaves that touch differ by one level at most, so that this fits together (Labelle and
+//! Shewchuk, "Isosurface stuffing", 2007). The smallest ball around each of these tetrahedra has radius sqrt(5)/4 of the larger leaf's edge
+//! at most.
 
 use crate::attractor::cell::Point;
+use std::collections::HashSet;
 
-/// Radius of a tetrahedron's smallest enclosing ball, in units of a.
+/// Radius of a tetrahedron's smallest enclosing ball, in units of the larger leaf's edge.
 pub const ENCLOSING: f64 = 0.559_016_994_374_947_5;
-/// Edges that belong to a cube: three between corners, three between centres, eight from the centre to
-/// the corners.
-pub const EDGES: usize = 14;
+/// Finest level.
+pub const LEVELS: u32 = 6;
+/// Units of coordinates along a cube of level 0: centres of the finest cubes are whole.
+pub const UNITS: i64 = 1 << (LEVELS + 1);
+
+/// Coordinates of a vertex in units of a / [`UNITS`]: what it is called in all blocks.
+pub type Number = [i32; 3];
+
+/// A cube: its level and its place in units of its edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Cube {
+    /// l.
+    pub level: u32,
+    /// Its corner, in units of a / 2^l.
+    pub index: [i64; 3],
+}
+
+impl Cube {
+    /// Its edge in units.
+    fn edge(self) -> i64 {
+        UNITS >> self.level
+    }
+
+    fn corner(self, offset: [i64; 3]) -> Number {
+        std::array::from_fn(|axis| ((self.index[axis] + offset[axis]) * self.edge()) as i32)
+    }
+
+    fn centre(self) -> Number {
+        self.index.map(|x| (x * self.edge() + self.edge() / 2) as i32)
+    }
+
+    fn moved(self, offset: [i64; 3]) -> Self {
+        Self { level: self.level, index: std::array::from_fn(|axis| self.index[axis] + offset[axis]) }
+    }
+
+    fn parent(self) -> Option<Self> {
+        (self.level > 0).then(|| Self { level: self.level - 1, index: self.index.map(|x| x >> 1) })
+    }
+
+    /// Its eight halves.
+    pub fn children(self) -> impl Iterator<Item = Self> {
+        (0..8).map(move |octant: i64| Self {
+            level: self.level + 1,
+            index: std::array::from_fn(|axis| 2 * self.index[axis] + (octant >> axis & 1)),
+        })
+    }
+
+    /// The cube of level 0 that it lies in.
+    pub fn base(self) -> [i64; 3] {
+        self.index.map(|x| x >> self.level)
+    }
+}
+
+/// The cubes that are subdivided.
+#[derive(Clone, Debug, Default)]
+pub struct Grading {
+    subdivided: HashSet<Cube>,
+}
+
+impl Grading {
+    /// Subdivides a cube, and as many around it as keep leaves that touch within one level of each other. The cubes that were
+    /// subdivided are added to `new`.
+    pub fn subdivide(&mut self, cube: Cube, new: &mut Vec<Cube>) {
+        let mut open = vec![cube];
+        while let Some(cube) = open.pop() {
+            if cube.level >= LEVELS || !self.subdivided.insert(cube) {
+                continue;
+            }
+            new.push(cube);
+            for offset in (0..27).map(|code: i64| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1]) {
+                open.extend(cube.moved(offset).parent());
+            }
+        }
+    }
+
+    /// Whether a cube is.
+    #[inline]
+    pub fn is_subdivided(&self, cube: Cube) -> bool {
+        !self.subdivided.is_empty() && self.subdivided.contains(&cube)
+    }
+
+    /// Whether none is.
+    pub fn is_empty(&self) -> bool {
+        self.subdivided.is_empty()
+    }
+
+    /// The leaves of a cube.
+    pub fn leaves(&self, cube: Cube, leaves: &mut Vec<Cube>) {
+        if self.is_subdivided(cube) {
+            cube.children().for_each(|child| self.leaves(child, leaves));
+        } else {
+            leaves.push(cube);
+        }
+    }
+
+    /// The level of the largest leaf that touches a vertex.
+    pub fn coarsest(&self, number: Number) -> u32 {
+        if self.subdivided.is_empty() {
+            return 0;
+        }
+        (0..8)
+            .map(|octant: i64| {
+                // A point just beside the vertex, in doubled units.
+                let at: [i64; 3] = std::array::from_fn(|axis| 2 * i64::from(number[axis]) + 2 * (octant >> axis & 1) - 1);
+                let mut cube = Cube { level: 0, index: at.map(|x| x.div_euclid(2 * UNITS)) };
+                while self.is_subdivided(cube) {
+                    let level = cube.level + 1;
+                    cube = Cube { level, index: at.map(|x| x.div_euclid(2 * UNITS >> level)) };
+                }
+                cube.level
+            })
+            .min()
+            .unwrap_or(0)
+    }
+
+    /// Calls `emit` with the vertices of every tetrahedron that belongs to a leaf: those towards the next leaf of its size
+    /// along every axis, and its own side of faces between different sizes. The second cube is the leaf on the other side.
+    pub fn tetrahedra(&self, leaf: Cube, emit: &mut impl FnMut([Number; 4], Option<Cube>)) {
+        for axis in 0..3 {
+            for side in [0, 1] {
+                let mut across = [0; 3];
+                across[axis] = 2 * side - 1;
+                let other = leaf.moved(across);
+                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                // Offset of a point of the face in units of half an edge.
+                let on_face = |du: i64, dv: i64| -> Number {
+                    let mut at = [0; 3];
+                    (at[axis], at[u], at[v]) = (2 * side, du, dv);
+                    let half = leaf.edge() / 2;
+                    std::array::from_fn(|k| (leaf.index[k] * leaf.edge() + at[k] * half) as i32)
+                };
+                if self.is_subdivided(other) {
+                    for (du, dv) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                        // The diagonal joins the middle of the larger face with its corner.
+                        let (inner, outer) = (on_face(1, 1), on_face(2 * du, 2 * dv));
+                        for third in [on_face(2 * du, 1), on_face(1, 2 * dv)] {
+                            emit([leaf.centre(), inner, outer, third], None);
+                        }
+                    }
+                } else if other.parent().is_some_and(|parent| !self.is_subdivided(parent)) {
+                    // The larger face's middle is the corner whose coordinates are odd in units of this leaf.
+                    let odd = |k: usize| 2 * (1 - (leaf.index[k] & 1));
+                    let (du, dv) = (odd(u), odd(v));
+                    for third in [on_face(2 - du, dv), on_face(du, 2 - dv)] {
+                        emit([leaf.centre(), on_face(du, dv), on_face(2 - du, 2 - dv), third], None);
+                    }
+                } else if side == 1 {
+                    self.between(leaf, other, (axis, u, v), emit);
+                }
+            }
+        }
+    }
+
+    /// The tetrahedra between two leaves of one size.
+    fn between(&self, leaf: Cube, other: Cube, (axis, u, v): (usize, usize, usize), emit: &mut impl FnMut([Number; 4], Option<Cube>)) {
+        for step in 0..4 {
+            let corner = |step: usize| {
+                let (du, dv) = [(0, 0), (1, 0), (1, 1), (0, 1)][step % 4];
+                let mut offset = [0; 3];
+                (offset[axis], offset[u], offset[v]) = (1, du, dv);
+                leaf.corner(offset)
+            };
+            // The cubes on the other side of the edge.
+            let mut beyond = [0; 3];
+            (beyond[u], beyond[v]) = [(0, -1), (1, 0), (0, 1), (-1, 0)][step];
+            let (p, q) = (corner(step), corner(step + 1));
+            if self.is_subdivided(leaf.moved(beyond)) || self.is_subdivided(other.moved(beyond)) {
+                let middle: Number = std::array::from_fn(|k| (p[k] + q[k]) / 2);
+                emit([leaf.centre(), other.centre(), p, middle], Some(other));
+                emit([leaf.centre(), other.centre(), middle, q], Some(other));
+            } else {
+                emit([leaf.centre(), other.centre(), p, q], Some(other));
+            }
+        }
+    }
+}
 
 /// Position and pitch of the lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,166 +199,77 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Position of a corner vertex. A function of the indices alone: every block computes the same bits.
+    /// Position of a corner of a cube of level 0.
     #[inline]
     #[must_use]
     pub fn corner(&self, index: [i64; 3]) -> Point {
-        std::array::from_fn(|axis| self.origin[axis] + self.pitch * index[axis] as f64)
+        self.position(index.map(|x| (x * UNITS) as i32))
     }
 
-    /// Position of a centre vertex.
+    /// Position of a vertex. A function of the number alone: every block computes the same bits.
     #[inline]
     #[must_use]
-    pub fn centre(&self, index: [i64; 3]) -> Point {
-        std::array::from_fn(|axis| self.origin[axis] + self.pitch * (index[axis] as f64 + 0.5))
+    pub fn position(&self, number: Number) -> Point {
+        let unit = self.pitch / UNITS as f64;
+        std::array::from_fn(|axis| self.origin[axis] + unit * f64::from(number[axis]))
     }
 }
 
-/// One of a tetrahedron's four vertices relative to its cube.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LatticeVertex {
-    /// Whether it is a centre.
-    pub centre: bool,
-    /// Offset of its cube from the tetrahedron's.
-    pub offset: [u8; 3],
-}
-
-/// An edge relative to the tetrahedron's cube: the cube that owns it and its number there. Numbers 0 to 2
-/// join the corner to the next along an axis, 3 to 5 the centre likewise, 6 + x + 2 y + 4 z the centre to
-/// the corner at (x, y, z).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LatticeEdge {
-    /// Offset of the owning cube.
-    pub offset: [u8; 3],
-    /// Number in that cube.
-    pub number: u8,
-}
-
-/// A tetrahedron of a cube, positively oriented: det(v1 - v0, v2 - v0, v3 - v0) > 0.
-#[derive(Clone, Copy, Debug)]
-pub struct Tetrahedron {
-    /// Its vertices; the first is the centre of its cube.
-    pub vertices: [LatticeVertex; 4],
-    /// Its edges, between the vertices of [`EDGE_ENDS`].
-    pub edges: [LatticeEdge; 6],
-}
-
-/// Vertices that the six edges of a tetrahedron join.
-pub const EDGE_ENDS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-
-/// The edges that triangles of a tetrahedron cut, for each set of inside vertices (bit v for vertex v), in
-/// pieces counter-clockwise seen from outside: three edges a triangle, four a quadrilateral.
-pub const CUTS: [&[usize]; 16] = [
-    &[],
-    &[0, 1, 2],
-    &[0, 4, 3],
-    &[1, 2, 4, 3],
-    &[1, 3, 5],
-    &[2, 0, 3, 5],
-    &[0, 4, 5, 1],
-    &[2, 4, 5],
-    &[2, 5, 4],
-    &[1, 5, 4, 0],
-    &[5, 3, 0, 2],
-    &[5, 3, 1],
-    &[3, 4, 2, 1],
-    &[3, 4, 0],
-    &[2, 1, 0],
-    &[],
-];
-
-/// The twelve tetrahedra of a cube, four around each axis.
+/// Whether det(v1 - v0, v2 - v0, v3 - v0) < 0.
 #[must_use]
-pub fn tetrahedra() -> Vec<Tetrahedron> {
-    let mut list = Vec::with_capacity(12);
-    for axis in 0..3 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let corner = |step: usize| {
-            let (du, dv) = [(0, 0), (1, 0), (1, 1), (0, 1)][step % 4];
-            let mut offset = [0_u8; 3];
-            (offset[axis], offset[u], offset[v]) = (1, du, dv);
-            LatticeVertex { centre: false, offset }
-        };
-        let own = LatticeVertex { centre: true, offset: [0; 3] };
-        let mut next = own;
-        next.offset[axis] = 1;
-        for step in 0..4 {
-            let mut vertices = [own, next, corner(step), corner(step + 1)];
-            if orientation(&vertices) < 0.0 {
-                vertices.swap(2, 3);
-            }
-            let edges = EDGE_ENDS.map(|(p, q)| edge_between(vertices[p], vertices[q]));
-            list.push(Tetrahedron { vertices, edges });
-        }
-    }
-    list
-}
-
-fn unit_position(vertex: LatticeVertex) -> glam::DVec3 {
-    let offset = vertex.offset.map(f64::from);
-    glam::DVec3::from_array(offset) + glam::DVec3::splat(if vertex.centre { 0.5 } else { 0.0 })
-}
-
-fn orientation(vertices: &[LatticeVertex; 4]) -> f64 {
-    let [a, b, c, d] = vertices.map(unit_position);
-    (b - a).dot((c - a).cross(d - a))
-}
-
-fn edge_between(p: LatticeVertex, q: LatticeVertex) -> LatticeEdge {
-    if p.centre == q.centre {
-        let offset: [u8; 3] = std::array::from_fn(|i| p.offset[i].min(q.offset[i]));
-        let axis = (0..3).find(|&i| p.offset[i] != q.offset[i]).unwrap_or(0) as u8;
-        return LatticeEdge { offset, number: if p.centre { 3 + axis } else { axis } };
-    }
-    let (centre, corner) = if p.centre { (p, q) } else { (q, p) };
-    let bit = |i: usize| corner.offset[i] - centre.offset[i];
-    LatticeEdge { offset: centre.offset, number: 6 + bit(0) + 2 * bit(1) + 4 * bit(2) }
+pub fn is_mirrored(numbers: &[Number; 4]) -> bool {
+    let edge = |k: usize| -> [i64; 3] { std::array::from_fn(|axis| i64::from(numbers[k][axis]) - i64::from(numbers[0][axis])) };
+    let (a, b, c) = (edge(1), edge(2), edge(3));
+    let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+    a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2] < 0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
+    use std::collections::HashMap;
 
-    #[test]
-    fn tetrahedra_fill_the_cube_and_fit_their_ball() {
-        let mut volume = 0.0;
-        for tetrahedron in tetrahedra() {
-            let corners = tetrahedron.vertices.map(unit_position);
-            volume += orientation(&tetrahedron.vertices) / 6.0;
-            let long: Vec<(usize, usize)> =
-                EDGE_ENDS.iter().copied().filter(|&(p, q)| (corners[p].distance(corners[q]) - 1.0).abs() < 1e-12).collect();
-            assert_eq!(long.len(), 2);
-            let middle: DVec3 = corners.iter().sum::<DVec3>() / 4.0;
-            for corner in corners {
-                assert!((corner.distance(middle) - ENCLOSING).abs() < 1e-12);
-            }
-        }
-        assert!((volume - 1.0).abs() < 1e-12);
+    fn volume(numbers: &[Number; 4]) -> i64 {
+        let edge = |k: usize| -> [i64; 3] { std::array::from_fn(|axis| i64::from(numbers[k][axis] - numbers[0][axis])) };
+        let (a, b, c) = (edge(1), edge(2), edge(3));
+        a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
     }
 
-    /// The triangles of every case face away from the inside vertices.
+    /// A graded piece of lattice: faces match in pairs save on its border, and nothing overlaps or is left out.
     #[test]
-    fn cuts_face_outwards() {
-        let tetrahedron = tetrahedra()[0];
-        let corners = tetrahedron.vertices.map(unit_position);
-        for (inside, cut) in CUTS.iter().enumerate() {
-            let middle = |edge: usize| {
-                let (p, q) = EDGE_ENDS[edge];
-                0.5 * (corners[p] + corners[q])
-            };
-            for &edge in *cut {
-                let (p, q) = EDGE_ENDS[edge];
-                assert_ne!(inside >> p & 1, inside >> q & 1, "case {inside} cuts edge {edge}");
-            }
-            for k in 1..cut.len().saturating_sub(1) {
-                let (a, b, c) = (middle(cut[0]), middle(cut[k]), middle(cut[k + 1]));
-                let normal = (b - a).cross(c - a);
-                for (vertex, corner) in corners.iter().enumerate() {
-                    let side = normal.dot(*corner - a);
-                    assert!(if inside >> vertex & 1 == 1 { side < 1e-12 } else { side > -1e-12 }, "case {inside}");
-                }
-            }
+    fn graded_tetrahedra_fit_together() {
+        let mut grading = Grading::default();
+        let mut new = Vec::new();
+        for (level, index) in [(0, [3, 3, 3]), (1, [7, 6, 6]), (2, [14, 12, 13]), (0, [5, 4, 3]), (1, [10, 9, 7]), (3, [28, 25, 26])] {
+            grading.subdivide(Cube { level, index }, &mut new);
         }
+        assert!(new.len() > 6);
+        let size = 9_i64;
+        let (mut faces, mut total) = (HashMap::<[Number; 3], i32>::new(), 0_i64);
+        let mut leaves = Vec::new();
+        for code in 0..size.pow(3) {
+            grading.leaves(Cube { level: 0, index: [code % size, code / size % size, code / size / size] }, &mut leaves);
+        }
+        for leaf in leaves {
+            grading.tetrahedra(leaf, &mut |mut numbers, _| {
+                numbers.sort_unstable();
+                let signed = volume(&numbers);
+                assert!(signed != 0 && (signed < 0) == is_mirrored(&numbers));
+                total += signed.abs();
+                for left_out in 0..4 {
+                    let mut face: Vec<Number> = numbers.to_vec();
+                    face.remove(left_out);
+                    *faces.entry([face[0], face[1], face[2]]).or_default() += 1;
+                }
+            });
+        }
+        let inside = |number: &Number| number.iter().all(|&x| i64::from(x) > UNITS && i64::from(x) < (size - 1) * UNITS);
+        for (face, count) in &faces {
+            assert!(*count <= 2 && (*count == 2 || !face.iter().all(inside)), "{face:?} {count}");
+        }
+        // Every cube of the inside is covered once: 12 tetrahedra of a^3 / 12 to a cube, or their parts.
+        let cubes = total as f64 / (6.0 * (UNITS as f64).powi(3));
+        let border = (size as f64).powi(3) - (size as f64 - 1.0).powi(3);
+        assert!((cubes - (size as f64).powi(3)).abs() < border, "{cubes}");
     }
 }

@@ -40,6 +40,8 @@ pub struct Dilation {
     pub leaf_cells: u64,
     /// The box of the attractor, not dilated.
     pub bounds: AxisBox,
+    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain.
+    pub uncertain: u64,
 }
 
 /// Dilates an attractor by the closed ball of radius r, to the tolerance: both bounds of the result are at

@@ -4,12 +4,14 @@
 use super::block::{BlockSurface, SIDE, Workshop, signed_side};
 use super::tree::{Candidate, Candidates};
 use super::DilationError;
+use super::lattice::Grading;
 use super::plan::Setting;
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, child_points, distance_squared};
 use crate::attractor::sites::SiteRule;
 use crate::budget::Budget;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,6 +20,9 @@ pub(super) struct Pass<'a> {
     pub(super) attractor: &'a Attractor,
     pub(super) rule: &'a SiteRule<'a>,
     pub(super) setting: &'a Setting,
+    pub(super) grading: &'a Grading,
+    /// The blocks to make, by their place in units of blocks: all when nothing is said.
+    pub(super) only: Option<&'a BTreeSet<[i64; 3]>>,
     pub(super) budget: &'a Budget,
     pub(super) triangles: AtomicU64,
     /// Cubes of the lattice that are done, of those of the whole space.
@@ -46,6 +51,9 @@ impl<'a> Pass<'a> {
 
     fn node(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Vec<BlockSurface>, DilationError> {
         self.budget.cancel.check()?;
+        if !self.is_wanted(node) {
+            return Ok(Vec::new());
+        }
         let Some((kept, open)) = self.reduce(node, candidates, open)? else {
             self.finish(node);
             return Ok(Vec::new());
@@ -71,6 +79,14 @@ impl<'a> Pass<'a> {
         Ok(surfaces)
     }
 
+    fn is_wanted(&self, node: Node) -> bool {
+        let inside = |block: &[i64; 3]| (0..3).all(|axis| (node.first_block[axis]..node.first_block[axis] + node.blocks).contains(&block[axis]));
+        // The first axis orders the set.
+        let first = [node.first_block[0], i64::MIN, i64::MIN];
+        let end = [node.first_block[0] + node.blocks, i64::MIN, i64::MIN];
+        self.only.is_none_or(|blocks| blocks.range(first..end).any(inside))
+    }
+
     fn finish(&self, node: Node) {
         let blocks = node.blocks.unsigned_abs().pow(3);
         let before = self.done.fetch_add(blocks, Ordering::Relaxed);
@@ -83,10 +99,10 @@ impl<'a> Pass<'a> {
     /// Middle and half diagonal of all lattice vertices that the cube's tetrahedra use.
     fn extent(&self, node: Node) -> (Point, f64) {
         let lattice = &self.setting.lattice;
-        let cubes = node.blocks as f64 * SIDE as f64 + 0.5;
+        let cubes = node.blocks as f64 * SIDE as f64;
         let corner = lattice.corner(node.first_block.map(|block| block * SIDE as i64));
         let half = 0.5 * cubes * lattice.pitch;
-        (corner.map(|x| x + half), half * 3.0_f64.sqrt() * 1.000_001)
+        (corner.map(|x| x + half), (half + 0.5 * lattice.pitch) * 3.0_f64.sqrt() * 1.000_001)
     }
 
     /// The cells that may cover something of the cube, and the solids whose
@@ -99,12 +115,12 @@ impl<'a> Pass<'a> {
         let mut expanded = Candidates::default();
         let mut upper = f64::INFINITY;
         // Sites farther than this cover nothing of the cube, but may tell the inside of a solid.
-        let horizon = self.setting.reach + half;
+        let horizon = self.setting.near + half;
         for candidate in &candidates.cells {
             self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded)?;
         }
         // One site covers all of the cube.
-        if upper + half < self.setting.reach {
+        if upper + half < self.setting.least {
             return Ok(None);
         }
         let Some(reaches) = self.solids(&middle, half, &brackets, &expanded, open) else { return Ok(None) };
@@ -219,11 +235,11 @@ impl<'a> Pass<'a> {
         open: &[u32],
     ) -> Result<Option<BlockSurface>, DilationError> {
         let first_cube = node.first_block.map(|block| block * SIDE as i64);
-        let surface = workshop.surface(self.setting, first_cube, candidates, open);
+        let surface = workshop.surface(self.setting, self.grading, first_cube, candidates, open);
         if workshop.is_exhausted() {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }
-        if surface.triangles.is_empty() {
+        if surface.triangles.is_empty() && surface.critical.is_empty() {
             return Ok(None);
         }
         let made = surface.triangles.len() as u64;

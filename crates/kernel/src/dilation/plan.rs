@@ -1,7 +1,7 @@
 //! Pitch, thresholds and bounds of a dilation.
 
 use super::block::{self, BlockSurface};
-use super::lattice::{ENCLOSING, Lattice};
+use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::Pass;
 use super::outside::MOST;
 use super::tree::Candidates;
@@ -12,6 +12,7 @@ use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::{Solid, SolidError};
 use crate::tolerance::{Radius, Tolerance};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
@@ -19,14 +20,23 @@ use std::sync::atomic::AtomicU64;
 #[derive(Clone, Debug)]
 pub(crate) struct Setting {
     pub(super) lattice: Lattice,
-    /// sqrt(theta): sites nearer than this cover a vertex.
+    /// sqrt(theta) at level 0: sites nearer than this cover a vertex.
     pub(super) reach: f64,
-    /// theta.
-    square: f64,
+    /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(theta + R^2).
+    pub(super) near: f64,
+    /// The least distance in the band of level 0.
+    pub(super) least: f64,
+    /// theta by level.
+    squares: [f64; LEVELS as usize + 1],
+    /// theta less the square of the band's lower end, and R^2, by level, as integers.
+    pub(super) bands: [i64; LEVELS as usize + 1],
+    pub(super) slopes: [f64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
     pub(super) deep: f64,
     /// 1 / q, with q the unit in which squared distances are compared.
     inverse_unit: f64,
+    /// The largest value of a site that matters.
+    pub(super) most: i64,
     /// Rounding of positions and distances: far above what double precision loses, far below everything else.
     pub(super) slack: f64,
     /// What was asked.
@@ -39,6 +49,8 @@ pub(crate) struct Setting {
 const COARSEST: f64 = 1.0;
 /// A pitch finer than this many roundings of single precision cannot be carried.
 const LEAST_ROUNDINGS: f64 = 64.0;
+/// Cubes that are refined to settle the topology, besides an eighth of the triangles: where more would be, it stays open.
+const MOST_REFINED: usize = 2_000;
 /// Bytes of a cell with its control points, nodes and sites.
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
@@ -47,32 +59,50 @@ const BYTES_PER_TRIANGLE: f64 = 120.0;
 const PREDICTION_WORK: f64 = 300_000.0;
 
 impl Setting {
-    fn new(reach: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
+    fn new(radius: f64, above: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
+        let reach = radius + above;
         let extent = extent(bounds, reach + 2.0 * pitch);
-        let margin = reach + 1.5 * pitch;
+        let margin = reach + 2.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
         let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let square = reach * reach;
-        // Values of sites that cover something are within -theta and (reach + a)^2 - theta.
-        let largest = square.max((reach + 1.000_1 * pitch).powi(2) - square);
+        let enclosing = (ENCLOSING * pitch).powi(2);
+        // Every level divides lengths by 2 and the band around r by 4.
+        let share = |level: usize| 0.25_f64.powi(level as i32);
+        let squares = std::array::from_fn(|level| (radius + above * share(level)).powi(2));
+        let band = |level: usize| 4.0 * radius * above * share(level);
+        let near = (squares[0] + enclosing).sqrt();
+        // Values of sites that matter are within -theta and (near + a)^2 - r^2, and the band is added to them.
+        let largest = (near + 1.000_1 * pitch).powi(2) - radius * radius + band(0);
+        let inverse_unit = (MOST - 2) as f64 / largest.max(squares[0]);
         Self {
             lattice: Lattice { origin, pitch },
             reach,
-            square,
-            deep: (reach - pitch * 1.000_1).max(0.0),
-            inverse_unit: (MOST - 1) as f64 / largest,
+            near,
+            least: (radius - above).max(0.0),
+            squares,
+            bands: std::array::from_fn(|level| (band(level) * inverse_unit).ceil() as i64),
+            slopes: std::array::from_fn(|level| enclosing * share(level) * inverse_unit),
+            deep: (radius - above - pitch * 1.000_1).max(0.0),
+            inverse_unit,
+            most: ((largest - band(0)) * inverse_unit) as i64,
             slack: 1e-13 * extent,
             tolerance,
             cells,
         }
     }
 
+    /// theta at vertices that leaves of this level and finer ones touch.
+    #[inline]
+    pub(super) fn square(&self, level: u32) -> f64 {
+        self.squares[level as usize]
+    }
+
     /// A squared distance less theta as an integer, never 0.
     #[inline]
-    pub(super) fn integer(&self, distance_squared: f64) -> i64 {
-        let scaled = (distance_squared - self.square) * self.inverse_unit;
+    pub(super) fn integer(&self, distance_squared: f64, square: f64) -> i64 {
+        let scaled = (distance_squared - square) * self.inverse_unit;
         // Saturates; far sites cover nothing.
-        let value = scaled.round() as i64;
+        let value = (scaled + scaled.signum() * 0.5) as i64;
         if value == 0 { 1 } else { value }
     }
 }
@@ -145,8 +175,8 @@ impl<'a> Plan<'a> {
         // The roots are there anyway; what grows beyond them may take a fair share of the memory.
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
-        let reach = self.radius + self.tolerance - self.extra - self.rule.outer_reserve();
-        Setting::new(reach, self.tolerance, pitch, cells, &self.bounds)
+        let above = self.tolerance - self.extra - self.rule.outer_reserve();
+        Setting::new(self.radius, above, self.tolerance, pitch, cells, &self.bounds)
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
@@ -160,7 +190,7 @@ impl<'a> Plan<'a> {
         let coarsest = (COARSEST * self.radius).max(self.pitch);
         let mut pitch = coarsest;
         loop {
-            let surfaces = self.surfaces(attractor, &self.setting(pitch, &unlimited), &unlimited)?;
+            let surfaces = self.surfaces(attractor, &self.setting(pitch, &unlimited), &Grading::default(), None, &unlimited)?;
             let made = surfaces.iter().map(|surface| surface.triangles.len() as f64).sum::<f64>();
             let expected = |finer: f64| made * (pitch / finer).powi(2);
             if pitch <= self.pitch || expected((0.5 * pitch).max(self.pitch)) > PREDICTION_WORK {
@@ -170,21 +200,56 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// The dilation.
+    /// The dilation. Where the distance may have critical points with values that the lattice does not tell from r, it is
+    /// refined until it does.
     pub(super) fn run(&self, attractor: &Attractor, budget: &Budget) -> Result<Dilation, DilationError> {
         let setting = self.setting(self.pitch, budget);
-        let surfaces = self.surfaces(attractor, &setting, budget)?;
+        let mut grading = Grading::default();
+        let made = self.surfaces(attractor, &setting, &grading, None, budget)?;
+        let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
+        let mut blocks: BTreeMap<[i64; 3], BlockSurface> = made.into_iter().map(|surface| (surface.first_cube, surface)).collect();
+        let mut refined = 0;
+        let mut uncertain;
+        loop {
+            let critical: BTreeSet<Cube> = blocks.values_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect();
+            let coarse: Vec<Cube> = critical.iter().copied().filter(|cube| cube.level < LEVELS).collect();
+            uncertain = critical.len() - coarse.len();
+            refined += coarse.len();
+            if coarse.is_empty() {
+                break;
+            }
+            if refined > allowed {
+                uncertain += coarse.len();
+                break;
+            }
+            let mut new = Vec::new();
+            coarse.into_iter().for_each(|cube| grading.subdivide(cube, &mut new));
+            let affected = blocks_around(&new);
+            affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
+            let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;
+            blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
+        }
+        let surfaces: Vec<BlockSurface> = blocks.into_values().collect();
         let triangles: usize = surfaces.iter().map(|surface| surface.triangles.len()).sum();
         budget.report("dilate", 1.0, triangles as u64);
-        self.certify(&setting, surfaces, budget)
+        self.certify(&setting, surfaces, uncertain, budget)
     }
 
-    fn surfaces(&self, attractor: &Attractor, setting: &Setting, budget: &Budget) -> Result<Vec<BlockSurface>, DilationError> {
+    fn surfaces(
+        &self,
+        attractor: &Attractor,
+        setting: &Setting,
+        grading: &Grading,
+        only: Option<&BTreeSet<[i64; 3]>>,
+        budget: &Budget,
+    ) -> Result<Vec<BlockSurface>, DilationError> {
         let (blocks, candidates) = self.space(attractor, setting);
         let pass = Pass {
             attractor,
             rule: &self.rule,
             setting,
+            grading,
+            only,
             budget,
             triangles: AtomicU64::new(0),
             done: AtomicU64::new(0),
@@ -209,7 +274,7 @@ impl<'a> Plan<'a> {
         (blocks.next_power_of_two() as i64, candidates)
     }
 
-    fn certify(&self, setting: &Setting, surfaces: Vec<BlockSurface>, budget: &Budget) -> Result<Dilation, DilationError> {
+    fn certify(&self, setting: &Setting, surfaces: Vec<BlockSurface>, uncertain: usize, budget: &Budget) -> Result<Dilation, DilationError> {
         let site = surfaces.iter().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
         let enclosing = ENCLOSING * setting.lattice.pitch;
         // x is in the solid if d(x, S)^2 <= theta - R^2, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
@@ -224,6 +289,18 @@ impl<'a> Plan<'a> {
             SolidError::NotManifold(_) if has_solids => DilationError::Inside,
             other => other.into(),
         })?;
-        Ok(Dilation { solid, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds })
+        Ok(Dilation { solid, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds, uncertain: uncertain as u64 })
     }
+}
+
+/// The blocks whose tetrahedra change with these cubes: those that hold one or a neighbour.
+fn blocks_around(cubes: &[Cube]) -> BTreeSet<[i64; 3]> {
+    let side = block::SIDE as i64;
+    let around = |cube: &Cube| {
+        let base = cube.base();
+        (0..27).map(move |code: i64| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1]).map(move |offset| {
+            std::array::from_fn(|axis: usize| (base[axis] + offset[axis]).div_euclid(side))
+        })
+    };
+    cubes.iter().flat_map(around).collect()
 }
