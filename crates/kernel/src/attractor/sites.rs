@@ -44,20 +44,19 @@ pub(crate) struct SiteRule<'a> {
     radius: f64,
     tolerance: f64,
     choices: Vec<Choice>,
-    /// Whether some sites may lie off the attractor.
-    reserved: bool,
 }
 
-/// The share of (r + e)^2 - (r - e)^2 = 4 r e that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
+/// The share of r^2 - (r - e)^2 that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
 /// needs a finer lattice.
 const SITE_SHARE: f64 = 0.3;
+/// The share of e by which sites may be off the attractor: the lattice's own error is inner only.
+const OUTER_SHARE: f64 = 0.5;
 
 impl<'a> SiteRule<'a> {
     /// The rule for a dilation by `radius` to `tolerance`, both in mm.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
-        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new(), reserved: true };
+        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new() };
         choose(&mut rule);
-        rule.reserved = rule.errs_outwards();
         rule
     }
 
@@ -66,25 +65,12 @@ impl<'a> SiteRule<'a> {
         self.attractor.automaton().states().iter().all(|state| state.leaf == LeafPrimitive::Simplex)
     }
 
-    /// The share of 4 r e that is the lattice's.
+    /// The share of r^2 - (r - e)^2 that is the lattice's.
     pub(crate) fn lattice_share(&self) -> f64 {
         if self.exact() { 1.0 } else { 1.0 - SITE_SHARE }
     }
 
-    /// How far sites may be from the attractor: the share of the tolerance that must be kept from the lattice's outer error.
-    pub(crate) fn outer_reserve(&self) -> f64 {
-        if self.reserved { SITE_SHARE * self.tolerance } else { 0.0 }
-    }
-
-    fn errs_outwards(&self) -> bool {
-        let states = self.attractor.automaton().states();
-        self.choices.iter().zip(states).any(|(choice, state)| *choice != Choice::Cover && state.leaf != LeafPrimitive::Simplex)
-    }
-
     /// The errors of a cell if it is small enough to be replaced.
-    ///
-    /// Either what it takes is inner alone, (r - e + inner)^2 + inner_square - (r - e)^2 <= share 4 r e; or it may err by the share of e
-    /// both ways, which takes as much of (r + e)^2 and (r - e)^2 together.
     #[inline]
     pub(crate) fn leaf(&self, cell: &Cell, points: &[ControlPoint]) -> Option<SiteError> {
         let error = match self.choices[cell.state.index()] {
@@ -98,10 +84,10 @@ impl<'a> SiteRule<'a> {
                 SiteError { inner_square: square, inner: cover.halo.image(&columns).radius(), outer: 0.0 }
             }
         };
-        let (reserve, least) = (SITE_SHARE * self.tolerance, self.radius - self.tolerance);
+        let least = self.radius - self.tolerance;
         let taken = (least + error.inner).powi(2) + error.inner_square - least * least;
-        let allowed = if self.reserved { (least + reserve).powi(2) - least * least } else { 4.0 * self.radius * reserve };
-        (taken <= allowed && error.outer <= reserve).then_some(error)
+        let allowed = SITE_SHARE * (self.radius * self.radius - least * least);
+        (taken <= allowed && error.outer <= OUTER_SHARE * self.tolerance).then_some(error)
     }
 
     /// Emits the sites of a leaf.
@@ -162,7 +148,6 @@ fn choose(rule: &mut SiteRule<'_>) {
                 continue;
             }
             below.iter().for_each(|&state| rule.choices[state] = choice);
-            rule.reserved = choice != Choice::Cover;
             // Sites that are exact leave the lattice a larger share.
             let work = expected_sites(rule, index) * if choice == Choice::Cover { 1.0 } else { INEXACT };
             if work < best.0 {

@@ -12,7 +12,7 @@
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
 use super::plan::Setting;
-use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
+use super::lattice::{Cube, Grading, LEVELS, Number, UNITS, is_mirrored};
 use super::outside::{Cut, FACES, HalfSpace, Outside};
 use super::tree::{Candidates, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
@@ -50,8 +50,10 @@ pub(super) struct BlockSurface {
     pub(super) leaves: u64,
     /// Largest errors of leaves met.
     pub(super) site_error: SiteError,
-    /// Leaves where the distance may have a critical point with a value that their size does not tell from r.
+    /// Cubes to subdivide: the distance may have a critical point there with a value that their size does not tell from r.
     pub(super) critical: Vec<Cube>,
+    /// Places where no level tells it.
+    pub(super) uncertain: Vec<Cube>,
 }
 
 /// What a vertex on an edge or a face of the lattice is called by every tetrahedron there.
@@ -86,8 +88,6 @@ fn mix(mut x: u64) -> u64 {
 struct Frame {
     numbers: [Number; 4],
     positions: [Point; 4],
-    /// theta at the vertices.
-    squares: [f64; 4],
     /// The nearest site of every vertex that is near one.
     nearest: [Option<SiteId>; 4],
     /// Whether a site covers a vertex.
@@ -184,6 +184,8 @@ impl<'a> Workshop<'a> {
         surface.shared.sort_unstable();
         surface.critical.sort_unstable();
         surface.critical.dedup();
+        surface.uncertain.sort_unstable();
+        surface.uncertain.dedup();
         surface.leaves = self.tree.leaves;
         surface.site_error = self.tree.largest_error;
         surface
@@ -210,9 +212,9 @@ impl<'a> Workshop<'a> {
         let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
         let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
         let horizon = setting.near + half;
-        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.least - half);
+        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.bottom(0) - half);
         let Some(hit) = hit else { return };
-        if hit.distance_squared.sqrt() + half < setting.least {
+        if hit.distance_squared.sqrt() + half < setting.bottom(0) {
             // One site covers every vertex, and nothing is near the surface.
             return;
         }
@@ -228,7 +230,7 @@ impl<'a> Workshop<'a> {
                     leaves.clear();
                     grading.leaves(Cube { level: 0, index: [first[0] + i, first[1] + j, first[2] + k] }, &mut leaves);
                     for &leaf in &leaves {
-                        grading.tetrahedra(leaf, &mut |numbers, other| self.tetrahedron(setting, grading, numbers, leaf, other, surface));
+                        grading.tetrahedra(leaf, &mut |numbers| self.tetrahedron(setting, numbers, leaf.level, surface));
                     }
                 }
             }
@@ -305,7 +307,6 @@ impl<'a> Workshop<'a> {
     fn frame(
         &mut self,
         setting: &Setting,
-        grading: &Grading,
         mut numbers: [Number; 4],
         level: u32,
         surface: &BlockSurface,
@@ -323,12 +324,10 @@ impl<'a> Workshop<'a> {
         if !near {
             return None;
         }
-        let squares = numbers.map(|number| setting.square(grading.coarsest(number)));
-        let covered = values.iter().zip(squares).any(|(value, square)| setting.integer(value.square, square) < 0);
+        let covered = values.iter().any(|value| setting.integer(value.square) < 0);
         Some(Frame {
             numbers,
             positions: numbers.map(|number| setting.lattice.position(number)),
-            squares,
             nearest: values.map(|value| (value.square != FAR).then_some(value.site)),
             covered,
             level,
@@ -341,19 +340,16 @@ impl<'a> Workshop<'a> {
     fn tetrahedron(
         &mut self,
         setting: &Setting,
-        grading: &Grading,
         numbers: [Number; 4],
-        leaf: Cube,
-        other: Option<Cube>,
+        level: u32,
         surface: &mut BlockSurface,
     ) {
-        let Some(frame) = self.frame(setting, grading, numbers, leaf.level, surface) else { return };
+        let Some(frame) = self.frame(setting, numbers, level, surface) else { return };
         if self.find_sites(setting, &frame) == Cut::Empty {
             return;
         }
         if self.may_be_critical(setting, &frame) {
-            surface.critical.push(leaf);
-            surface.critical.extend(other);
+            self.search_critical(setting, &frame, surface);
         }
         if !frame.covered {
             return;
@@ -403,7 +399,7 @@ impl<'a> Workshop<'a> {
 
     fn consider(&mut self, setting: &Setting, frame: &Frame, id: SiteId) -> Cut {
         let site = self.tree.site(id);
-        let values = std::array::from_fn(|k| setting.integer(site.distance_squared(&frame.positions[k]), frame.squares[k]));
+        let values = std::array::from_fn(|k| setting.integer(site.distance_squared(&frame.positions[k])));
         // A site that is farther than near + pitch from a vertex does not matter in the tetrahedron.
         if values.iter().any(|&value| value > setting.most) {
             return Cut::Missed;
@@ -414,16 +410,18 @@ impl<'a> Workshop<'a> {
         self.outside.cut(HalfSpace { values: values.map(|value| value + band), ..half_space })
     }
 
-    /// Whether the distance to the sites may have a critical point in the tetrahedron, with a value that the level does not tell from r.
+    /// Whether the distance to the sites may have a critical point in the tetrahedron, with a value that the level does not tell
+    /// from r.
     ///
-    /// A point x is critical when it lies in the convex hull of its closest points. What is left in `outside` contains all x with a
-    /// distance in the band; the closest point of a convex site to a point of the tetrahedron lies among the hull of those of its
-    /// vertices for points and segments (on a segment, the parameter is a clamped affine function), and near it for triangles. So if a plane parts the two hulls, there is none.
+    /// A point x is critical when it lies in the convex hull of its closest points. What is left in `outside` contains all x with
+    /// such a distance; the closest point of a convex site to a point of the tetrahedron lies in the hull of those of its
+    /// vertices for points and segments (on a segment, the parameter is a clamped affine function), and near it for triangles. So if
+    /// a plane parts the two hulls, there is none.
     fn may_be_critical(&mut self, setting: &Setting, frame: &Frame) -> bool {
         if self.nearby.len() < 2 {
             return false;
         }
-        let slope = setting.slopes[frame.level as usize];
+        let slope = setting.bands[frame.level as usize] as f64;
         let corners = self.outside.corners();
         let least = |values: &[i64; 4]| -> f64 {
             corners.iter().map(|corner| (0..4).map(|k| corner.weights[k] * values[k] as f64).sum()).fold(f64::INFINITY, f64::min)
@@ -447,6 +445,57 @@ impl<'a> Workshop<'a> {
         self.rest.clear();
         self.rest.extend(corners.iter().map(|corner| place(&frame.positions, &corner.weights)));
         !are_parted(&self.rest, &self.closest)
+    }
+
+    /// Looks closer at what is left of a tetrahedron, and notes the cubes that must be subdivided to tell the values of critical
+    /// points from r.
+    fn search_critical(&mut self, setting: &Setting, frame: &Frame, surface: &mut BlockSurface) {
+        let low: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
+        let high: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
+        let half = (0..3).map(|axis| 0.5 * (high[axis] - low[axis])).fold(0.0, f64::max);
+        let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + 4));
+        let mut open = vec![(std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis])), half)];
+        let mut work = 0;
+        let mut closest = std::mem::take(&mut self.closest);
+        while let Some((middle, half)) = open.pop() {
+            let around = half * 3.0_f64.sqrt();
+            work += 1;
+            let distance = self.closest_around(&middle, around, &mut closest);
+            if distance - around > setting.reach || distance + around < setting.bottom(frame.level) {
+                continue;
+            }
+            // Closest points of other points of the cube are within `around` of these.
+            if is_farther(&middle, &closest, 2.0 * around) {
+                continue;
+            }
+            if half > smallest && work < MOST_WORK {
+                let offset = |octant: u32, axis: usize| if octant >> axis & 1 == 1 { 0.5 * half } else { -0.5 * half };
+                open.extend((0..8).map(|octant| (std::array::from_fn(|axis| middle[axis] + offset(octant, axis)), 0.5 * half)));
+                continue;
+            }
+            self.note_critical(setting, frame.level, &middle, distance + around, surface);
+        }
+        self.closest = closest;
+    }
+
+    /// The distance of a point from the sites of the tetrahedron, and the closest points of those that may be nearest to a point within
+    /// `around` of it.
+    fn closest_around(&self, x: &Point, around: f64, closest: &mut Vec<Point>) -> f64 {
+        closest.clear();
+        closest.extend(self.nearby.iter().map(|nearby| self.tree.site(nearby.site).closest(x)));
+        let least = closest.iter().map(|point| distance_squared(x, point)).fold(f64::INFINITY, f64::min).sqrt();
+        let most = (least + 2.0 * around).powi(2);
+        closest.retain(|point| distance_squared(x, point) <= most);
+        least
+    }
+
+    fn note_critical(&self, setting: &Setting, level: u32, x: &Point, value: f64, surface: &mut BlockSurface) {
+        let within = std::array::from_fn(|axis| (x[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
+        match (level + 1..=LEVELS).find(|&level| value < setting.bottom(level)) {
+            Some(enough) => surface.critical.push(Cube::containing(enough - 1, within)),
+            None if level < LEVELS && value < setting.reach => surface.critical.push(Cube::containing(LEVELS - 1, within)),
+            None => surface.uncertain.push(Cube::containing(0, within)),
+        }
     }
 
     /// A ball around what is left.
@@ -545,6 +594,33 @@ fn named(coordinates: impl Iterator<Item = i32>, first: u64, second: u64) -> Ver
         high = mix(high.rotate_left(11) ^ low ^ (coordinate as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     }
     u128::from(high) << 64 | u128::from(low)
+}
+
+/// Cubes that the search for critical points in a tetrahedron may look at.
+const MOST_WORK: usize = 4000;
+
+/// Whether a point is surely farther than `distance` from the convex hull of others.
+fn is_farther(x: &Point, others: &[Point], distance: f64) -> bool {
+    let Some(first) = others.first() else { return true };
+    // The shortest vector found so far from the hull to x.
+    let mut shortest = subtract(x, first);
+    for _ in 0..STEPS {
+        let square = dot(&shortest, &shortest);
+        if square <= distance * distance {
+            return false;
+        }
+        let along = |point: &&Point| dot(&shortest, point);
+        let Some(farthest) = others.iter().max_by(|a, b| along(a).total_cmp(&along(b))) else { return true };
+        let support = subtract(x, farthest);
+        let product = dot(&shortest, &support);
+        if product > 0.0 && product * product > distance * distance * square {
+            return true;
+        }
+        let step = subtract(&support, &shortest);
+        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
+    }
+    false
 }
 
 /// Steps of the search for a plane.

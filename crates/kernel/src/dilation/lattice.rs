@@ -59,6 +59,12 @@ impl Cube {
         })
     }
 
+    /// The cube of a level that contains a point, given in units of the pitch.
+    pub fn containing(level: u32, point: [f64; 3]) -> Self {
+        let scale = f64::from(1_u32 << level);
+        Self { level, index: point.map(|x| (x * scale).floor() as i64) }
+    }
+
     /// The cube of level 0 that it lies in.
     pub fn base(self) -> [i64; 3] {
         self.index.map(|x| x >> self.level)
@@ -72,8 +78,8 @@ pub struct Grading {
 }
 
 impl Grading {
-    /// Subdivides a cube, and as many around it as keep leaves that touch within one level of each other. The cubes that were
-    /// subdivided are added to `new`.
+    /// Subdivides a cube, those it lies in, and as many around it as keep leaves that touch within one level of each other. The
+    /// cubes that were subdivided are added to `new`.
     pub fn subdivide(&mut self, cube: Cube, new: &mut Vec<Cube>) {
         let mut open = vec![cube];
         while let Some(cube) = open.pop() {
@@ -93,11 +99,6 @@ impl Grading {
         !self.subdivided.is_empty() && self.subdivided.contains(&cube)
     }
 
-    /// Whether none is.
-    pub fn is_empty(&self) -> bool {
-        self.subdivided.is_empty()
-    }
-
     /// The leaves of a cube.
     pub fn leaves(&self, cube: Cube, leaves: &mut Vec<Cube>) {
         if self.is_subdivided(cube) {
@@ -107,29 +108,9 @@ impl Grading {
         }
     }
 
-    /// The level of the largest leaf that touches a vertex.
-    pub fn coarsest(&self, number: Number) -> u32 {
-        if self.subdivided.is_empty() {
-            return 0;
-        }
-        (0..8)
-            .map(|octant: i64| {
-                // A point just beside the vertex, in doubled units.
-                let at: [i64; 3] = std::array::from_fn(|axis| 2 * i64::from(number[axis]) + 2 * (octant >> axis & 1) - 1);
-                let mut cube = Cube { level: 0, index: at.map(|x| x.div_euclid(2 * UNITS)) };
-                while self.is_subdivided(cube) {
-                    let level = cube.level + 1;
-                    cube = Cube { level, index: at.map(|x| x.div_euclid(2 * UNITS >> level)) };
-                }
-                cube.level
-            })
-            .min()
-            .unwrap_or(0)
-    }
-
     /// Calls `emit` with the vertices of every tetrahedron that belongs to a leaf: those towards the next leaf of its size
-    /// along every axis, and its own side of faces between different sizes. The second cube is the leaf on the other side.
-    pub fn tetrahedra(&self, leaf: Cube, emit: &mut impl FnMut([Number; 4], Option<Cube>)) {
+    /// along every axis, and its own side of faces between different sizes.
+    pub fn tetrahedra(&self, leaf: Cube, emit: &mut impl FnMut([Number; 4])) {
         for axis in 0..3 {
             for side in [0, 1] {
                 let mut across = [0; 3];
@@ -148,7 +129,7 @@ impl Grading {
                         // The diagonal joins the middle of the larger face with its corner.
                         let (inner, outer) = (on_face(1, 1), on_face(2 * du, 2 * dv));
                         for third in [on_face(2 * du, 1), on_face(1, 2 * dv)] {
-                            emit([leaf.centre(), inner, outer, third], None);
+                            emit([leaf.centre(), inner, outer, third]);
                         }
                     }
                 } else if other.parent().is_some_and(|parent| !self.is_subdivided(parent)) {
@@ -156,7 +137,7 @@ impl Grading {
                     let odd = |k: usize| 2 * (1 - (leaf.index[k] & 1));
                     let (du, dv) = (odd(u), odd(v));
                     for third in [on_face(2 - du, dv), on_face(du, 2 - dv)] {
-                        emit([leaf.centre(), on_face(du, dv), on_face(2 - du, 2 - dv), third], None);
+                        emit([leaf.centre(), on_face(du, dv), on_face(2 - du, 2 - dv), third]);
                     }
                 } else if side == 1 {
                     self.between(leaf, other, (axis, u, v), emit);
@@ -166,7 +147,7 @@ impl Grading {
     }
 
     /// The tetrahedra between two leaves of one size.
-    fn between(&self, leaf: Cube, other: Cube, (axis, u, v): (usize, usize, usize), emit: &mut impl FnMut([Number; 4], Option<Cube>)) {
+    fn between(&self, leaf: Cube, other: Cube, (axis, u, v): (usize, usize, usize), emit: &mut impl FnMut([Number; 4])) {
         for step in 0..4 {
             let corner = |step: usize| {
                 let (du, dv) = [(0, 0), (1, 0), (1, 1), (0, 1)][step % 4];
@@ -180,10 +161,10 @@ impl Grading {
             let (p, q) = (corner(step), corner(step + 1));
             if self.is_subdivided(leaf.moved(beyond)) || self.is_subdivided(other.moved(beyond)) {
                 let middle: Number = std::array::from_fn(|k| (p[k] + q[k]) / 2);
-                emit([leaf.centre(), other.centre(), p, middle], Some(other));
-                emit([leaf.centre(), other.centre(), middle, q], Some(other));
+                emit([leaf.centre(), other.centre(), p, middle]);
+                emit([leaf.centre(), other.centre(), middle, q]);
             } else {
-                emit([leaf.centre(), other.centre(), p, q], Some(other));
+                emit([leaf.centre(), other.centre(), p, q]);
             }
         }
     }
@@ -251,7 +232,7 @@ mod tests {
             grading.leaves(Cube { level: 0, index: [code % size, code / size % size, code / size / size] }, &mut leaves);
         }
         for leaf in leaves {
-            grading.tetrahedra(leaf, &mut |mut numbers, _| {
+            grading.tetrahedra(leaf, &mut |mut numbers| {
                 numbers.sort_unstable();
                 let signed = volume(&numbers);
                 assert!(signed != 0 && (signed < 0) == is_mirrored(&numbers));

@@ -2,9 +2,11 @@
 //!
 //! In every tetrahedron of the lattice the solid is a union of half-spaces, one for every site near: where the affine
 //! function with the values of the site's squared distance at the four vertices is below theta. Creases between sites are
-//! cut where those functions meet; so, with rho the error of sites and R a tetrahedron's circumradius,
-//! D(sqrt(theta - R^2)) subset solid subset D(sqrt(theta)) for the sites (see `block`), and theta = (r + e)^2 makes both bounds
-//! e when R^2 = 4 r e: a pitch of sqrt(r e), whatever the shape.
+//! cut where those functions meet; so, with R a tetrahedron's circumradius, D(sqrt(theta - R^2)) subset solid subset D(sqrt(theta))
+//! for the sites (see `block`). theta = r^2, and R^2 = r^2 - (r - e)^2 is a pitch of sqrt(r e), whatever the shape.
+//!
+//! The solid has the topology of D(r) where the distance has no critical value between sqrt(r^2 - R^2) and r. Where it may have one,
+//! the lattice is refined until R tells the value from r; what no level tells is counted as uncertain.
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`.
 

@@ -120,7 +120,7 @@ impl<'a> Pass<'a> {
             self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded)?;
         }
         // One site covers all of the cube.
-        if upper + half < self.setting.least {
+        if upper + half < self.setting.bottom(0) {
             return Ok(None);
         }
         let Some(reaches) = self.solids(&middle, half, &brackets, &expanded, open) else { return Ok(None) };
@@ -239,7 +239,7 @@ impl<'a> Pass<'a> {
         if workshop.is_exhausted() {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }
-        if surface.triangles.is_empty() && surface.critical.is_empty() {
+        if surface.triangles.is_empty() && surface.critical.is_empty() && surface.uncertain.is_empty() {
             return Ok(None);
         }
         let made = surface.triangles.len() as u64;

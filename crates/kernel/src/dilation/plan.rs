@@ -20,17 +20,13 @@ use std::sync::atomic::AtomicU64;
 #[derive(Clone, Debug)]
 pub(crate) struct Setting {
     pub(super) lattice: Lattice,
-    /// sqrt(theta) at level 0: sites nearer than this cover a vertex.
+    /// sqrt(theta) = r: sites nearer than this cover a vertex.
     pub(super) reach: f64,
     /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(theta + R^2).
     pub(super) near: f64,
-    /// The least distance in the band of level 0.
-    pub(super) least: f64,
-    /// theta by level.
-    squares: [f64; LEVELS as usize + 1],
-    /// theta less the square of the band's lower end, and R^2, by level, as integers.
+    /// R^2 by level: as a length squared, and as integers.
+    enclosing: [f64; LEVELS as usize + 1],
     pub(super) bands: [i64; LEVELS as usize + 1],
-    pub(super) slopes: [f64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
     pub(super) deep: f64,
     /// 1 / q, with q the unit in which squared distances are compared.
@@ -59,51 +55,43 @@ const BYTES_PER_TRIANGLE: f64 = 120.0;
 const PREDICTION_WORK: f64 = 300_000.0;
 
 impl Setting {
-    fn new(radius: f64, above: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
-        let reach = radius + above;
-        let extent = extent(bounds, reach + 2.0 * pitch);
-        let margin = reach + 2.5 * pitch;
+    fn new(radius: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
+        let extent = extent(bounds, radius + 2.0 * pitch);
+        let margin = radius + 2.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
         let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let enclosing = (ENCLOSING * pitch).powi(2);
-        // Every level divides lengths by 2 and the band around r by 4.
-        let share = |level: usize| 0.25_f64.powi(level as i32);
-        let squares = std::array::from_fn(|level| (radius + above * share(level)).powi(2));
-        let band = |level: usize| 4.0 * radius * above * share(level);
-        let near = (squares[0] + enclosing).sqrt();
-        // Values of sites that matter are within -theta and (near + a)^2 - r^2, and the band is added to them.
-        let largest = (near + 1.000_1 * pitch).powi(2) - radius * radius + band(0);
-        let inverse_unit = (MOST - 2) as f64 / largest.max(squares[0]);
+        let enclosing = std::array::from_fn(|level| (ENCLOSING * pitch).powi(2) * 0.25_f64.powi(level as i32));
+        let near = (radius * radius + enclosing[0]).sqrt();
+        // Values of sites that matter are within -theta and (near + a)^2 - theta, and the band is added to them.
+        let largest = ((near + 1.000_1 * pitch).powi(2) - radius * radius).max(radius * radius);
+        let inverse_unit = (MOST - 2) as f64 / (largest + enclosing[0]);
         Self {
             lattice: Lattice { origin, pitch },
-            reach,
+            reach: radius,
             near,
-            least: (radius - above).max(0.0),
-            squares,
-            bands: std::array::from_fn(|level| (band(level) * inverse_unit).ceil() as i64),
-            slopes: std::array::from_fn(|level| enclosing * share(level) * inverse_unit),
-            deep: (radius - above - pitch * 1.000_1).max(0.0),
+            enclosing,
+            bands: enclosing.map(|square: f64| (square * inverse_unit).ceil() as i64),
+            deep: (radius * radius - enclosing[0]).max(0.0).sqrt() - pitch * 1.000_1,
             inverse_unit,
-            most: ((largest - band(0)) * inverse_unit) as i64,
+            most: (largest * inverse_unit) as i64,
             slack: 1e-13 * extent,
             tolerance,
             cells,
         }
     }
 
-    /// theta at vertices that leaves of this level and finer ones touch.
-    #[inline]
-    pub(super) fn square(&self, level: u32) -> f64 {
-        self.squares[level as usize]
-    }
-
     /// A squared distance less theta as an integer, never 0.
     #[inline]
-    pub(super) fn integer(&self, distance_squared: f64, square: f64) -> i64 {
-        let scaled = (distance_squared - square) * self.inverse_unit;
+    pub(super) fn integer(&self, distance_squared: f64) -> i64 {
+        let scaled = (distance_squared - self.reach * self.reach) * self.inverse_unit;
         // Saturates; far sites cover nothing.
-        let value = (scaled + scaled.signum() * 0.5) as i64;
+        let value = (scaled + 0.5_f64.copysign(scaled)) as i64;
         if value == 0 { 1 } else { value }
+    }
+
+    /// The least distance at which the surface may be in tetrahedra of a level: sqrt(theta - R^2).
+    pub(super) fn bottom(&self, level: u32) -> f64 {
+        (self.reach * self.reach - self.enclosing[level as usize]).max(0.0).sqrt()
     }
 }
 
@@ -159,24 +147,23 @@ impl<'a> Plan<'a> {
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         let pitch = Self::pitch(&rule, radius, aimed - extra).min(COARSEST * radius);
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
-            let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (4.0 * radius * rule.lattice_share());
+            let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
         Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule })
     }
 
-    /// a = R / 0.559 with R^2 the lattice's share of (r + e)^2 - (r - e)^2 = 4 r e.
+    /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
     fn pitch(rule: &SiteRule<'_>, radius: f64, tolerance: f64) -> f64 {
-        (4.0 * radius * tolerance.max(0.0) * rule.lattice_share()).sqrt() / ENCLOSING
+        (tolerance.max(0.0) * (2.0 * radius - tolerance) * rule.lattice_share()).sqrt() / ENCLOSING
     }
 
     fn setting(&self, pitch: f64, budget: &Budget) -> Setting {
         // The roots are there anyway; what grows beyond them may take a fair share of the memory.
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
-        let above = self.tolerance - self.extra - self.rule.outer_reserve();
-        Setting::new(self.radius, above, self.tolerance, pitch, cells, &self.bounds)
+        Setting::new(self.radius, self.tolerance, pitch, cells, &self.bounds)
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
@@ -212,18 +199,14 @@ impl<'a> Plan<'a> {
         let mut uncertain;
         loop {
             let critical: BTreeSet<Cube> = blocks.values_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect();
-            let coarse: Vec<Cube> = critical.iter().copied().filter(|cube| cube.level < LEVELS).collect();
-            uncertain = critical.len() - coarse.len();
-            refined += coarse.len();
-            if coarse.is_empty() {
-                break;
-            }
-            if refined > allowed {
-                uncertain += coarse.len();
-                break;
-            }
+            uncertain = blocks.values().flat_map(|surface| &surface.uncertain).collect::<BTreeSet<_>>().len();
             let mut new = Vec::new();
-            coarse.into_iter().for_each(|cube| grading.subdivide(cube, &mut new));
+            critical.iter().for_each(|&cube| grading.subdivide(cube, &mut new));
+            refined += new.len();
+            if new.is_empty() || refined > allowed {
+                uncertain += critical.len();
+                break;
+            }
             let affected = blocks_around(&new);
             affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
             let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;

@@ -286,7 +286,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// All sites below `starts` that are within `reach` of x, and perhaps some more.
+    /// All sites below `starts` that are within `reach` of x.
     pub(super) fn collect(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<SiteId>) {
         let mut stack = std::mem::take(&mut self.stack);
         stack.clear();
@@ -303,7 +303,11 @@ impl<'a> Tree<'a> {
                     let near = |&index: &u32| distance_squared(x, &self.point_sites[index as usize]) <= square;
                     found.extend((first..first + count).filter(near).map(SiteId::Point));
                 }
-                Content::Sites(first, count) => found.extend((first..first + count).map(SiteId::Listed)),
+                Content::Sites(first, count) => {
+                    let square = (reach + self.slack).powi(2);
+                    let near = |&index: &u32| self.sites[index as usize].distance_squared(x) <= square;
+                    found.extend((first..first + count).filter(near).map(SiteId::Listed));
+                }
                 Content::Open(first, count) => stack.extend(first..first + count),
                 Content::Closed(points) => {
                     let (first, count) = self.expand(id, points);
