@@ -50,7 +50,7 @@ pub(super) struct BlockSurface {
     pub(super) leaves: u64,
     /// Largest errors of leaves met.
     pub(super) site_error: SiteError,
-    /// Cubes to subdivide: the distance may have a critical point there with a value that their size does not tell from r.
+    /// Cubes to subdivide: the distance may have a critical point below r there that the solid leaves out.
     pub(super) critical: Vec<Cube>,
     /// Places where no level tells it.
     pub(super) uncertain: Vec<Cube>,
@@ -212,10 +212,10 @@ impl<'a> Workshop<'a> {
         let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
         let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
         let horizon = setting.near + half;
-        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.bottom(0) - half);
+        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.reach - half);
         let Some(hit) = hit else { return };
-        if hit.distance_squared.sqrt() + half < setting.bottom(0) {
-            // One site covers every vertex, and nothing is near the surface.
+        if hit.distance_squared.sqrt() + half < setting.reach {
+            // One site covers all.
             return;
         }
         self.seed = Some(hit.node);
@@ -335,8 +335,8 @@ impl<'a> Workshop<'a> {
         })
     }
 
-    /// Cuts what all sites cover out of a tetrahedron and emits the surface of the rest; notes the cubes if the distance may
-    /// have a critical point there.
+    /// Cuts what all sites cover out of a tetrahedron and emits the surface of the rest; notes the cubes to subdivide if a critical
+    /// point of the distance may be left out.
     fn tetrahedron(
         &mut self,
         setting: &Setting,
@@ -345,7 +345,7 @@ impl<'a> Workshop<'a> {
         surface: &mut BlockSurface,
     ) {
         let Some(frame) = self.frame(setting, numbers, level, surface) else { return };
-        if self.find_sites(setting, &frame) == Cut::Empty {
+        if self.cut_sites(setting, &frame) == Cut::Empty {
             return;
         }
         if self.may_be_critical(setting, &frame) {
@@ -353,12 +353,6 @@ impl<'a> Workshop<'a> {
         }
         if !frame.covered {
             return;
-        }
-        self.outside.reset();
-        for nearby in &self.nearby {
-            if nearby.half_space.values.iter().any(|&value| value < 0) && self.outside.cut(nearby.half_space) == Cut::Empty {
-                return;
-            }
         }
         // What is left is far from all surfaces, so it is on one side of them.
         if !self.solid_nodes.is_empty() {
@@ -370,9 +364,8 @@ impl<'a> Workshop<'a> {
         self.emit(&frame, surface);
     }
 
-    /// Lists the sites that matter in a tetrahedron, and leaves in `outside` the part where the distance may be above the lower end
-    /// of the level's band.
-    fn find_sites(&mut self, setting: &Setting, frame: &Frame) -> Cut {
+    /// Lists the sites near what no site covers of a tetrahedron, which is left in `outside`.
+    fn cut_sites(&mut self, setting: &Setting, frame: &Frame) -> Cut {
         self.outside.reset();
         self.nearby.clear();
         for k in 0..4 {
@@ -406,17 +399,15 @@ impl<'a> Workshop<'a> {
         }
         let half_space = HalfSpace { values, name: name_of(&site) };
         self.nearby.push(Nearby { site: id, half_space });
-        let band = setting.bands[frame.level as usize];
-        self.outside.cut(HalfSpace { values: values.map(|value| value + band), ..half_space })
+        if values.iter().all(|&value| value > 0) { Cut::Missed } else { self.outside.cut(half_space) }
     }
 
-    /// Whether the distance to the sites may have a critical point in the tetrahedron, with a value that the level does not tell
-    /// from r.
+    /// Whether the distance to the sites may have a critical point below r in the part of the tetrahedron that the solid leaves out.
     ///
-    /// A point x is critical when it lies in the convex hull of its closest points. What is left in `outside` contains all x with
-    /// such a distance; the closest point of a convex site to a point of the tetrahedron lies in the hull of those of its
-    /// vertices for points and segments (on a segment, the parameter is a clamped affine function), and near it for triangles. So if
-    /// a plane parts the two hulls, there is none.
+    /// A point x is critical when it lies in the convex hull of its closest points. By Morse theory D(r) is, up to homotopy, D(s) with the hulls of the critical points
+    /// of values in (s, r] attached (Chazal, Cohen-Steiner and Lieutier, 2009); the solid contains D(s), s the lattice's inner bound, and where no critical point is left out, those hulls. The closest point of
+    /// a convex site to a point of the tetrahedron lies in the hull of those of its vertices for points and segments (on a
+    /// segment, the parameter is a clamped affine function), and near it for triangles. So if a plane parts the two hulls, there is none.
     fn may_be_critical(&mut self, setting: &Setting, frame: &Frame) -> bool {
         if self.nearby.len() < 2 {
             return false;
@@ -447,13 +438,13 @@ impl<'a> Workshop<'a> {
         !are_parted(&self.rest, &self.closest)
     }
 
-    /// Looks closer at what is left of a tetrahedron, and notes the cubes that must be subdivided to tell the values of critical
-    /// points from r.
+    /// Looks closer at what is left of a tetrahedron, and notes the cubes that must be subdivided so that critical points below r
+    /// are in the solid.
     fn search_critical(&mut self, setting: &Setting, frame: &Frame, surface: &mut BlockSurface) {
         let low: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
         let high: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
         let half = (0..3).map(|axis| 0.5 * (high[axis] - low[axis])).fold(0.0, f64::max);
-        let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + 4));
+        let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + 5));
         let mut open = vec![(std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis])), half)];
         let mut work = 0;
         let mut closest = std::mem::take(&mut self.closest);
@@ -461,7 +452,7 @@ impl<'a> Workshop<'a> {
             let around = half * 3.0_f64.sqrt();
             work += 1;
             let distance = self.closest_around(&middle, around, &mut closest);
-            if distance - around > setting.reach || distance + around < setting.bottom(frame.level) {
+            if distance - around > setting.reach || self.is_covered(frame, &middle, around) {
                 continue;
             }
             // Closest points of other points of the cube are within `around` of these.
@@ -473,7 +464,12 @@ impl<'a> Workshop<'a> {
                 open.extend((0..8).map(|octant| (std::array::from_fn(|axis| middle[axis] + offset(octant, axis)), 0.5 * half)));
                 continue;
             }
-            self.note_critical(setting, frame.level, &middle, distance + around, surface);
+            let within = std::array::from_fn(|axis| (middle[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
+            if frame.level < LEVELS {
+                surface.critical.push(Cube::containing(frame.level, within));
+            } else {
+                surface.uncertain.push(Cube::containing(0, within));
+            }
         }
         self.closest = closest;
     }
@@ -489,13 +485,17 @@ impl<'a> Workshop<'a> {
         least
     }
 
-    fn note_critical(&self, setting: &Setting, level: u32, x: &Point, value: f64, surface: &mut BlockSurface) {
-        let within = std::array::from_fn(|axis| (x[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
-        match (level + 1..=LEVELS).find(|&level| value < setting.bottom(level)) {
-            Some(enough) => surface.critical.push(Cube::containing(enough - 1, within)),
-            None if level < LEVELS && value < setting.reach => surface.critical.push(Cube::containing(LEVELS - 1, within)),
-            None => surface.uncertain.push(Cube::containing(0, within)),
-        }
+    /// Whether one site covers the ball of radius `around` a point, as the lattice sees it.
+    fn is_covered(&self, frame: &Frame, x: &Point, around: f64) -> bool {
+        let (base, columns) = (&frame.positions[0], [1, 2, 3].map(|k| subtract(&frame.positions[k], &frame.positions[0])));
+        let dual = [cross(&columns[1], &columns[2]), cross(&columns[2], &columns[0]), cross(&columns[0], &columns[1])];
+        let determinant = dot(&columns[0], &dual[0]);
+        let offset = subtract(x, base);
+        self.nearby.iter().any(|nearby| {
+            let values = nearby.half_space.values.map(|value| value as f64);
+            let slope: Point = std::array::from_fn(|axis| (0..3).map(|k| (values[k + 1] - values[0]) * dual[k][axis]).sum::<f64>() / determinant);
+            values[0] + dot(&slope, &offset) + around * dot(&slope, &slope).sqrt() < 0.0
+        })
     }
 
     /// A ball around what is left.
@@ -650,6 +650,10 @@ fn are_parted(points: &[Point], others: &[Point]) -> bool {
         }
     }
     false
+}
+
+fn cross(a: &Point, b: &Point) -> Point {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn place(positions: &[Point; 4], weights: &[f64; 4]) -> Point {

@@ -5,8 +5,8 @@
 //! cut where those functions meet; so, with R a tetrahedron's circumradius, D(sqrt(theta - R^2)) subset solid subset D(sqrt(theta))
 //! for the sites (see `block`). theta = r^2, and R^2 = r^2 - (r - e)^2 is a pitch of sqrt(r e), whatever the shape.
 //!
-//! The solid has the topology of D(r) where the distance has no critical value between sqrt(r^2 - R^2) and r. Where it may have one,
-//! the lattice is refined until R tells the value from r; what no level tells is counted as uncertain.
+//! Where the solid leaves out a critical point of the distance below r, the lattice is refined until it does not: by Morse
+//! theory the solid then has all of D(r)'s topology (see `block`). Where no level is fine enough, that is counted as uncertain.
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`.
 

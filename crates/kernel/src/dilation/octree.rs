@@ -120,7 +120,7 @@ impl<'a> Pass<'a> {
             self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded)?;
         }
         // One site covers all of the cube.
-        if upper + half < self.setting.bottom(0) {
+        if upper + half < self.setting.reach {
             return Ok(None);
         }
         let Some(reaches) = self.solids(&middle, half, &brackets, &expanded, open) else { return Ok(None) };

@@ -24,8 +24,7 @@ pub(crate) struct Setting {
     pub(super) reach: f64,
     /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(theta + R^2).
     pub(super) near: f64,
-    /// R^2 by level: as a length squared, and as integers.
-    enclosing: [f64; LEVELS as usize + 1],
+    /// R^2 by level, as an integer.
     pub(super) bands: [i64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
     pub(super) deep: f64,
@@ -60,18 +59,17 @@ impl Setting {
         let margin = radius + 2.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
         let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let enclosing = std::array::from_fn(|level| (ENCLOSING * pitch).powi(2) * 0.25_f64.powi(level as i32));
-        let near = (radius * radius + enclosing[0]).sqrt();
-        // Values of sites that matter are within -theta and (near + a)^2 - theta, and the band is added to them.
+        let enclosing = (ENCLOSING * pitch).powi(2);
+        let near = (radius * radius + enclosing).sqrt();
+        // Values of sites that matter are within -theta and (near + a)^2 - theta.
         let largest = ((near + 1.000_1 * pitch).powi(2) - radius * radius).max(radius * radius);
-        let inverse_unit = (MOST - 2) as f64 / (largest + enclosing[0]);
+        let inverse_unit = (MOST - 2) as f64 / largest;
         Self {
             lattice: Lattice { origin, pitch },
             reach: radius,
             near,
-            enclosing,
-            bands: enclosing.map(|square: f64| (square * inverse_unit).ceil() as i64),
-            deep: (radius * radius - enclosing[0]).max(0.0).sqrt() - pitch * 1.000_1,
+            bands: std::array::from_fn(|level| (enclosing * 0.25_f64.powi(level as i32) * inverse_unit).ceil() as i64),
+            deep: (radius - pitch * 1.000_1).max(0.0),
             inverse_unit,
             most: (largest * inverse_unit) as i64,
             slack: 1e-13 * extent,
@@ -87,11 +85,6 @@ impl Setting {
         // Saturates; far sites cover nothing.
         let value = (scaled + 0.5_f64.copysign(scaled)) as i64;
         if value == 0 { 1 } else { value }
-    }
-
-    /// The least distance at which the surface may be in tetrahedra of a level: sqrt(theta - R^2).
-    pub(super) fn bottom(&self, level: u32) -> f64 {
-        (self.reach * self.reach - self.enclosing[level as usize]).max(0.0).sqrt()
     }
 }
 
