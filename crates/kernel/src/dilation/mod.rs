@@ -8,12 +8,16 @@
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`.
 
+mod assemble;
 mod block;
+mod certificate;
 mod error;
+mod half_edges;
 mod lattice;
 mod octree;
 mod outside;
 mod plan;
+mod simplify;
 mod stitch;
 mod tree;
 
