@@ -3,16 +3,18 @@
 use super::tree::{NodeId, SiteId, Tree};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_on_triangle;
+use super::block::NameHasher;
 use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
 
 /// A lower bound of the distance of a triangle from a site is raised by so many steps of alternating projection.
 const STEPS: usize = 6;
 /// Sites that tell coverage.
 const MOST_COVERING: usize = 64;
 /// Tetrahedra that a swept one is cut into at most.
-const MOST_PIECES: usize = 24;
+const MOST_PIECES: usize = 16;
 /// Halvings that find where two sites are equally far.
-const HALVINGS: usize = 24;
+const HALVINGS: usize = 16;
 
 /// Whether a triangle is farther than `least` from a convex site, for sure. For closest candidates p of the site and q of the
 /// triangle, the plane across q - p parts them: distance >= min over corners t of (t - p') . u, u the unit vector and p' the site's
@@ -43,7 +45,7 @@ pub(super) fn is_clear(triangle: &[Point; 3], site: &Site, least: f64) -> bool {
 /// Sites near places, from lists of nodes that are refined from coarse to fine places.
 #[derive(Debug, Default)]
 pub(super) struct Places {
-    lists: HashMap<(u32, [i32; 3]), Vec<NodeId>>,
+    lists: HashMap<u128, Vec<NodeId>, BuildHasherDefault<NameHasher>>,
     origin: Point,
     /// Edge of the places of level 0.
     edge: f64,
@@ -72,9 +74,13 @@ impl Places {
         tree.collect(x, list, reach + radius, found);
     }
 
-    fn key(&self, level: u32, x: &Point) -> (u32, [i32; 3]) {
+    fn place(&self, level: u32, x: &Point) -> [i32; 3] {
         let edge = self.edge * f64::from(1_u32 << level);
-        (level, std::array::from_fn(|axis| ((x[axis] - self.origin[axis]) / edge).floor() as i32))
+        std::array::from_fn(|axis| ((x[axis] - self.origin[axis]) / edge).floor() as i32)
+    }
+
+    fn key(&self, level: u32, x: &Point) -> u128 {
+        self.place(level, x).iter().fold(u128::from(level), |key, &index| key << 32 | u128::from(index as u32))
     }
 
     fn refine(&mut self, tree: &mut Tree<'_>, level: u32, x: &Point, reach: f64) {
@@ -83,8 +89,8 @@ impl Places {
             return;
         }
         self.refine(tree, level + 1, x, reach);
-        let edge = self.edge * f64::from(1_u32 << level);
-        let middle: Point = std::array::from_fn(|axis| self.origin[axis] + edge * (f64::from(key.1[axis]) + 0.5));
+        let (edge, place) = (self.edge * f64::from(1_u32 << level), self.place(level, x));
+        let middle: Point = std::array::from_fn(|axis| self.origin[axis] + edge * (f64::from(place[axis]) + 0.5));
         let mut list = Vec::new();
         // Half a diagonal, and the radius that the level serves.
         let horizon = reach + edge * (0.5 * 3.0_f64.sqrt() * 1.000_001 + 1.0);

@@ -128,6 +128,35 @@ impl HalfEdges {
         }
     }
 
+    /// The other half of an edge, or `NONE`.
+    #[inline]
+    pub(super) fn twin(&self, half: u32) -> u32 {
+        self.twins[half as usize]
+    }
+
+    /// Turns the edge between two triangles (a, b, c) and (b, a, d) into cd: the half-edge from a becomes that from d to c. Its twin must be there, and no
+    /// edge cd.
+    pub(super) fn flip(&mut self, half: u32) {
+        let twin = self.twins[half as usize];
+        // Around the square: b c, c a, a d, d b.
+        let (bc, ca, ad, db) = (next(half), previous(half), next(twin), previous(twin));
+        let [a, b, c, d] = [half, twin, ca, db].map(|half| self.corners[half as usize]);
+        let outer = [bc, ca, ad, db].map(|half| self.twins[half as usize]);
+        // Triangle of `half`: (d, c, a); of `twin`: (c, d, b).
+        let slots = [half, bc, ca, twin, ad, db];
+        for (slot, corner) in slots.into_iter().zip([d, c, a, c, d, b]) {
+            self.corners[slot as usize] = corner;
+            self.leaving[corner as usize] = slot;
+        }
+        // (d c), (c a), (a d); (c d), (d b), (b c).
+        for (slot, other) in [(bc, outer[1]), (ca, outer[2]), (ad, outer[3]), (db, outer[0])] {
+            self.twins[slot as usize] = other;
+            if other != NONE {
+                self.twins[other as usize] = slot;
+            }
+        }
+    }
+
     /// Removes a vertex by collapsing its edge to ring m into that neighbour.
     pub(super) fn collapse(&mut self, vertex: u32, star: &Star, m: usize) {
         let count = star.ring.len();

@@ -42,6 +42,8 @@ pub struct Dilation {
     pub pitch_mm: f64,
     /// Leaf cells met, each once in every block of the lattice that needed it.
     pub leaf_cells: u64,
+    /// Pairs of triangles that meet elsewhere than where they are joined.
+    pub crossings: u64,
     /// The box of the attractor, not dilated.
     pub bounds: AxisBox,
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain.

@@ -11,7 +11,7 @@ use crate::attractor::Attractor;
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
-use crate::solid::{Solid, SolidError, TriMesh};
+use crate::solid::{Crossings, Solid, SolidError, TriMesh};
 use glam::DVec3;
 use crate::tolerance::{Radius, Tolerance};
 use std::collections::{BTreeMap, BTreeSet};
@@ -327,7 +327,8 @@ impl<'a> Plan<'a> {
             SolidError::NotManifold(_) if has_solids => DilationError::Inside,
             other => other.into(),
         })?;
-        Ok(Dilation { solid, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds, uncertain: uncertain as u64 })
+        let crossings = Crossings::of(solid.mesh(), budget)?.count;
+        Ok(Dilation { solid, crossings, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds, uncertain: uncertain as u64 })
     }
 }
 

@@ -15,14 +15,13 @@
 
 use super::block::BlockSurface;
 use super::certificate::{Nearby, Places};
-use super::half_edges::{HalfEdges, NONE, Star};
+use super::half_edges::{HalfEdges, NONE, Star, next};
 use super::plan::Setting;
 use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::contact;
-use std::collections::VecDeque;
 
 /// Where a node's surface is its own.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +42,7 @@ const MOST_AROUND: usize = 24;
 /// Triangles around a vertex afterwards.
 const MOST_AFTER: usize = 40;
 /// How far the new position may be from the planes of the old triangles, in units of the band, pass by pass.
-const PASSES: [f64; 5] = [1e-6, 0.01, 0.08, 0.3, 2.0];
+const PASSES: [f64; 7] = [1e-6, 0.01, 0.05, 0.12, 0.3, 2.0, 4.0];
 /// The share of an edge's length that is added: where all is flat, short edges go first.
 const LENGTH_SHARE: f64 = 1e-3;
 /// Cosine of the angle by which a normal may turn.
@@ -51,6 +50,8 @@ const LEAST_COSINE: f64 = 0.1;
 /// Heights of new triangles in units of rounding, and lengths of edges that are as good as none.
 const LEAST_HEIGHT: f64 = 8.0;
 const TINY: f64 = 4.0;
+/// Sweeps that turn edges, at most.
+const FLIP_ROUNDS: usize = 8;
 
 /// Working memory of a thread.
 pub(super) struct Simplifier<'a> {
@@ -69,6 +70,8 @@ pub(super) struct Simplifier<'a> {
     close: Vec<u32>,
     stamps: Vec<u32>,
     stamp: u32,
+    /// Triangles of a star, old or new, with their boxes.
+    own: Vec<([u32; 3], [Point; 3], Box32)>,
     /// Only what cannot be a solid is removed.
     clean_only: bool,
 }
@@ -90,6 +93,7 @@ impl<'a> Simplifier<'a> {
             close: Vec::new(),
             stamps: Vec::new(),
             stamp: 0,
+            own: Vec::new(),
             clean_only: setting.clean_only,
         }
     }
@@ -106,29 +110,30 @@ impl<'a> Simplifier<'a> {
         self.stamps.clear();
         self.stamps.resize(mesh.points.len(), 0);
         self.stamp = 0;
-        self.index(&mesh);
         let inside: Vec<bool> = mesh.points.iter().map(|point| core.contains(point)).collect();
         surface.settled.resize(mesh.points.len(), false);
+        self.merge(&mut mesh, &inside, &surface.settled);
+        for _ in 0..FLIP_ROUNDS {
+            if !self.flip(&mut mesh, &inside) {
+                break;
+            }
+        }
+        self.index(&mesh);
         // A settled vertex waits until something changes; `fresh` says that something did since its last trial.
         let mut fresh: Vec<bool> = surface.settled.iter().map(|settled| !settled).collect();
-        let mut queued = vec![false; mesh.points.len()];
-        let mut queue = VecDeque::new();
         let passes = if self.clean_only { &PASSES[..1] } else { &PASSES[..] };
         let mut lower = 0.0;
         for &pass in passes {
             let upper = pass * (setting.reach - setting.least);
-            queue.extend((0..mesh.points.len() as u32).filter(|&v| inside[v as usize] && mesh.is_used(v) && !surface.settled[v as usize]));
-            queue.iter().for_each(|&v| queued[v as usize] = true);
-            while let Some(vertex) = queue.pop_front() {
-                queued[vertex as usize] = false;
+            for vertex in 0..mesh.points.len() as u32 {
+                if !inside[vertex as usize] || surface.settled[vertex as usize] || !mesh.is_used(vertex) {
+                    continue;
+                }
                 let from = if std::mem::take(&mut fresh[vertex as usize]) { 0.0 } else { lower };
                 if self.remove(setting, &mut mesh, &inside, vertex, from, upper) {
                     for &neighbour in &self.star.ring {
                         fresh[neighbour as usize] = true;
                         surface.settled[neighbour as usize] = false;
-                        if inside[neighbour as usize] && !std::mem::replace(&mut queued[neighbour as usize], true) {
-                            queue.push_back(neighbour);
-                        }
                     }
                     if mesh.alive < self.boxed / 2 {
                         self.index(&mesh);
@@ -138,6 +143,51 @@ impl<'a> Simplifier<'a> {
             lower = upper;
         }
         self.write(&mut mesh, &inside, surface);
+    }
+
+    /// Makes vertices at the same place one where that keeps the manifold: the surface as a set does not change.
+    fn merge(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) {
+        for vertex in 0..mesh.points.len() as u32 {
+            if !inside[vertex as usize] || settled[vertex as usize] || !mesh.star(vertex, MOST_AROUND, &mut self.star) {
+                continue;
+            }
+            for m in 0..self.star.ring.len() {
+                let target = self.star.ring[m];
+                if mesh.points[target as usize] == mesh.points[vertex as usize] && inside[target as usize] && self.keeps_manifold(mesh, m) {
+                    mesh.collapse(vertex, &self.star, m);
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Turns the longest edge of triangles without area, when that leaves none: the surface as a set does not change. Whether one was turned.
+    fn flip(&mut self, mesh: &mut HalfEdges, inside: &[bool]) -> bool {
+        let mut turned = false;
+        for triangle in 0..mesh.triangles() {
+            let Some(corners) = mesh.triangle(triangle) else { continue };
+            let points = corners.map(|corner| mesh.points[corner as usize]);
+            if !corners.iter().all(|&corner| inside[corner as usize]) || !contact::is_flat(&points) {
+                continue;
+            }
+            let length = |&k: &usize| distance_squared(&points[k], &points[(k + 1) % 3]);
+            let Some(k) = (0..3).max_by(|p, q| length(p).total_cmp(&length(q))) else { continue };
+            let half = 3 * triangle + k as u32;
+            let twin = mesh.twin(half);
+            if twin == NONE {
+                continue;
+            }
+            let (a, b, c, d) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3], mesh.end(next(twin)));
+            let at = |corner: u32| mesh.points[corner as usize];
+            if contact::is_flat(&[at(d), at(c), at(a)]) || contact::is_flat(&[at(c), at(d), at(b)]) {
+                continue;
+            }
+            if mesh.star(c, usize::MAX, &mut self.other) && !self.other.ring.contains(&d) {
+                mesh.flip(half);
+                turned = true;
+            }
+        }
+        turned
     }
 
     /// Gives the mesh back to the surface, without what is gone.
@@ -273,7 +323,7 @@ impl<'a> Simplifier<'a> {
                 // A needle may replace a worse one.
                 let origin = &mesh.points[vertex as usize];
                 let old = distance_squared(a, b).max(distance_squared(a, origin)).max(distance_squared(b, origin));
-                return square > 0.0 && square * old > self.lengths[k].powi(2) * longest;
+                return square > 0.0 && square * old >= self.lengths[k].powi(2) * longest;
             }
             let was = self.lengths[k];
             was <= least * longest.sqrt() || dot(&normal, &self.normals[k]) > LEAST_COSINE * square.sqrt() * was
@@ -306,24 +356,21 @@ impl<'a> Simplifier<'a> {
 
     /// Counts pairs of a triangle of the star, old or after moving to ring m, and another that meet; gives up above `most`.
     fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, most: usize) -> usize {
-        let Self { star, boxes, close, .. } = self;
+        let Self { star, boxes, close, own, .. } = self;
         let count = star.ring.len();
         let apex = m.map_or(vertex, |m| star.ring[m]);
         let point = |corner: u32| mesh.points[corner as usize];
-        let mut own: [([u32; 3], [Point; 3], Box32); MOST_AROUND] = [([0; 3], [[0.0; 3]; 3], Box32::EMPTY); MOST_AROUND];
-        let mut length = 0;
+        own.clear();
         let mut whole = Box32::EMPTY;
         for k in 0..count {
-            if m.is_some_and(|m| k == m || (k + 1) % count == m) {
-                continue;
+            if m.is_none_or(|m| k != m && (k + 1) % count != m) {
+                let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
+                let points = corners.map(point);
+                let own_box = Box32::of(&points);
+                whole = whole.union(&own_box);
+                own.push((corners, points, own_box));
             }
-            let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
-            let points = corners.map(point);
-            own[length] = (corners, points, Box32::of(&points));
-            whole = whole.union(&own[length].2);
-            length += 1;
         }
-        let own = &own[..length];
         let mut found = 0;
         for (index, (corners, points, _)) in own.iter().enumerate() {
             found += usize::from(contact::is_flat(points));
@@ -349,7 +396,7 @@ impl<'a> Simplifier<'a> {
             if !own_box.meets(&whole) {
                 continue;
             }
-            for (others, places, other_box) in own {
+            for (others, places, other_box) in own.iter() {
                 if own_box.meets(other_box) && contact::meet([&corners, others], [&points, places]) {
                     found += 1;
                     if found > most {
