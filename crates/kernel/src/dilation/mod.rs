@@ -63,6 +63,14 @@ pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budge
     plan.run(attractor, budget)
 }
 
+/// As [`dilate`], with the triangles of the lattice: only those that have no area are removed.
+///
+/// # Errors
+/// As [`dilate`].
+pub fn dilate_unsimplified(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
+    Plan::new(attractor, radius, tolerance, budget)?.unsimplified().run(attractor, budget)
+}
+
 /// What a dilation is predicted to cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {

@@ -152,6 +152,7 @@ pub(super) struct Plan<'a> {
     extra: f64,
     bounds: AxisBox,
     rule: SiteRule<'a>,
+    clean_only: bool,
 }
 
 impl<'a> Plan<'a> {
@@ -171,7 +172,7 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule })
+        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule, clean_only: false })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of (r + e)^2 - (r - e)^2 = 4 r e.
@@ -184,7 +185,12 @@ impl<'a> Plan<'a> {
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
         let above = self.tolerance - self.extra - self.rule.outer_reserve();
-        Setting::new(self.radius, above, self.tolerance, pitch, cells, &self.bounds)
+        Setting { clean_only: self.clean_only, ..Setting::new(self.radius, above, self.tolerance, pitch, cells, &self.bounds) }
+    }
+
+    /// The same without simplification.
+    pub(super) fn unsimplified(self) -> Self {
+        Self { clean_only: true, ..self }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.

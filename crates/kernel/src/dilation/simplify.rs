@@ -53,6 +53,41 @@ const TINY: f64 = 4.0;
 /// Sweeps that turn edges, at most.
 const FLIP_ROUNDS: usize = 8;
 
+/// A triangle that is compared with others.
+struct Facet {
+    corners: [u32; 3],
+    points: [Point; 3],
+    bounds: Box32,
+    /// Along the normal, and what a volume may err per length.
+    normal: Point,
+    error: f64,
+}
+
+impl Facet {
+    fn new(corners: [u32; 3], points: [Point; 3]) -> Self {
+        let (p, q) = (subtract(&points[1], &points[0]), subtract(&points[2], &points[0]));
+        // Products of two lengths, at most 8 roundings each, and three sums.
+        let error = 64.0 * f64::EPSILON * (dot(&p, &p) + dot(&q, &q));
+        Self { corners, points, bounds: Box32::of(&points), normal: cross(&p, &q), error }
+    }
+
+    /// Whether the plane surely parts the triangle from what another has besides common corners.
+    #[inline]
+    fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
+        let (mut above, mut below) = (true, true);
+        for (corner, point) in corners.iter().zip(points) {
+            if !self.corners.contains(corner) {
+                let offset = subtract(point, &self.points[0]);
+                let side = dot(&self.normal, &offset);
+                let error = self.error * (offset[0].abs() + offset[1].abs() + offset[2].abs());
+                above &= side > error;
+                below &= side < -error;
+            }
+        }
+        above || below
+    }
+}
+
 /// Working memory of a thread.
 pub(super) struct Simplifier<'a> {
     tree: Tree<'a>,
@@ -70,8 +105,8 @@ pub(super) struct Simplifier<'a> {
     close: Vec<u32>,
     stamps: Vec<u32>,
     stamp: u32,
-    /// Triangles of a star, old or new, with their boxes.
-    own: Vec<([u32; 3], [Point; 3], Box32)>,
+    /// Triangles of a star, old or new.
+    own: Vec<Facet>,
     /// Only what cannot be a solid is removed.
     clean_only: bool,
 }
@@ -365,17 +400,16 @@ impl<'a> Simplifier<'a> {
         for k in 0..count {
             if m.is_none_or(|m| k != m && (k + 1) % count != m) {
                 let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
-                let points = corners.map(point);
-                let own_box = Box32::of(&points);
-                whole = whole.union(&own_box);
-                own.push((corners, points, own_box));
+                let facet = Facet::new(corners, corners.map(point));
+                whole = whole.union(&facet.bounds);
+                own.push(facet);
             }
         }
         let mut found = 0;
-        for (index, (corners, points, _)) in own.iter().enumerate() {
-            found += usize::from(contact::is_flat(points));
-            for (others, places, _) in &own[..index] {
-                found += usize::from(contact::meet([corners, others], [points, places]));
+        for (index, facet) in own.iter().enumerate() {
+            found += usize::from(contact::is_flat(&facet.points));
+            for other in &own[..index] {
+                found += usize::from(contact::meet([&facet.corners, &other.corners], [&facet.points, &other.points]));
             }
         }
         if found > most {
@@ -396,8 +430,11 @@ impl<'a> Simplifier<'a> {
             if !own_box.meets(&whole) {
                 continue;
             }
-            for (others, places, other_box) in own.iter() {
-                if own_box.meets(other_box) && contact::meet([&corners, others], [&points, places]) {
+            for facet in own.iter() {
+                if own_box.meets(&facet.bounds)
+                    && !facet.parts(&corners, &points)
+                    && contact::meet([&corners, &facet.corners], [&points, &facet.points])
+                {
                     found += 1;
                     if found > most {
                         return found;
