@@ -150,6 +150,36 @@ impl Nearby {
         }
     }
 
+    /// The point of the sites that is closest to the last point, if all sites within reach have the same: there the distance is smooth.
+    pub(super) fn foot(&self) -> Option<Point> {
+        let middle = self.marked.last()?;
+        let mut foot: Option<Point> = None;
+        for site in &self.sites {
+            let closest = site.closest(&middle.at);
+            if distance_squared(&closest, &middle.at) <= self.square {
+                if foot.is_some_and(|known| distance_squared(&known, &closest) > 1e-12 * self.square) {
+                    return None;
+                }
+                foot = Some(closest);
+            }
+        }
+        foot
+    }
+
+    /// Moves one of the points.
+    pub(super) fn place(&mut self, index: usize, at: Point) {
+        let count = self.marked.len();
+        let mut mask = 0;
+        for (number, site) in self.sites.iter().enumerate() {
+            let square = site.distance_squared(&at);
+            self.squares[number * count + index] = square;
+            if number < MOST_COVERING && square <= self.square {
+                mask |= 1 << number;
+            }
+        }
+        self.marked[index] = Marked { at, mask };
+    }
+
     /// Whether sites cover the tetrahedron of four of the points. One convex site that reaches all four corners does; else it is cut where two sites
     /// are equally far, until one does.
     pub(super) fn cover(&mut self, corners: [usize; 4]) -> bool {

@@ -184,7 +184,8 @@ impl<'a> Plan<'a> {
         // The roots are there anyway; what grows beyond them may take a fair share of the memory.
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
-        let above = self.tolerance - self.extra - self.rule.outer_reserve();
+        // Less what sums of such lengths lose to rounding.
+        let above = (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
         Setting { clean_only: self.clean_only, ..Setting::new(self.radius, above, self.tolerance, pitch, cells, &self.bounds) }
     }
 

@@ -43,6 +43,8 @@ const MOST_AROUND: usize = 24;
 const MOST_AFTER: usize = 40;
 /// How far the new position may be from the planes of the old triangles, in units of the band, pass by pass.
 const PASSES: [f64; 7] = [1e-6, 0.01, 0.05, 0.12, 0.3, 2.0, 4.0];
+/// Before this pass vertices are lifted.
+const LIFT_BEFORE: usize = 4;
 /// The share of an edge's length that is added: where all is flat, short edges go first.
 const LENGTH_SHARE: f64 = 1e-3;
 /// Cosine of the angle by which a normal may turn.
@@ -50,6 +52,9 @@ const LEAST_COSINE: f64 = 0.1;
 /// Heights of new triangles in units of rounding, and lengths of edges that are as good as none.
 const LEAST_HEIGHT: f64 = 8.0;
 const TINY: f64 = 4.0;
+/// Vertices are lifted by this share of the band at least, and no normal turns by more than this cosine.
+const LEAST_LIFT: f64 = 0.05;
+const LEAST_TURN: f64 = 0.7;
 /// Sweeps that turn edges, at most.
 const FLIP_ROUNDS: usize = 8;
 
@@ -158,7 +163,10 @@ impl<'a> Simplifier<'a> {
         let mut fresh: Vec<bool> = surface.settled.iter().map(|settled| !settled).collect();
         let passes = if self.clean_only { &PASSES[..1] } else { &PASSES[..] };
         let mut lower = 0.0;
-        for &pass in passes {
+        for (number, &pass) in passes.iter().enumerate() {
+            if number == LIFT_BEFORE {
+                self.lift_all(setting, core, &mut mesh, &inside, &mut fresh, &mut surface.settled);
+            }
             let upper = pass * (setting.reach - setting.least);
             for vertex in 0..mesh.points.len() as u32 {
                 if !inside[vertex as usize] || surface.settled[vertex as usize] || !mesh.is_used(vertex) {
@@ -178,6 +186,65 @@ impl<'a> Simplifier<'a> {
             lower = upper;
         }
         self.write(&mut mesh, &inside, surface);
+    }
+
+    /// Moves vertices outwards to the end of the band where the distance is smooth: chords between them have the whole band then.
+    fn lift_all(&mut self, setting: &Setting, core: &Core, mesh: &mut HalfEdges, inside: &[bool], fresh: &mut [bool], settled: &mut [bool]) {
+        for vertex in 0..mesh.points.len() as u32 {
+            if inside[vertex as usize] && !settled[vertex as usize] && mesh.is_used(vertex) && self.lift(setting, core, mesh, inside, vertex) {
+                for &changed in self.star.ring.iter().chain([&vertex]) {
+                    fresh[changed as usize] = true;
+                    settled[changed as usize] = false;
+                }
+            }
+        }
+    }
+
+    fn lift(&mut self, setting: &Setting, core: &Core, mesh: &mut HalfEdges, inside: &[bool], vertex: u32) -> bool {
+        if !mesh.star(vertex, MOST_AROUND, &mut self.star) || self.star.ring.iter().any(|&other| !inside[other as usize]) {
+            return false;
+        }
+        let count = self.star.ring.len();
+        let from = mesh.points[vertex as usize];
+        self.points.clear();
+        self.points.extend(self.star.ring.iter().chain([&vertex, &vertex]).map(|&other| mesh.points[other as usize]));
+        self.nearby.find(&mut self.tree, &mut self.places, &self.points, setting.reach + setting.rounding);
+        let Some(foot) = self.nearby.foot() else { return false };
+        let length = distance_squared(&from, &foot).sqrt();
+        let to: Point = std::array::from_fn(|axis| f64::from((foot[axis] + (from[axis] - foot[axis]) * (setting.reach / length)) as f32));
+        let moved = distance_squared(&from, &to).sqrt();
+        // No height of a swept tetrahedron is more than the way.
+        let worth = moved > LEAST_LIFT * (setting.reach - setting.least) && count as f64 * moved < 1.9 * setting.least;
+        if self.tree.exhausted || !worth || !core.contains(&to) {
+            return false;
+        }
+        let (ring, points) = (&self.star.ring, &mesh.points);
+        let normal = |apex: &Point, k: usize| {
+            let (a, b) = (&points[ring[k] as usize], &points[ring[(k + 1) % count] as usize]);
+            cross(&subtract(a, apex), &subtract(b, apex))
+        };
+        let keeps_shape = (0..count).all(|k| {
+            let (old, new) = (normal(&from, k), normal(&to, k));
+            dot(&old, &new) > LEAST_TURN * (dot(&old, &old) * dot(&new, &new)).sqrt()
+        });
+        if !keeps_shape {
+            return false;
+        }
+        self.nearby.place(count, to);
+        let certified = (0..count).all(|k| {
+            let next = (k + 1) % count;
+            self.nearby.cover([count, k, next, count + 1]) && self.nearby.is_clear([count, k, next], setting.least - setting.rounding)
+        });
+        if !certified || self.meetings(mesh, vertex, None, Some(to), 0) > 0 {
+            return false;
+        }
+        mesh.points[vertex as usize] = to;
+        for &half in &self.star.halves {
+            if let Some(corners) = mesh.triangle(half / 3) {
+                self.boxes.grow(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
+            }
+        }
+        true
     }
 
     /// Makes vertices at the same place one where that keeps the manifold: the surface as a set does not change.
@@ -375,22 +442,22 @@ impl<'a> Simplifier<'a> {
     /// Whether the new triangles meet no others. Where old ones did, it is enough that there are fewer such pairs, or no more when
     /// nothing moves to speak of.
     fn is_free(&mut self, setting: &Setting, mesh: &HalfEdges, vertex: u32, m: usize) -> bool {
-        let found = self.meetings(mesh, vertex, Some(m), 0);
+        let found = self.meetings(mesh, vertex, Some(m), None, 0);
         if found == 0 {
             return true;
         }
         let target = self.star.ring[m];
         let moved = distance_squared(&mesh.points[vertex as usize], &mesh.points[target as usize]).sqrt();
-        let before = self.meetings(mesh, vertex, None, usize::MAX);
+        let before = self.meetings(mesh, vertex, None, None, usize::MAX);
         if before == 0 {
             return false;
         }
-        let after = self.meetings(mesh, vertex, Some(m), usize::MAX);
+        let after = self.meetings(mesh, vertex, Some(m), None, usize::MAX);
         after < before || (after == before && moved <= TINY * setting.rounding)
     }
 
-    /// Counts pairs of a triangle of the star, old or after moving to ring m, and another that meet; gives up above `most`.
-    fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, most: usize) -> usize {
+    /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
+    fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>, most: usize) -> usize {
         let Self { star, boxes, close, own, .. } = self;
         let count = star.ring.len();
         let apex = m.map_or(vertex, |m| star.ring[m]);
@@ -400,7 +467,9 @@ impl<'a> Simplifier<'a> {
         for k in 0..count {
             if m.is_none_or(|m| k != m && (k + 1) % count != m) {
                 let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
-                let facet = Facet::new(corners, corners.map(point));
+                let mut points = corners.map(point);
+                points[0] = to.unwrap_or(points[0]);
+                let facet = Facet::new(corners, points);
                 whole = whole.union(&facet.bounds);
                 own.push(facet);
             }
