@@ -73,9 +73,6 @@ impl Assembly<'_, '_> {
     fn core(&self, node: Node) -> Core {
         let lattice = &self.pass.setting.lattice;
         let corner = |blocks: i64| lattice.corner(node.first_block.map(|block| (block + blocks) * SIDE as i64));
-        Core {
-            low: corner(0).map(|x| x + (0.5 + MARGIN) * lattice.pitch),
-            high: corner(node.blocks).map(|x| x - MARGIN * lattice.pitch),
-        }
+        Core { low: corner(0).map(|x| x + (0.5 + MARGIN) * lattice.pitch), high: corner(node.blocks).map(|x| x - MARGIN * lattice.pitch) }
     }
 }

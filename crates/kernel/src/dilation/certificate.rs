@@ -1,9 +1,9 @@
 //! The certificate of a changed surface: which sites are near, how far it stays from them, and that they cover what it swept.
 
+use super::block::NameHasher;
 use super::tree::{NodeId, SiteId, Tree};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_on_triangle;
-use super::block::NameHasher;
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 

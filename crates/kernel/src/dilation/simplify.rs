@@ -189,9 +189,21 @@ impl<'a> Simplifier<'a> {
     }
 
     /// Moves vertices outwards to the end of the band where the distance is smooth: chords between them have the whole band then.
-    fn lift_all(&mut self, setting: &Setting, core: &Core, mesh: &mut HalfEdges, inside: &[bool], fresh: &mut [bool], settled: &mut [bool]) {
+    fn lift_all(
+        &mut self,
+        setting: &Setting,
+        core: &Core,
+        mesh: &mut HalfEdges,
+        inside: &[bool],
+        fresh: &mut [bool],
+        settled: &mut [bool],
+    ) {
         for vertex in 0..mesh.points.len() as u32 {
-            if inside[vertex as usize] && !settled[vertex as usize] && mesh.is_used(vertex) && self.lift(setting, core, mesh, inside, vertex) {
+            if inside[vertex as usize]
+                && !settled[vertex as usize]
+                && mesh.is_used(vertex)
+                && self.lift(setting, core, mesh, inside, vertex)
+            {
                 for &changed in self.star.ring.iter().chain([&vertex]) {
                     fresh[changed as usize] = true;
                     settled[changed as usize] = false;
