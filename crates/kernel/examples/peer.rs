@@ -45,6 +45,6 @@ fn main() {
     for t in &mesh.triangles { for x in t { f.write_all(&x.to_le_bytes()).unwrap() } }
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let rss: f64 = status.lines().find(|l| l.starts_with("VmHWM")).unwrap().split_whitespace().nth(1).unwrap().parse().unwrap();
-    eprintln!("{:?} inner {} outer {} pitch {}", d.solid.topology(), d.inner_mm / scale, d.outer_mm / scale, d.pitch_mm / scale);
+    eprintln!("crossings {} {:?} inner {} outer {} pitch {}", d.crossings, d.solid.topology(), d.inner_mm / scale, d.outer_mm / scale, d.pitch_mm / scale);
     println!("{{\"wall\": {walls:?}, \"cpu\": {cpus:?}, \"rss_mb\": {}}}", rss / 1024.0);
 }

@@ -2,7 +2,7 @@
 
 use super::Attractor;
 use super::cell::{Cell, ControlPoint, Point, Site, child_points, dot, frame_columns, subtract, times};
-use crate::automaton::{Automaton, LeafPrimitive, StateId};
+use crate::automaton::{Automaton, LeafPrimitive, State, StateId};
 
 /// Errors of replacing a cell of A by its sites S, in mm: d(x, A) <= d(x, S) + outer, and
 /// d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
@@ -68,6 +68,12 @@ impl<'a> SiteRule<'a> {
     /// The share of r^2 - (r - e)^2 that is the lattice's.
     pub(crate) fn lattice_share(&self) -> f64 {
         if self.exact() { 1.0 } else { 1.0 - SITE_SHARE }
+    }
+
+    /// How far sites may be from the attractor.
+    pub(crate) fn outer_reserve(&self) -> f64 {
+        let exact = |(choice, state): (&Choice, &State)| *choice == Choice::Cover || state.leaf == LeafPrimitive::Simplex;
+        if self.choices.iter().zip(self.attractor.automaton().states()).all(exact) { 0.0 } else { OUTER_SHARE * self.tolerance }
     }
 
     /// The errors of a cell if it is small enough to be replaced.

@@ -44,6 +44,8 @@ pub(super) struct BlockSurface {
     pub(super) vertices: Vec<Point>,
     /// Corners.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// Whether a vertex was tried by the simplification with all of its star; empty before.
+    pub(super) settled: Vec<bool>,
     /// Names of vertices that other blocks may have too.
     pub(super) shared: Vec<(VertexName, u32)>,
     /// Leaf cells met.

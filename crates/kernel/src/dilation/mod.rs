@@ -10,12 +10,16 @@
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`.
 
+mod assemble;
 mod block;
+mod certificate;
 mod error;
+mod half_edges;
 mod lattice;
 mod octree;
 mod outside;
 mod plan;
+mod simplify;
 mod stitch;
 mod tree;
 
@@ -40,6 +44,8 @@ pub struct Dilation {
     pub pitch_mm: f64,
     /// Leaf cells met, each once in every block of the lattice that needed it.
     pub leaf_cells: u64,
+    /// Pairs of triangles that meet elsewhere than where they are joined.
+    pub crossings: u64,
     /// The box of the attractor, not dilated.
     pub bounds: AxisBox,
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain.
@@ -57,6 +63,14 @@ pub struct Dilation {
 pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
     let plan = Plan::new(attractor, radius, tolerance, budget)?;
     plan.run(attractor, budget)
+}
+
+/// As [`dilate`], with the triangles of the lattice: only those that have no area are removed.
+///
+/// # Errors
+/// As [`dilate`].
+pub fn dilate_unsimplified(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
+    Plan::new(attractor, radius, tolerance, budget)?.unsimplified().run(attractor, budget)
 }
 
 /// What a dilation is predicted to cost.

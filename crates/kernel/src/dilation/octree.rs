@@ -34,9 +34,18 @@ pub(super) struct Pass<'a> {
 
 /// A cube of space: `blocks` blocks along its side, a power of two.
 #[derive(Clone, Copy)]
-struct Node {
-    first_block: [i64; 3],
-    blocks: i64,
+pub(super) struct Node {
+    pub(super) first_block: [i64; 3],
+    pub(super) blocks: i64,
+}
+
+impl Node {
+    /// Its eight halves.
+    pub(super) fn children(self) -> Vec<Self> {
+        let half = self.blocks / 2;
+        let child = |octant: i64| Self { first_block: std::array::from_fn(|axis| self.first_block[axis] + half * (octant >> axis & 1)), blocks: half };
+        (0..8).map(child).collect()
+    }
 }
 
 /// Cells larger than this share of a cube's half diagonal are expanded.
@@ -63,15 +72,8 @@ impl<'a> Pass<'a> {
             self.finish(node);
             return Ok(surface.into_iter().collect());
         }
-        let half = node.blocks / 2;
-        let children: Vec<Node> = (0..8_i64)
-            .map(|octant| Node {
-                first_block: std::array::from_fn(|axis| node.first_block[axis] + half * (octant >> axis & 1)),
-                blocks: half,
-            })
-            .collect();
         let parts: Vec<Result<Vec<BlockSurface>, DilationError>> =
-            children.into_par_iter().with_max_len(1).map(|child| self.node(child, &kept, &open)).collect();
+            node.children().into_par_iter().with_max_len(1).map(|child| self.node(child, &kept, &open)).collect();
         let mut surfaces = Vec::new();
         for part in parts {
             surfaces.extend(part?);
@@ -108,7 +110,7 @@ impl<'a> Pass<'a> {
     /// The cells that may cover something of the cube, and the solids whose
     /// surface meets the cube, of those that are still `open`; `None` when the result's surface cannot meet
     /// the cube.
-    fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<(Candidates, Vec<u32>)>, DilationError> {
+    pub(super) fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<(Candidates, Vec<u32>)>, DilationError> {
         let (middle, half) = self.extent(node);
         let size = CELL_SHARE * half;
         let mut brackets = Vec::with_capacity(candidates.cells.len());

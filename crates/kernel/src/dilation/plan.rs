@@ -2,15 +2,17 @@
 
 use super::block::{self, BlockSurface};
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
-use super::octree::Pass;
+use super::assemble::{Assembly, Blocks};
+use super::octree::{Node, Pass};
 use super::outside::MOST;
 use super::tree::Candidates;
-use super::{Dilation, DilationError, Prediction, stitch};
+use super::{Dilation, DilationError, Prediction};
 use crate::attractor::Attractor;
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
-use crate::solid::{Solid, SolidError};
+use crate::solid::{Crossings, Solid, SolidError, TriMesh};
+use glam::DVec3;
 use crate::tolerance::{Radius, Tolerance};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
@@ -24,6 +26,10 @@ pub(crate) struct Setting {
     pub(super) reach: f64,
     /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(theta + R^2).
     pub(super) near: f64,
+    /// The surface is nowhere nearer to a site than this: sqrt(theta - R^2).
+    pub(super) least: f64,
+    /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
+    pub(super) outer: f64,
     /// R^2 by level, as an integer.
     pub(super) bands: [i64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
@@ -34,6 +40,10 @@ pub(crate) struct Setting {
     pub(super) most: i64,
     /// Rounding of positions and distances: far above what double precision loses, far below everything else.
     pub(super) slack: f64,
+    /// How far a position moves when it becomes a single-precision number.
+    pub(super) rounding: f64,
+    /// Whether simplification only removes what cannot be a solid.
+    pub(super) clean_only: bool,
     /// What was asked.
     pub(super) tolerance: f64,
     /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
@@ -68,11 +78,15 @@ impl Setting {
             lattice: Lattice { origin, pitch },
             reach: radius,
             near,
+            least: (radius * radius - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
+            outer: radius,
             bands: std::array::from_fn(|level| (enclosing * 0.25_f64.powi(level as i32) * inverse_unit).ceil() as i64),
             deep: (radius - pitch * 1.000_1).max(0.0),
             inverse_unit,
             most: (largest * inverse_unit) as i64,
             slack: 1e-13 * extent,
+            rounding: rounding(self::extent(bounds, 3.0 * radius)),
+            clean_only: false,
             tolerance,
             cells,
         }
@@ -125,6 +139,7 @@ pub(super) struct Plan<'a> {
     extra: f64,
     bounds: AxisBox,
     rule: SiteRule<'a>,
+    clean_only: bool,
 }
 
 impl<'a> Plan<'a> {
@@ -144,7 +159,7 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule })
+        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule, clean_only: false })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -156,7 +171,15 @@ impl<'a> Plan<'a> {
         // The roots are there anyway; what grows beyond them may take a fair share of the memory.
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
-        Setting::new(self.radius, self.tolerance, pitch, cells, &self.bounds)
+        let setting = Setting::new(self.radius, self.tolerance, pitch, cells, &self.bounds);
+        // What the lattice gives is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
+        let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
+        Setting { outer, clean_only: self.clean_only, ..setting }
+    }
+
+    /// The same without simplification.
+    pub(super) fn unsimplified(self) -> Self {
+        Self { clean_only: true, ..self }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
@@ -205,10 +228,9 @@ impl<'a> Plan<'a> {
             let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;
             blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
         }
-        let surfaces: Vec<BlockSurface> = blocks.into_values().collect();
-        let triangles: usize = surfaces.iter().map(|surface| surface.triangles.len()).sum();
-        budget.report("dilate", 1.0, triangles as u64);
-        self.certify(&setting, surfaces, uncertain, budget)
+        let surface = self.assemble(attractor, &setting, &grading, blocks, budget)?;
+        budget.report("dilate", 1.0, surface.triangles.len() as u64);
+        self.certify(&setting, surface, uncertain, budget)
     }
 
     fn surfaces(
@@ -220,7 +242,19 @@ impl<'a> Plan<'a> {
         budget: &Budget,
     ) -> Result<Vec<BlockSurface>, DilationError> {
         let (blocks, candidates) = self.space(attractor, setting);
-        let pass = Pass {
+        self.pass(attractor, setting, grading, only, budget, blocks).run([0; 3], blocks, &candidates)
+    }
+
+    fn pass<'b>(
+        &'b self,
+        attractor: &'b Attractor,
+        setting: &'b Setting,
+        grading: &'b Grading,
+        only: Option<&'b BTreeSet<[i64; 3]>>,
+        budget: &'b Budget,
+        blocks: i64,
+    ) -> Pass<'b> {
+        Pass {
             attractor,
             rule: &self.rule,
             setting,
@@ -231,8 +265,28 @@ impl<'a> Plan<'a> {
             done: AtomicU64::new(0),
             space: (blocks as f64).powi(3),
             workshops: Mutex::new(Vec::new()),
-        };
-        pass.run([0; 3], blocks, &candidates)
+        }
+    }
+
+    /// One surface from those of all blocks, with as few triangles as the promise allows.
+    fn assemble(
+        &self,
+        attractor: &Attractor,
+        setting: &Setting,
+        grading: &Grading,
+        made: BTreeMap<[i64; 3], BlockSurface>,
+        budget: &Budget,
+    ) -> Result<BlockSurface, DilationError> {
+        let (blocks, candidates) = self.space(attractor, setting);
+        let pass = self.pass(attractor, setting, grading, None, budget, blocks);
+        let site_error = made.values().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
+        let leaves = made.values().map(|surface| surface.leaves).sum();
+        let block = |(cube, surface): ([i64; 3], BlockSurface)| (cube.map(|x| x / block::SIDE as i64), Mutex::new(surface));
+        let surfaces: Blocks = made.into_iter().map(block).collect();
+        let solids: Vec<u32> = (0..attractor.solids().len() as u32).collect();
+        let assembly = Assembly { pass: &pass, blocks: &surfaces, idle: Mutex::new(Vec::new()) };
+        let root = assembly.node(Node { first_block: [0; 3], blocks }, &candidates, &solids)?.unwrap_or_default();
+        Ok(BlockSurface { leaves, site_error: root.site_error.max(site_error), ..root })
     }
 
     /// The cube of space to refine, and the roots as its candidates.
@@ -250,22 +304,22 @@ impl<'a> Plan<'a> {
         (blocks.next_power_of_two() as i64, candidates)
     }
 
-    fn certify(&self, setting: &Setting, surfaces: Vec<BlockSurface>, uncertain: usize, budget: &Budget) -> Result<Dilation, DilationError> {
-        let site = surfaces.iter().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
-        let enclosing = ENCLOSING * setting.lattice.pitch;
-        // x is in the solid if d(x, S)^2 <= theta - R^2, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
-        let inside = (setting.reach.powi(2) - enclosing.powi(2) - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
-        let outside = setting.reach + site.outer + self.extra;
+    fn certify(&self, setting: &Setting, surface: BlockSurface, uncertain: usize, budget: &Budget) -> Result<Dilation, DilationError> {
+        let site = surface.site_error;
+        // x is in the solid if d(x, S) <= least, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
+        let inside = (setting.least.powi(2) - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
+        let outside = setting.outer + site.outer + self.extra;
         let (inner, outer) = (self.radius - inside, outside - self.radius);
-        let leaf_cells = surfaces.iter().map(|surface| surface.leaves).sum();
-        let mesh = stitch::join(surfaces, budget)?;
+        let leaf_cells = surface.leaves;
+        let mesh = TriMesh { vertices: surface.vertices.into_iter().map(DVec3::from_array).collect(), triangles: surface.triangles };
         // Signs from pseudo-normals are right for embedded surfaces only; elsewhere they tear the result.
         let has_solids = !self.rule.attractor().solids().is_empty();
         let solid = Solid::new(mesh, budget).map_err(|error| match error {
             SolidError::NotManifold(_) if has_solids => DilationError::Inside,
             other => other.into(),
         })?;
-        Ok(Dilation { solid, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds, uncertain: uncertain as u64 })
+        let crossings = Crossings::of(solid.mesh(), budget)?.count;
+        Ok(Dilation { solid, crossings, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds, uncertain: uncertain as u64 })
     }
 }
 

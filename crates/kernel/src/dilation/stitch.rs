@@ -1,14 +1,14 @@
-//! Joining block surfaces into one mesh: vertices that several blocks made are found by their names, never by their position.
+//! Joining block surfaces into one: vertices that several blocks made are found by their names, never by their position.
 
 use super::block::{BlockSurface, VertexName};
 use crate::budget::{Budget, Stopped};
-use crate::solid::TriMesh;
-use glam::DVec3;
 use rayon::prelude::*;
 
-/// Joins the surfaces; vertices and triangles keep the blocks' order, a shared vertex belongs to the first block that has it.
-pub(super) fn join(mut surfaces: Vec<BlockSurface>, budget: &Budget) -> Result<TriMesh, Stopped> {
-    budget.report("stitch", 0.0, 0);
+/// Joins the surfaces; vertices and triangles keep the blocks' order, a shared vertex belongs to the first block that has it and is settled if it is everywhere.
+pub(super) fn join(mut surfaces: Vec<BlockSurface>, budget: &Budget) -> Result<BlockSurface, Stopped> {
+    if surfaces.len() == 1 {
+        return Ok(surfaces.remove(0));
+    }
     let mut shared: Vec<(VertexName, u32, u32)> = surfaces
         .iter()
         .enumerate()
@@ -24,10 +24,15 @@ pub(super) fn join(mut surfaces: Vec<BlockSurface>, budget: &Budget) -> Result<T
             elsewhere[surface as usize].push((number, owner, original));
         }
     }
-    drop(shared);
     let vertices: usize = surfaces.iter().zip(&elsewhere).map(|(surface, elsewhere)| surface.vertices.len() - elsewhere.len()).sum();
     let triangles = surfaces.iter().map(|surface| surface.triangles.len()).sum();
-    let mut mesh = TriMesh { vertices: Vec::with_capacity(vertices), triangles: Vec::with_capacity(triangles) };
+    let mut joined = BlockSurface {
+        first_cube: surfaces.first().map_or([0; 3], |surface| surface.first_cube),
+        vertices: Vec::with_capacity(vertices),
+        triangles: Vec::with_capacity(triangles),
+        settled: Vec::with_capacity(vertices),
+        ..BlockSurface::default()
+    };
     let mut places: Vec<Vec<u32>> = Vec::with_capacity(surfaces.len());
     for (surface, mut elsewhere) in surfaces.iter_mut().zip(elsewhere) {
         budget.cancel.check()?;
@@ -38,15 +43,18 @@ pub(super) fn join(mut surfaces: Vec<BlockSurface>, budget: &Budget) -> Result<T
             if let Some((_, owner, original)) = next.next_if(|&(foreign, ..)| foreign as usize == number) {
                 own.push(places[owner as usize][original as usize]);
             } else {
-                own.push(mesh.vertices.len() as u32);
-                mesh.vertices.push(DVec3::from_array(*vertex));
+                own.push(joined.vertices.len() as u32);
+                joined.vertices.push(*vertex);
+                joined.settled.push(surface.settled.get(number).copied().unwrap_or(false));
             }
         }
-        mesh.triangles.extend(surface.triangles.iter().map(|triangle| triangle.map(|corner| own[corner as usize])));
+        joined.triangles.extend(surface.triangles.iter().map(|triangle| triangle.map(|corner| own[corner as usize])));
+        joined.leaves += surface.leaves;
+        joined.site_error = joined.site_error.max(surface.site_error);
         // Memory is given back block by block while the mesh grows.
-        *surface = BlockSurface { shared: std::mem::take(&mut surface.shared), ..BlockSurface::default() };
+        *surface = BlockSurface::default();
         places.push(own);
     }
-    budget.report("stitch", 1.0, mesh.triangles.len() as u64);
-    Ok(mesh)
+    joined.shared.extend(shared.chunk_by(|a, b| a.0 == b.0).map(|same| (same[0].0, places[same[0].1 as usize][same[0].2 as usize])));
+    Ok(joined)
 }

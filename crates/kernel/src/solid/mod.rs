@@ -1,9 +1,13 @@
 //! Indexed triangle meshes and proven solids.
 
+pub(crate) mod box_tree;
+pub(crate) mod contact;
+mod crossings;
 mod topology;
 
 use crate::budget::{Budget, Stopped};
 use crate::measure::mass::volume;
+pub use crossings::Crossings;
 use glam::DVec3;
 pub use topology::Topology;
 

@@ -1,0 +1,191 @@
+//! A binary tree of boxes over triangles in the order of a space-filling curve.
+
+use crate::attractor::cell::Point;
+use rayon::prelude::*;
+
+/// A box in single precision, rounded outwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Box32 {
+    pub(crate) low: [f32; 3],
+    pub(crate) high: [f32; 3],
+}
+
+impl Box32 {
+    pub(crate) const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+    /// The box of some points.
+    #[inline]
+    pub(crate) fn of(points: &[Point]) -> Self {
+        let mut result = Self::EMPTY;
+        for point in points {
+            for axis in 0..3 {
+                let near = point[axis] as f32;
+                let exact = f64::from(near);
+                let low = if exact > point[axis] { near.next_down() } else { near };
+                let high = if exact < point[axis] { near.next_up() } else { near };
+                result.low[axis] = result.low[axis].min(low);
+                result.high[axis] = result.high[axis].max(high);
+            }
+        }
+        result
+    }
+
+    #[inline]
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        Self {
+            low: std::array::from_fn(|axis| self.low[axis].min(other.low[axis])),
+            high: std::array::from_fn(|axis| self.high[axis].max(other.high[axis])),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        // Without branches: three comparisons each at once.
+        (self.low[0] <= other.high[0])
+            & (self.low[1] <= other.high[1])
+            & (self.low[2] <= other.high[2])
+            & (other.low[0] <= self.high[0])
+            & (other.low[1] <= self.high[1])
+            & (other.low[2] <= self.high[2])
+    }
+}
+
+/// Triangles of a leaf at most.
+const LEAF: usize = 4;
+
+/// The tree: node 1 is the root, 2 i and 2 i + 1 are the children of i, nodes from `leaves` on hold triangles.
+#[derive(Debug, Default)]
+pub(crate) struct BoxTree {
+    nodes: Vec<Box32>,
+    /// A power of two.
+    leaves: usize,
+    /// Items along the curve.
+    order: Vec<u32>,
+    /// Where an item is in `order`; `u32::MAX` for those left out.
+    places: Vec<u32>,
+    keys: Vec<u64>,
+}
+
+impl BoxTree {
+    /// Makes the tree over those of `items` that have a box.
+    pub(crate) fn build(&mut self, items: usize, box_of: impl Fn(u32) -> Option<Box32> + Sync, parallel: bool) {
+        let Self { nodes, leaves, order, places, keys } = self;
+        let whole = |item: u32| box_of(item).unwrap_or(Box32::EMPTY);
+        let join = |a: Box32, b: Box32| a.union(&b);
+        let count = items as u32;
+        let all = if parallel {
+            (0..count).into_par_iter().map(whole).reduce(|| Box32::EMPTY, join)
+        } else {
+            (0..count).map(whole).fold(Box32::EMPTY, join)
+        };
+        let scale: [f32; 3] = std::array::from_fn(|axis| 1023.0 / (all.high[axis] - all.low[axis]).max(f32::MIN_POSITIVE));
+        let key = |item: u32| {
+            let own = box_of(item)?;
+            let code = (0..3).fold(0_u64, |code, axis| {
+                let middle = 0.5 * (own.low[axis] + own.high[axis]);
+                code | spread(((middle - all.low[axis]) * scale[axis]) as u64) << axis
+            });
+            Some(code << 32 | u64::from(item))
+        };
+        keys.clear();
+        if parallel {
+            keys.par_extend((0..count).into_par_iter().filter_map(key));
+            keys.par_sort_unstable();
+        } else {
+            keys.extend((0..count).filter_map(key));
+            keys.sort_unstable();
+        }
+        order.clear();
+        order.extend(keys.iter().map(|key| *key as u32));
+        places.clear();
+        places.resize(items, u32::MAX);
+        for (place, &item) in order.iter().enumerate() {
+            places[item as usize] = place as u32;
+        }
+        *leaves = order.len().div_ceil(LEAF).next_power_of_two();
+        nodes.clear();
+        nodes.resize(2 * *leaves, Box32::EMPTY);
+        for (place, &item) in order.iter().enumerate() {
+            let leaf = *leaves + leaf_of(place, order.len(), *leaves);
+            nodes[leaf] = nodes[leaf].union(&whole(item));
+        }
+        for node in (1..*leaves).rev() {
+            nodes[node] = nodes[2 * node].union(&nodes[2 * node + 1]);
+        }
+    }
+
+    /// The number of leaves.
+    pub(crate) fn leaves(&self) -> usize {
+        self.leaves
+    }
+
+    /// The items of a leaf.
+    #[inline]
+    pub(crate) fn items(&self, leaf: usize) -> &[u32] {
+        let start = |leaf: usize| (leaf * self.order.len()).div_ceil(self.leaves);
+        &self.order[start(leaf)..start(leaf + 1)]
+    }
+
+    /// The box of a leaf.
+    pub(crate) fn leaf_box(&self, leaf: usize) -> &Box32 {
+        &self.nodes[self.leaves + leaf]
+    }
+
+    /// Lets an item have a larger box.
+    #[inline]
+    pub(crate) fn grow(&mut self, item: u32, by: &Box32) {
+        let mut node = self.leaves + leaf_of(self.places[item as usize] as usize, self.order.len(), self.leaves);
+        while node > 0 {
+            let grown = self.nodes[node].union(by);
+            if grown == self.nodes[node] {
+                return;
+            }
+            self.nodes[node] = grown;
+            node /= 2;
+        }
+    }
+
+    /// Calls `visit` with the leaves from `first` on whose boxes meet `wanted`, until it answers false.
+    #[inline]
+    pub(crate) fn query(&self, wanted: &Box32, first: usize, mut visit: impl FnMut(usize) -> bool) {
+        // Depth-first: at most one node waits at every level.
+        let mut stack = [0_u32; 33];
+        let mut height = 1;
+        stack[0] = 1;
+        while height > 0 {
+            height -= 1;
+            let node = stack[height] as usize;
+            if !self.nodes[node].meets(wanted) {
+                continue;
+            }
+            if node >= self.leaves {
+                if !visit(node - self.leaves) {
+                    return;
+                }
+                continue;
+            }
+            let levels = self.leaves.ilog2() - node.ilog2();
+            // The last leaf below.
+            if ((node + 1) << levels) <= first + self.leaves {
+                continue;
+            }
+            stack[height] = 2 * node as u32 + 1;
+            stack[height + 1] = 2 * node as u32;
+            height += 2;
+        }
+    }
+}
+
+#[inline]
+fn leaf_of(place: usize, count: usize, leaves: usize) -> usize {
+    place * leaves / count
+}
+
+/// The lower ten bits, two zeros between each.
+fn spread(mut x: u64) -> u64 {
+    x &= 0x3FF;
+    x = (x | x << 16) & 0x0300_00FF;
+    x = (x | x << 8) & 0x0300_F00F;
+    x = (x | x << 4) & 0x030C_30C3;
+    (x | x << 2) & 0x0924_9249
+}
