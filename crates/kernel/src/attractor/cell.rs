@@ -120,9 +120,94 @@ fn combine<const N: usize, const M: usize>(parent: &[ControlPoint], entries: &[f
     }
 }
 
+/// Control points of a pair of factors that are combined without another buffer.
+const PAIR: usize = 128;
+
+/// P (U x V), direction after direction.
+fn combine_pair(parent: &[ControlPoint], u: &SubdivisionOperator, v: &SubdivisionOperator, child: &mut [ControlPoint]) {
+    let size = |operator: &SubdivisionOperator| (operator.rows(), operator.columns());
+    match (size(u), size(v)) {
+        ((3, 3), (3, 3)) => combine_square::<3, 9>(parent, u.entries(), v.entries(), child),
+        ((4, 4), (4, 4)) => combine_square::<4, 16>(parent, u.entries(), v.entries(), child),
+        ((_, columns), (rows, _)) if columns * rows <= PAIR => {
+            let mut half = [[0.0; 4]; PAIR];
+            combine_direction(parent, u, rows, &mut half[..columns * rows]);
+            combine_direction(&half[..columns * rows], v, 1, child);
+        }
+        _ => combine_factors(parent, &[u.clone(), v.clone()], child),
+    }
+}
+
+/// As [`combine_pair`] for n x n operators, with the size known: `M` is n^2.
+#[inline]
+fn combine_square<const N: usize, const M: usize>(parent: &[ControlPoint], u: &[f64], v: &[f64], child: &mut [ControlPoint]) {
+    let parent: &[ControlPoint; M] = parent.try_into().expect("the parent has the operator's rows");
+    let mut half = [[0.0; 4]; M];
+    for i in 0..N {
+        for k in 0..N {
+            let weight = u[i * N + k];
+            for j in 0..N {
+                for axis in 0..4 {
+                    half[i * N + j][axis] += weight * parent[k * N + j][axis];
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        for j in 0..N {
+            let mut sum = [0.0; 4];
+            for k in 0..N {
+                for axis in 0..4 {
+                    sum[axis] += v[j * N + k] * half[i * N + k][axis];
+                }
+            }
+            child[i * N + j] = sum;
+        }
+    }
+}
+
+/// As [`combine_pair`] for any number of factors.
+fn combine_factors(parent: &[ControlPoint], factors: &[SubdivisionOperator], child: &mut [ControlPoint]) {
+    let mut current = parent.to_vec();
+    let mut inner = parent.len();
+    for factor in factors {
+        inner /= factor.rows();
+        let mut image = vec![[0.0; 4]; current.len() / factor.rows() * factor.columns()];
+        combine_direction(&current, factor, inner, &mut image);
+        current = image;
+    }
+    child[..current.len()].copy_from_slice(&current);
+}
+
+/// One direction of a grid, `inner` points to a step of its index.
+#[inline]
+fn combine_direction(parent: &[ControlPoint], operator: &SubdivisionOperator, inner: usize, child: &mut [ControlPoint]) {
+    let (rows, columns) = (operator.rows(), operator.columns());
+    let entries = operator.entries();
+    for (source, target) in parent.chunks_exact(rows * inner).zip(child.chunks_exact_mut(columns * inner)) {
+        for (weights, target) in entries.chunks_exact(rows).zip(target.chunks_exact_mut(inner)) {
+            for (position, point) in target.iter_mut().enumerate() {
+                let mut sum = [0.0; 4];
+                for (row, &weight) in weights.iter().enumerate() {
+                    let from = &source[row * inner + position];
+                    for (total, &coordinate) in sum.iter_mut().zip(from) {
+                        *total += weight * coordinate;
+                    }
+                }
+                *point = sum;
+            }
+        }
+    }
+}
+
 /// The child's control points P T. Unrolled for the common sizes.
 #[inline]
 pub(crate) fn child_points(parent: &[ControlPoint], operator: &SubdivisionOperator, child: &mut [ControlPoint]) {
+    match operator.factors() {
+        [] => {}
+        [u, v] => return combine_pair(parent, u, v, child),
+        factors => return combine_factors(parent, factors, child),
+    }
     let entries = operator.entries();
     match (operator.rows(), operator.columns()) {
         (2, 2) => combine::<2, 2>(parent, entries, child),

@@ -13,6 +13,9 @@
 //! 2 eta. If L interpolates the ends of a curve, the chord *is* L(D_s), and its distance at most eta.
 //! r_k vanishes for control points in linear position, so eta is of second order in the size of smooth cells.
 //!
+//! Products of curves: if G_A maps the attractor of one onto [0, 1], and G_B that of the other, then x_A x x_B, of which
+//! the product's attractor consists, is mapped onto the unit square by (G_A x 1, 1 x G_B), whatever the ratios.
+//!
 //! G is found by elimination over all states at once. What it misses, |G_s T_e - l G_w - t_e 1^T| <= e entrywise, moves
 //! parameters by at most (1 + 2 m) e / (1 - l), which is kept and charged.
 
@@ -67,6 +70,10 @@ pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Op
         if component.iter().all(|&index| result[index].is_some()) {
             continue;
         }
+        // A product has what its factors have.
+        if component.iter().any(|&index| !automaton.factors(StateId::new(index)).is_empty()) {
+            continue;
+        }
         let drawn = |&index: &usize| matches!(states[index].leaf, LeafPrimitive::Chord(_) | LeafPrimitive::Polygon(_));
         if component.iter().any(|&index| states[index].frame) || !component.iter().any(drawn) {
             continue;
@@ -88,7 +95,38 @@ pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Op
             }
         }
     }
+    for index in 0..states.len() {
+        let factors = automaton.factors(StateId::new(index));
+        if let [left, right] = factors {
+            result[index] = product(&states[index].leaf, [&result[left.index()], &result[right.index()]], bounds[index].margin());
+        }
+    }
     result
+}
+
+/// The precision of a product of two curves, whose outline is the unit square; see the module's comment.
+fn product(leaf: &LeafPrimitive, factors: [&Option<LinearPrecision>; 2], margin: f64) -> Option<LinearPrecision> {
+    let [Some(left), Some(right)] = factors else { return None };
+    let interval = |factor: &LinearPrecision| factor.domain.len() == 2;
+    if !interval(left) || !interval(right) {
+        return None;
+    }
+    let raw: Vec<[f64; 2]> =
+        left.parameters.iter().flat_map(|u| right.parameters.iter().map(move |v| [u[0], v[0]])).collect();
+    let domain: Vec<[f64; 2]> = corners(leaf)?.iter().map(|corner| evaluate(&raw, corner)).collect();
+    // The four corners of the square, each once, in order around it.
+    let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let off = |first: usize, backwards: bool| {
+        let corner = |k: usize| square[(first + if backwards { 4 - k } else { k }) % 4];
+        domain.iter().enumerate().map(|(k, place)| apart(place, &corner(k))).fold(0.0, f64::max)
+    };
+    let least = (0..4).flat_map(|first| [off(first, false), off(first, true)]).fold(f64::INFINITY, f64::min);
+    if domain.len() != 4 || least > MISS {
+        return None;
+    }
+    let rounding = (1.0 + 2.0 * margin) * 1e-14 + 2.0 * least;
+    scaled(&raw, &domain, left.residual.hypot(right.residual) + rounding)
 }
 
 /// The precision of states whose model claims parameters, where the claims hold for them and all their descendants.

@@ -117,6 +117,8 @@ pub struct Automaton {
     states: Vec<State>,
     /// Parameters that models claim for control points; see [`Self::claim_parameters`].
     claims: BTreeMap<StateId, Vec<[f64; 2]>>,
+    /// The factors of every state that is a product; empty for others. See [`Self::claim_products`].
+    products: Vec<Vec<StateId>>,
 }
 
 /// Why states do not form an automaton.
@@ -176,7 +178,8 @@ impl Automaton {
                 check(format!("boundary {index}"), boundary.state, &boundary.incidence)?;
             }
         }
-        Ok(Self { states, claims: BTreeMap::new() })
+        let products = vec![Vec::new(); states.len()];
+        Ok(Self { states, claims: BTreeMap::new(), products })
     }
 
     /// The states, in order of their ids.
@@ -199,6 +202,73 @@ impl Automaton {
 
     pub(crate) fn claimed_parameters(&self) -> &BTreeMap<StateId, Vec<[f64; 2]>> {
         &self.claims
+    }
+
+    /// Notes which states are products of others: all their children are products of one child of every factor, in
+    /// lexicographic order, through the Kronecker products of the factors' operators. What is proven of the factors then
+    /// holds for the product. Claims that do not hold are dropped.
+    pub(crate) fn claim_products(&mut self, claims: &BTreeMap<StateId, Vec<StateId>>) {
+        let holds: Vec<bool> = (0..self.states.len()).map(|index| self.is_product(StateId::new(index), claims)).collect();
+        let holds = self.hereditary(holds);
+        // Factors are no products themselves, and nothing else leads to one.
+        let stray = self.states.iter().enumerate().filter(|(index, _)| !holds[*index]).any(|(_, state)| {
+            state.transitions.iter().any(|transition| holds[transition.to.index()])
+        });
+        let nested = claims.iter().filter(|(id, _)| holds[id.index()]).flat_map(|(_, factors)| factors).any(|id| holds[id.index()]);
+        if stray || nested {
+            return;
+        }
+        for (id, factors) in claims.iter().filter(|(id, _)| holds[id.index()]) {
+            self.products[id.index()].clone_from(factors);
+        }
+    }
+
+    /// The factors of a state that is a product, as [`Self::claim_products`] says; none for others.
+    #[must_use]
+    pub fn factors(&self, id: StateId) -> &[StateId] {
+        &self.products[id.index()]
+    }
+
+    /// The automaton of these states alone, which lead to no others, without boundaries.
+    fn restricted_to(&self, kept: &[StateId]) -> Self {
+        let mut place = vec![None; self.states.len()];
+        kept.iter().enumerate().for_each(|(position, id)| place[id.index()] = Some(StateId::new(position)));
+        let states: Vec<State> = kept
+            .iter()
+            .map(|&id| {
+                let state = self.state(id);
+                let follow = |transition: &Transition| Some(Transition { to: place[transition.to.index()]?, ..transition.clone() });
+                State { transitions: state.transitions.iter().filter_map(follow).collect(), boundaries: Vec::new(), ..state.clone() }
+            })
+            .collect();
+        let products = vec![Vec::new(); states.len()];
+        Self { states, claims: BTreeMap::new(), products }
+    }
+
+    fn is_product(&self, id: StateId, claims: &BTreeMap<StateId, Vec<StateId>>) -> bool {
+        let Some(factors) = claims.get(&id).filter(|factors| factors.len() > 1) else { return false };
+        if factors.iter().any(|factor| factor.index() >= self.states.len()) {
+            return false;
+        }
+        let own = self.state(id);
+        let parts: Vec<&State> = factors.iter().map(|&factor| self.state(factor)).collect();
+        let children: usize = parts.iter().map(|part| part.transitions.len()).product();
+        let dimension: usize = parts.iter().map(|part| part.dimension).product();
+        if own.frame || parts.iter().any(|part| part.frame) || own.dimension != dimension || own.transitions.len() != children || children == 0 {
+            return false;
+        }
+        own.transitions.iter().enumerate().all(|(index, transition)| {
+            let mut rest = index;
+            let mut chosen: Vec<&Transition> = Vec::with_capacity(parts.len());
+            for part in parts.iter().rev() {
+                chosen.push(&part.transitions[rest % part.transitions.len()]);
+                rest /= part.transitions.len();
+            }
+            chosen.reverse();
+            let targets = claims.get(&transition.to);
+            targets.is_some_and(|targets| chosen.iter().map(|step| step.to).eq(targets.iter().copied()))
+                && transition.operator.factors().iter().eq(chosen.iter().map(|step| &step.operator))
+        })
     }
 
     /// Chooses chords for edges that are proven to be curves, and polygons for faces whose sides close.

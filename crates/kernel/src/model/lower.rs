@@ -51,6 +51,8 @@ pub(super) struct Draft {
     shared: BTreeMap<String, StateId>,
     /// Parameters of states' control points; see [`Automaton::claim_parameters`].
     pub(super) parameters: BTreeMap<StateId, Vec<[f64; 2]>>,
+    /// States that are products of others; see [`Automaton::claim_products`].
+    pub(super) products: BTreeMap<StateId, Vec<StateId>>,
     /// Where every state's transitions are listed in the model.
     origins: Vec<String>,
     /// Where the family that is being lowered stands in the model.
@@ -218,6 +220,7 @@ impl Model {
             Ok(automaton) => automaton,
             Err(error) => return Err(fail(draft.findings, &error.into())),
         };
+        automaton.claim_products(&std::mem::take(&mut draft.products));
         let topology = match Topology::new(&automaton, &draft.declared) {
             Ok(topology) => topology,
             Err(error) => return Err(incoherent(draft.findings, &error)),

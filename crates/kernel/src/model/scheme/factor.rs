@@ -1,8 +1,8 @@
 //! Products of curve automata.
 //!
 //! A *factor* is a curve without control points: kinds of pieces, and the spans that a list of control points is made
-//! into. A cell of a product is one piece per direction; its operators are the Kronecker products of theirs, formed for
-//! the combinations that are reached. The end of a piece is a point of its barycentric space, so a side of a product
+//! into. A cell of a product is one piece per direction; its operators are the Kronecker products of theirs, for the
+//! combinations that are reached, and kept as their factors: what is proven of the pieces holds for the products. The end of a piece is a point of its barycentric space, so a side of a product
 //! cell is the product of the other directions' pieces: patches, curves and iso-parametric edges share states, and
 //! neighbours share sides exactly.
 
@@ -203,20 +203,16 @@ impl Product<'_> {
             let state = self.state(&pieces);
             let name = std::mem::take(&mut self.draft.states[id.index()].name);
             self.draft.states[id.index()] = State { name, ..state };
-            let parameters = self.parameters(&pieces);
-            if !parameters.is_empty() {
-                self.draft.parameters.insert(id, parameters);
+            if let [piece] = pieces.as_slice() {
+                let parameters = &self.piece(*piece).parameters;
+                if !parameters.is_empty() {
+                    let parameters = parameters.iter().map(|&u| [u, 0.0]).collect();
+                    self.draft.parameters.insert(id, parameters);
+                }
+            } else {
+                let factors = pieces.iter().map(|&piece| self.intern(vec![piece])).collect();
+                self.draft.products.insert(id, factors);
             }
-        }
-    }
-
-    /// Parameters of the control points of an edge or a face, where all its pieces have them.
-    fn parameters(&self, pieces: &Pieces) -> Vec<[f64; 2]> {
-        let own: Vec<&[f64]> = pieces.iter().map(|&piece| self.piece(piece).parameters.as_slice()).collect();
-        match own.as_slice() {
-            [u] => u.iter().map(|&u| [u, 0.0]).collect(),
-            [u, v] => u.iter().flat_map(|&u| v.iter().map(move |&v| [u, v])).collect(),
-            _ => Vec::new(),
         }
     }
 
@@ -227,7 +223,7 @@ impl Product<'_> {
         for (label, choice) in combinations(&counts).enumerate() {
             let chosen: Vec<&(usize, SubdivisionOperator)> = choice.iter().zip(&own).map(|(&k, piece)| &piece.children[k]).collect();
             let to = self.intern(chosen.iter().zip(pieces).map(|(child, &(direction, _))| (direction, child.0)).collect());
-            let operator = kronecker(&chosen.iter().map(|child| child.1.clone()).collect::<Vec<_>>());
+            let operator = SubdivisionOperator::product(chosen.iter().map(|child| child.1.clone()).collect());
             transitions.push(Transition { to, operator, label });
         }
         let mut boundaries = Vec::new();
@@ -242,7 +238,7 @@ impl Product<'_> {
                         SubdivisionOperator::identity(piece.dimension)
                     }
                 };
-                let incidence = kronecker(&own.iter().enumerate().map(factor).collect::<Vec<_>>());
+                let incidence = SubdivisionOperator::product(own.iter().enumerate().map(factor).collect());
                 boundaries.push(Boundary { state: self.intern(others), incidence });
             }
         }
@@ -308,23 +304,4 @@ impl Product<'_> {
             }
         }
     }
-}
-
-/// The Kronecker product, the first factor's index slowest.
-fn kronecker(factors: &[SubdivisionOperator]) -> SubdivisionOperator {
-    factors
-        .iter()
-        .cloned()
-        .reduce(|a, b| {
-            let mut entries = Vec::with_capacity(a.entries().len() * b.entries().len());
-            for i in 0..a.columns() {
-                for j in 0..b.columns() {
-                    for x in a.column(i) {
-                        entries.extend(b.column(j).iter().map(|y| x * y));
-                    }
-                }
-            }
-            SubdivisionOperator::exact(a.rows() * b.rows(), entries)
-        })
-        .expect("a product has a factor")
 }
