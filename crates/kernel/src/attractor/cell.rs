@@ -122,6 +122,21 @@ fn combine<const N: usize, const M: usize>(parent: &[ControlPoint], entries: &[f
 
 /// Control points of a pair of factors that are combined without another buffer.
 const PAIR: usize = 128;
+/// Points at most that measure the error of a cell, as a buffer holds them.
+pub(super) const MOST_MEASURED: usize = PAIR;
+
+/// The points that measure the deviation of a cell from an affine map.
+#[inline]
+fn measured<'p>(precision: &LinearPrecision, points: &'p [ControlPoint], buffer: &'p mut [ControlPoint; PAIR]) -> &'p [ControlPoint] {
+    match &precision.hull {
+        None => points,
+        Some(hull) => {
+            let buffer = &mut buffer[..hull.columns()];
+            child_points(points, hull, buffer);
+            buffer
+        }
+    }
+}
 
 /// P (U x V), direction after direction.
 fn combine_pair(parent: &[ControlPoint], u: &SubdivisionOperator, v: &SubdivisionOperator, child: &mut [ControlPoint]) {
@@ -346,11 +361,14 @@ impl Attractor {
                 let chord = points.iter().map(off).fold(0.0, f64::max).sqrt();
                 let margin = self.bound(cell.state).margin();
                 let first_order = if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord };
-                match self.precision(cell.state) {
-                    Some(precision) if rational => first_order.min(rational_chord_error(precision, points, ends)),
-                    Some(precision) => first_order.min(chord_error(precision, margin, points, &start, &end)),
-                    None => first_order,
-                }
+                let Some(precision) = self.precision(cell.state) else { return first_order };
+                let mut buffer = [[0.0; 4]; PAIR];
+                let measured = measured(precision, points, &mut buffer);
+                first_order.min(if rational {
+                    rational_chord_error(precision, points, measured, ends)
+                } else {
+                    chord_error(precision, measured, &start, &end)
+                })
             }
             // Points of the cell, and segments between them, are in the ball too.
             LeafPrimitive::Star(_) => 2.0 * cell.ball.radius,
@@ -358,11 +376,10 @@ impl Attractor {
             // no two points of them are farther apart than its diameter.
             LeafPrimitive::Polygon(_) => {
                 let first_order = 2.0 * cell.ball.radius;
-                match self.precision(cell.state) {
-                    Some(precision) if rational => first_order.min(rational_polygon_error(precision, points)),
-                    Some(precision) => first_order.min(polygon_error(precision, self.bound(cell.state).margin(), points)),
-                    None => first_order,
-                }
+                let Some(precision) = self.precision(cell.state) else { return first_order };
+                let mut buffer = [[0.0; 4]; PAIR];
+                let measured = measured(precision, points, &mut buffer);
+                first_order.min(if rational { rational_polygon_error(precision, measured) } else { polygon_error(precision, measured) })
             }
             LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
         }
@@ -437,19 +454,19 @@ impl Attractor {
 
 /// eta for the affine map that takes a curve's parameters to its chord; see `precision`.
 #[inline]
-fn chord_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
+fn chord_error(precision: &LinearPrecision, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
     let chord = subtract(end, start);
     let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
         let linear: Point = std::array::from_fn(|i| start[i] + parameter[0] * chord[i]);
         distance_squared(&[point[0], point[1], point[2]], &linear)
     };
-    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
-    (1.0 + 2.0 * margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
+    let largest = points.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
+    (1.0 + 2.0 * precision.margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
 }
 
 /// 2 eta for the affine map that fits a face's control points best; see `precision`.
 #[inline]
-fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint]) -> f64 {
+fn polygon_error(precision: &LinearPrecision, points: &[ControlPoint]) -> f64 {
     let mut map = [[0.0; 3]; 3];
     for (point, fit) in points.iter().zip(&precision.fit) {
         for (column, weight) in map.iter_mut().zip(fit) {
@@ -460,17 +477,17 @@ fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoin
         let linear: Point = std::array::from_fn(|i| map[0][i] + parameter[0] * map[1][i] + parameter[1] * map[2][i]);
         distance_squared(&[point[0], point[1], point[2]], &linear)
     };
-    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
+    let largest = points.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
     let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
-    2.0 * (1.0 + 2.0 * margin) * largest + precision.residual * slope
+    2.0 * (1.0 + 2.0 * precision.margin) * largest + precision.residual * slope
 }
 
 /// As [`chord_error`] for weights; see [`homogeneous_error`].
-fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], ends: &Ends) -> f64 {
+fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], measured: &[ControlPoint], ends: &Ends) -> f64 {
     let place = |weights: &[f64]| -> ControlPoint { std::array::from_fn(|i| points.iter().zip(weights).map(|(p, w)| w * p[i]).sum()) };
     let (start, end) = (place(&ends.start), place(&ends.end));
     let linear: [ControlPoint; 3] = [start, std::array::from_fn(|i| end[i] - start[i]), [0.0; 4]];
-    homogeneous_error(precision, points, &linear)
+    homogeneous_error(precision, measured, &linear)
 }
 
 /// As [`polygon_error`] for weights; see [`homogeneous_error`].
@@ -503,7 +520,7 @@ fn homogeneous_error(precision: &LinearPrecision, points: &[ControlPoint], linea
         (dot(&seen, &seen).sqrt(), v[3].abs())
     };
     let (mut off, mut skew, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
-    for (point, parameter) in points.iter().zip(&precision.parameters) {
+    for (point, parameter) in points.iter().zip(&precision.measured) {
         let linear = at(parameter);
         let (n, d) = size(&std::array::from_fn(|i| point[i] - linear[i]));
         (off, skew, least) = (off.max(n), skew.max(d), least.min(point[3]));

@@ -110,13 +110,30 @@ pub struct State {
     pub frame: bool,
 }
 
+/// What a model claims of the cells of a curve.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub(crate) struct Smooth {
+    /// Parameters of its control points with which it has linear precision: those of a child are an affine image.
+    pub(crate) parameters: Vec<f64>,
+    /// Points in whose hull its attractor lies, if that is smaller than the control points'.
+    pub(crate) hull: Option<Hull>,
+}
+
+/// Points H of a state, and for every transition the matrix K without negative entries for which T H' = H K, H' being
+/// the child's points: so the hull of H contains those of the children, and with them the attractor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Hull {
+    pub(crate) points: SubdivisionOperator,
+    pub(crate) children: Vec<SubdivisionOperator>,
+}
+
 /// States and transitions. Invariant: operators fit their states, and every transition and boundary
 /// names a state of the automaton.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Automaton {
     states: Vec<State>,
-    /// Parameters that models claim for control points; see [`Self::claim_parameters`].
-    claims: BTreeMap<StateId, Vec<[f64; 2]>>,
+    /// What models claim of their curves; see [`Self::claim_smooth`].
+    claims: BTreeMap<StateId, Smooth>,
     /// The factors of every state that is a product; empty for others. See [`Self::claim_products`].
     products: Vec<Vec<StateId>>,
 }
@@ -194,13 +211,12 @@ impl Automaton {
         &self.states[id.index()]
     }
 
-    /// Notes, for some states, parameters of their control points with which their curves or faces have linear precision
-    /// at the ratio 1/2, over unit intervals or squares. Claims are verified before use, and save a search.
-    pub(crate) fn claim_parameters(&mut self, claims: BTreeMap<StateId, Vec<[f64; 2]>>) {
+    /// Notes what some curves are like. Claims are verified before use, and save a search.
+    pub(crate) fn claim_smooth(&mut self, claims: BTreeMap<StateId, Smooth>) {
         self.claims = claims;
     }
 
-    pub(crate) fn claimed_parameters(&self) -> &BTreeMap<StateId, Vec<[f64; 2]>> {
+    pub(crate) fn claimed_smooth(&self) -> &BTreeMap<StateId, Smooth> {
         &self.claims
     }
 

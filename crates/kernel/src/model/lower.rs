@@ -4,7 +4,7 @@
 use super::{AffineMap, CellKind, Model, Shape};
 use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
 use crate::automaton::topology::{Declared, Topology, TopologyError};
-use crate::automaton::{Automaton, Boundary, LeafPrimitive, State, StateId, SubdivisionOperator};
+use crate::automaton::{Automaton, Boundary, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator};
 use std::collections::BTreeMap;
 
 /// Something about a model that its author should know: an error, or a warning.
@@ -49,8 +49,8 @@ pub(super) struct Draft {
     pub(super) seam_mm: f64,
     /// States whose names tell their content, by name.
     shared: BTreeMap<String, StateId>,
-    /// Parameters of states' control points; see [`Automaton::claim_parameters`].
-    pub(super) parameters: BTreeMap<StateId, Vec<[f64; 2]>>,
+    /// What is claimed of curves; see [`Automaton::claim_smooth`].
+    pub(super) smooth: BTreeMap<StateId, Smooth>,
     /// States that are products of others; see [`Automaton::claim_products`].
     pub(super) products: BTreeMap<StateId, Vec<StateId>>,
     /// Where every state's transitions are listed in the model.
@@ -226,7 +226,7 @@ impl Model {
             Err(error) => return Err(incoherent(draft.findings, &error)),
         };
         automaton.connect(&topology);
-        automaton.claim_parameters(std::mem::take(&mut draft.parameters));
+        automaton.claim_smooth(std::mem::take(&mut draft.smooth));
         let warnings = draft.findings.iter().map(|finding| finding.message.clone()).collect();
         let attractor = match Attractor::new(automaton, draft.roots, draft.solids, warnings) {
             Ok(attractor) => attractor,

@@ -7,7 +7,7 @@
 //! neighbours share sides exactly.
 
 use crate::attractor::{Gluing, Root};
-use crate::automaton::{Boundary, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
+use crate::automaton::{Boundary, Hull, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator, Transition};
 use crate::model::CellKind;
 use crate::model::lower::Draft;
 use std::collections::BTreeMap;
@@ -25,6 +25,8 @@ pub(in crate::model) struct Piece {
     pub(super) ends: [Vec<f64>; 2],
     /// Parameters of its control points, 0 and 1 at the ends, with which it has linear precision; empty if it has none.
     pub(super) parameters: Vec<f64>,
+    /// Points in whose hull it lies, if that is smaller than its control points'.
+    pub(super) hull: Option<Hull>,
 }
 
 /// A piece with its control points: combinations of the curve's, by index and weight.
@@ -204,10 +206,10 @@ impl Product<'_> {
             let name = std::mem::take(&mut self.draft.states[id.index()].name);
             self.draft.states[id.index()] = State { name, ..state };
             if let [piece] = pieces.as_slice() {
-                let parameters = &self.piece(*piece).parameters;
+                let Piece { parameters, hull, .. } = self.piece(*piece);
                 if !parameters.is_empty() {
-                    let parameters = parameters.iter().map(|&u| [u, 0.0]).collect();
-                    self.draft.parameters.insert(id, parameters);
+                    let smooth = Smooth { parameters: parameters.clone(), hull: hull.clone() };
+                    self.draft.smooth.insert(id, smooth);
                 }
             } else {
                 let factors = pieces.iter().map(|&piece| self.intern(vec![piece])).collect();

@@ -117,12 +117,12 @@ pub struct Sum {
     pub v: Curve,
 }
 
-/// More control points of one cell than this are refused: operators grow with the square.
-const MOST_CELL_POINTS: usize = 128;
+/// More control points of one cell than this are refused: three factors of degree 9 have 1000.
+const MOST_CELL_POINTS: usize = 1024;
 /// More root cells than this are refused.
 const MOST_CELLS: usize = 1 << 20;
-/// Entries of operators beyond which splines are written with Bezier points: one state instead of one per stencil.
-const MOST_ENTRIES: usize = 1 << 19;
+/// Combinations of pieces beyond which splines are written with Bezier points: one piece instead of one per stencil.
+const MOST_STATES: usize = 512;
 
 /// Where the scheme of a direction stands in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,9 +252,8 @@ impl TensorProduct {
             };
             let factors: Vec<Option<Factor>> = self.schemes.iter().enumerate().map(factor).collect();
             let Some(factors) = factors.into_iter().collect::<Option<Vec<Factor>>>() else { return };
-            let points: usize = factors.iter().map(Factor::dimension).product();
             let states: usize = factors.iter().map(|factor| factor.pieces.len()).product();
-            if form == Form::Bezier || states.saturating_mul((points * points) << factors.len()) <= MOST_ENTRIES {
+            if form == Form::Bezier || states <= MOST_STATES {
                 return lower_product(draft, &factors, &grid);
             }
         }
