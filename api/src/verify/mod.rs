@@ -9,11 +9,13 @@ mod solve;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use lacuna_exchange::document::Sought;
 use lacuna_fabrication::{Input, Job, JobKind, Params};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
+use crate::addresses::{self, AddressAnswer};
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::{documents, production};
@@ -22,6 +24,8 @@ pub use report::{CaseReport, Report, Row};
 
 /// Deepest folder in which cases are looked for.
 const DEEPEST: usize = 16;
+/// Time for one point of a case.
+const POINT_TIME: Duration = Duration::from_secs(60);
 
 /// Does every case below a folder whose path contains `filter`.
 ///
@@ -82,7 +86,11 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
     let result = perform(folder, &document, kind, manifest);
     match (&manifest.refused, result) {
         (Some(refused), result) => vec![compare_refusal(refused, result)],
-        (None, Ok(certificate)) => compare::rows(manifest, &certificate),
+        (None, Ok(certificate)) => {
+            let mut rows = compare::rows(manifest, &certificate);
+            rows.extend(point_rows(folder, &document, manifest));
+            rows
+        }
         (None, Err(problem)) => vec![Row::failure("result", "a certificate", &told(&problem))],
     }
 }
@@ -102,6 +110,28 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
     let _watchdog = Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
     let outcome = production::compute(&job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
     serde_json::to_value(&outcome.certificate).map_err(|error| Problem::internal(error.to_string()))
+}
+
+/// The comparisons of `[point.*]`.
+fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest) -> Vec<Row> {
+    if manifest.point.is_empty() {
+        return Vec::new();
+    }
+    let model = match documents::read_model_in(document, Some(folder)) {
+        Ok(model) => model,
+        Err(problem) => return vec![Row::failure("points", "a model", &told(&problem))],
+    };
+    let row = |(address, expected): (&String, &manifest::ExpectedPoint)| {
+        let name = format!("point {address}");
+        let wanted = format!("{:?}", expected.value);
+        let Ok(at) = address.parse() else { return Row::failure(&name, "an address", address) };
+        match addresses::answer(&model, &Sought::At(at), POINT_TIME) {
+            Ok(AddressAnswer { at: Some(found), .. }) => compare::point_row(&name, expected, &found.point_mm),
+            Ok(_) => Row::failure(&name, &wanted, "no point"),
+            Err(problem) => Row::failure(&name, &wanted, &told(&problem)),
+        }
+    };
+    manifest.point.iter().map(row).collect()
 }
 
 fn compare_refusal(refused: &Refused, result: Result<serde_json::Value, Problem>) -> Row {

@@ -73,7 +73,8 @@ fn drawings_of_products_keep_their_bounds() {
         let kinds = [round % 8, (round * 3 + round / 8) % 8];
         let [(u, m), (v, n)] = kinds.map(|kind| scheme(kind, &mut random));
         let points = (0..m * n).map(|k| DVec3::new((k / n) as f64, (k % n) as f64, random.between(-1.0, 1.0))).collect();
-        let weights = kinds.iter().all(|kind| matches!(kind, 0 | 1 | 5 | 7)).then(|| (0..m * n).map(|_| random.between(0.5, 2.0)).collect());
+        let weights =
+            kinds.iter().all(|kind| matches!(kind, 0 | 1 | 5 | 7)).then(|| (0..m * n).map(|_| random.between(0.5, 2.0)).collect());
         let attractor = lower(product(vec![u, v], ControlNet { size: vec![m, n], points, weights })).attractor;
         let drawn = evaluated(&attractor, 0.5);
         assert!(drawn.deviation_mm <= 0.5 && !drawn.triangles.is_empty(), "{kinds:?}");

@@ -559,6 +559,22 @@ pub(super) const INTERPOLATION: Object = Object {
     ],
 };
 
+pub(super) const BCIFS_SCHEME: Object = Object {
+    title: "the states of a curve",
+    about: "A curve of one's own states: edges between two vertices. As many control points as the first state has.",
+    members: &[
+        family!("bcifs"),
+        required("states", "The kinds of cells: the curve's, those that it reaches, and their vertices.", || list(reference("State"), 1)),
+        optional("start", "The name of the curve's state; the first when absent.", text),
+    ],
+};
+
+pub(super) const IFS_SCHEME: Object = Object {
+    title: "the maps of a curve",
+    about: "The curve of affine maps whose images follow each other, drawn in the affine frame of four control points: o, o + x, o + y, o + z.",
+    members: &[family!("ifs"), required("maps", "The maps, in order along the curve.", || list(reference("AffineMap"), 2))],
+};
+
 pub(super) const TENSOR: Object = Object {
     title: "a tensor",
     about: "The tensor product of two or three curve schemes on a net of control points.",
@@ -587,7 +603,7 @@ pub(super) const SUM: Object = Object {
 };
 
 /// Curve schemes that products are made of, with the schema's name.
-pub(super) const SCHEMES: [(&str, &str, &Object); 7] = [
+pub(super) const SCHEMES: [(&str, &str, &Object); 9] = [
     ("bezier_curve", "BezierScheme", &BEZIER_SCHEME),
     ("nurbs_curve", "NurbsScheme", &NURBS_SCHEME),
     ("catmull_rom", "CatmullRomScheme", &CATMULL_ROM_SCHEME),
@@ -595,6 +611,8 @@ pub(super) const SCHEMES: [(&str, &str, &Object); 7] = [
     ("corner_cutting", "CornerCuttingScheme", &CORNER_CUTTING_SCHEME),
     ("four_point", "FourPointScheme", &FOUR_POINT_SCHEME),
     ("interpolation", "InterpolationScheme", &INTERPOLATION_SCHEME),
+    ("bcifs", "BcifsScheme", &BCIFS_SCHEME),
+    ("ifs", "IfsScheme", &IFS_SCHEME),
 ];
 
 /// Curves that sums are made of, with the schema's name.

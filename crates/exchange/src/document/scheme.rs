@@ -3,6 +3,7 @@
 use glam::DVec3;
 use lacuna_kernel::model::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct};
 
+use super::bcifs::curve_states;
 use super::grammar::{CURVES, Member, NURBS_SURFACE, NURBS_VOLUME, Object, SCHEMES, SUM, TENSOR};
 use super::node::{Place, Value, quoted};
 use super::transform::{affine_map, control_point, point};
@@ -70,6 +71,10 @@ fn scheme_of(walker: &mut Walker<'_>, family: &str, members: &Members<'_>) -> Op
             CurveScheme::FourPoint { tension: tension?, closed: closed? }
         }
         "interpolation" => return interpolation(walker, members),
+        "bcifs" => return curve_states(walker, members),
+        "ifs" => CurveScheme::Ifs {
+            maps: members.get("maps").and_then(|place| walker.each_of(place, 2, "an array of affine maps", affine_map))?,
+        },
         _ => CurveScheme::Bezier,
     })
 }

@@ -106,6 +106,8 @@ impl<M: SerializeMap> Members<M> {
             CurveScheme::BetaSpline { .. } => "beta_spline",
             CurveScheme::FourPoint { .. } => "four_point",
             CurveScheme::Interpolation { .. } | CurveScheme::AffineInterpolation { .. } => "interpolation",
+            CurveScheme::Bcifs { .. } => "bcifs",
+            CurveScheme::Ifs { .. } => "ifs",
         };
         self.put("family", &family)?;
         if let CurveScheme::Nurbs { degree, knots } = scheme {
@@ -131,7 +133,8 @@ impl<M: SerializeMap> Members<M> {
             }
             CurveScheme::FourPoint { tension, closed } => self.put("w", &Number(*tension))?.put_if(*closed, "closed", &true),
             CurveScheme::Interpolation { vertical_scaling } => self.put("vertical_scaling", &numbers(vertical_scaling)),
-            CurveScheme::AffineInterpolation { maps } => self.put("maps", &list(maps)),
+            CurveScheme::AffineInterpolation { maps } | CurveScheme::Ifs { maps } => self.put("maps", &list(maps)),
+            CurveScheme::Bcifs { states, start } => self.put("states", &list(states))?.put("start", start),
         }
     }
 

@@ -112,9 +112,9 @@ fn product_bound(factors: &[StateId], bounds: &[StateBound], centres: &[Vec<f64>
 
 /// The product of points of the factors.
 fn product_point(factors: &[StateId], points: &[Vec<f64>]) -> Vec<f64> {
-    factors.iter().fold(vec![1.0], |product, factor| {
-        product.iter().flat_map(|x| points[factor.index()].iter().map(move |y| x * y)).collect()
-    })
+    factors
+        .iter()
+        .fold(vec![1.0], |product, factor| product.iter().flat_map(|x| points[factor.index()].iter().map(move |y| x * y)).collect())
 }
 
 /// Tightens the coordinate boxes: each is replaced by its intersection with the hull of its children's

@@ -142,8 +142,7 @@ fn product(leaf: &LeafPrimitive, factors: [&Option<LinearPrecision>; 2], margin:
     if !interval(left) || !interval(right) {
         return None;
     }
-    let raw: Vec<[f64; 2]> =
-        left.parameters.iter().flat_map(|u| right.parameters.iter().map(move |v| [u[0], v[0]])).collect();
+    let raw: Vec<[f64; 2]> = left.parameters.iter().flat_map(|u| right.parameters.iter().map(move |v| [u[0], v[0]])).collect();
     let domain: Vec<[f64; 2]> = corners(leaf)?.iter().map(|corner| evaluate(&raw, corner)).collect();
     // The four corners of the square, each once, in order around it.
     let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
@@ -159,9 +158,7 @@ fn product(leaf: &LeafPrimitive, factors: [&Option<LinearPrecision>; 2], margin:
     let rounding = (1.0 + 2.0 * margin) * 1e-14 + 2.0 * least;
     let mut precision = scaled(&raw, &domain, left.residual.hypot(right.residual) + rounding, margin)?;
     if left.hull.is_some() || right.hull.is_some() {
-        let hull = |factor: &LinearPrecision| {
-            factor.hull.clone().unwrap_or_else(|| SubdivisionOperator::identity(factor.parameters.len()))
-        };
+        let hull = |factor: &LinearPrecision| factor.hull.clone().unwrap_or_else(|| SubdivisionOperator::identity(factor.parameters.len()));
         precision.measure_at(&SubdivisionOperator::product(vec![hull(left), hull(right)]))?;
         // As for the margins of bounds: see there.
         precision.margin = 0.5 * ((1.0 + 2.0 * left.margin) * (1.0 + 2.0 * right.margin) - 1.0);

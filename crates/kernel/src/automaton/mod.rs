@@ -227,9 +227,12 @@ impl Automaton {
         let holds: Vec<bool> = (0..self.states.len()).map(|index| self.is_product(StateId::new(index), claims)).collect();
         let holds = self.hereditary(holds);
         // Factors are no products themselves, and nothing else leads to one.
-        let stray = self.states.iter().enumerate().filter(|(index, _)| !holds[*index]).any(|(_, state)| {
-            state.transitions.iter().any(|transition| holds[transition.to.index()])
-        });
+        let stray = self
+            .states
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| !holds[*index])
+            .any(|(_, state)| state.transitions.iter().any(|transition| holds[transition.to.index()]));
         let nested = claims.iter().filter(|(id, _)| holds[id.index()]).flat_map(|(_, factors)| factors).any(|id| holds[id.index()]);
         if stray || nested {
             return;
@@ -270,7 +273,12 @@ impl Automaton {
         let parts: Vec<&State> = factors.iter().map(|&factor| self.state(factor)).collect();
         let children: usize = parts.iter().map(|part| part.transitions.len()).product();
         let dimension: usize = parts.iter().map(|part| part.dimension).product();
-        if own.frame || parts.iter().any(|part| part.frame) || own.dimension != dimension || own.transitions.len() != children || children == 0 {
+        if own.frame
+            || parts.iter().any(|part| part.frame)
+            || own.dimension != dimension
+            || own.transitions.len() != children
+            || children == 0
+        {
             return false;
         }
         own.transitions.iter().enumerate().all(|(index, transition)| {

@@ -262,7 +262,8 @@ impl Joint {
         };
         let mut centre = Vec::with_capacity(left.centre.len() * right.centre.len());
         left.centre.iter().for_each(|x| centre.extend(right.centre.iter().map(|y| x * y)));
-        let norm = StateNorm::Product(Box::new(ProductNorm { left: left.norm, right: right.norm, centres: [left.centre, right.centre], delta }));
+        let norm =
+            StateNorm::Product(Box::new(ProductNorm { left: left.norm, right: right.norm, centres: [left.centre, right.centre], delta }));
         Part { norm, centre, transient, farthest: off(left.farthest, right.farthest), steps }
     }
 }

@@ -4,13 +4,14 @@ mod factor;
 mod fractal;
 mod knots;
 mod net;
+mod own;
 mod polynomial;
 mod subdivision;
 
 pub use net::ControlNet;
 
-use super::AffineMap;
 use super::lower::Draft;
+use super::{AffineMap, BcifsState};
 use factor::{Factor, Grid, product};
 use glam::DVec3;
 use knots::Form;
@@ -79,6 +80,18 @@ pub enum CurveScheme {
     Interpolation {
         /// d_i, one per interval, in absolute value below 1.
         vertical_scaling: Vec<f64>,
+    },
+    /// The edge of a user's automaton. For products only.
+    Bcifs {
+        /// The states; all that the first one reaches by transitions are edges between two vertices.
+        states: Vec<BcifsState>,
+        /// The name of the state of the curve.
+        start: String,
+    },
+    /// The curve of affine maps, in the affine frame that four control points are. For products only.
+    Ifs {
+        /// Maps whose images follow each other along the curve.
+        maps: Vec<AffineMap>,
     },
     /// The curve through the points whose part over interval i is its image under map i. Not for products.
     AffineInterpolation {
@@ -202,6 +215,8 @@ impl CurveScheme {
             Self::BetaSpline { beta1, beta2, closed } => polynomial::beta_spline([*beta1, *beta2], *closed, count, faults),
             Self::FourPoint { tension, closed } => subdivision::four_point(*tension, *closed, count, faults),
             Self::Interpolation { vertical_scaling } => fractal::interpolation(vertical_scaling, count, None, faults),
+            Self::Bcifs { states, start } => own::bcifs(states, start, count, faults),
+            Self::Ifs { maps } => own::ifs(maps, count, faults),
             Self::AffineInterpolation { .. } => {
                 faults.add("/maps", "tensor.scheme", "affine maps belong to points in space; use vertical scaling in a product".into());
                 None
