@@ -11,11 +11,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use lacuna_exchange::document::Sought;
 use lacuna_fabrication::{Input, Job, JobKind, Params};
+use lacuna_kernel::attractor::Address;
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
-use crate::addresses::{self, AddressAnswer};
+use crate::addresses;
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::{documents, production};
@@ -24,8 +24,8 @@ pub use report::{CaseReport, Report, Row};
 
 /// Deepest folder in which cases are looked for.
 const DEEPEST: usize = 16;
-/// Time for one point of a case.
-const POINT_TIME: Duration = Duration::from_secs(60);
+/// Time for the points of a case.
+const POINTS_TIME: Duration = Duration::from_secs(60);
 
 /// Does every case below a folder whose path contains `filter`.
 ///
@@ -121,17 +121,18 @@ fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest) -> Vec<Row> {
         Ok(model) => model,
         Err(problem) => return vec![Row::failure("points", "a model", &told(&problem))],
     };
-    let row = |(address, expected): (&String, &manifest::ExpectedPoint)| {
-        let name = format!("point {address}");
-        let wanted = format!("{:?}", expected.value);
-        let Ok(at) = address.parse() else { return Row::failure(&name, "an address", address) };
-        match addresses::answer(&model, &Sought::At(at), POINT_TIME) {
-            Ok(AddressAnswer { at: Some(found), .. }) => compare::point_row(&name, expected, &found.point_mm),
-            Ok(_) => Row::failure(&name, &wanted, "no point"),
-            Err(problem) => Row::failure(&name, &wanted, &told(&problem)),
-        }
+    let name = |address: &String| format!("point {address}");
+    let parsed: Result<Vec<Address>, String> = manifest.point.keys().map(|text| text.parse().map_err(|_| text.clone())).collect();
+    let addresses = match parsed {
+        Ok(addresses) => addresses,
+        Err(text) => return vec![Row::failure(&name(&text), "an address", &text)],
     };
-    manifest.point.iter().map(row).collect()
+    match addresses::points(&model, &addresses, POINTS_TIME) {
+        Ok(found) => {
+            manifest.point.iter().zip(&found).map(|((text, expected), got)| compare::point_row(&name(text), expected, got)).collect()
+        }
+        Err(problem) => vec![Row::failure("points", "points at all addresses", &told(&problem))],
+    }
 }
 
 fn compare_refusal(refused: &Refused, result: Result<serde_json::Value, Problem>) -> Row {
