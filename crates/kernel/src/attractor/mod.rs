@@ -9,6 +9,7 @@ mod connected;
 mod cover;
 mod defect;
 mod early;
+mod invariant;
 mod near;
 mod needle;
 mod precision;
