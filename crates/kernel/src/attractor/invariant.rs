@@ -28,7 +28,7 @@ const STEPS: usize = 100;
 const MOST_RATIO: f64 = 0.95;
 
 /// Three orthonormal rows that span W: the first is constant.
-type Rows = [Vec<f64>; 3];
+pub(super) type Rows = [Vec<f64>; 3];
 
 /// The precision of every face state that has it.
 pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
@@ -156,7 +156,7 @@ fn orthonormal(more: [Vec<f64>; 2]) -> Option<Rows> {
 }
 
 /// The invariant subspace of the largest eigenvalues that holds the constant row.
-fn dominant(product: &SubdivisionOperator) -> Option<Rows> {
+pub(super) fn dominant(product: &SubdivisionOperator) -> Option<Rows> {
     let n = product.rows();
     // Any start that is in no special position.
     let start = |seed: f64| (0..n).map(|k| (seed * (k + 1) as f64).sin()).collect::<Vec<f64>>();

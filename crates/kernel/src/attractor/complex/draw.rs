@@ -3,9 +3,9 @@
 use super::address::{Origin, Part};
 use super::merge::Merged;
 use super::tally::{Loops, Pieces, Tally};
-use super::{CellComplex, NONE, Side};
-use crate::attractor::Attractor;
+use super::{CellComplex, NONE, Side, normals};
 use crate::attractor::cell::Point;
+use crate::attractor::{Attractor, TangentPlanes};
 use crate::tessellation::Tessellation;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,6 +16,8 @@ type Places = Vec<Vec<u32>>;
 
 /// What a shard draws. Places of middles of faces count from the first of the shard's.
 struct Drawn {
+    /// At the corners of the triangles, if asked for.
+    normals: Vec<[Point; 3]>,
     triangles: Vec<[u32; 3]>,
     nodes: Vec<u32>,
     middles: Vec<(Point, u32)>,
@@ -23,12 +25,12 @@ struct Drawn {
 
 impl Merged<'_> {
     /// The tessellation of all that was refined.
-    pub(super) fn draw(mut self, attractor: &Attractor) -> Tessellation {
+    pub(super) fn draw(mut self, attractor: &Attractor, tangents: Option<&TangentPlanes>) -> Tessellation {
         let wires: Vec<Vec<Side>> = (0..self.shards.len()).map(|shard| self.wires(shard)).collect();
         let (loops, pieces): (Vec<Loops>, Vec<Pieces>) = (0..self.shards.len())
             .into_par_iter()
             .map(|shard| {
-                let loops = Loops::of(&self, shard);
+                let loops = Loops::of(&self, shard, tangents.is_some());
                 let pieces = Pieces::of(&self, shard, &loops, &wires[shard]);
                 (loops, pieces)
             })
@@ -46,12 +48,15 @@ impl Merged<'_> {
                 let (piece, own): (u32, bool) = turns[shard][face];
                 own != turned[shard][piece as usize]
             };
-            self.fill(shard, &loops[shard], &flip, &places, &tessellation.vertices)
+            let bends = tangents.map_or_else(Vec::new, |tangents| self.bends(attractor, tangents, shard, &loops[shard]));
+            self.fill(shard, &loops[shard], &flip, &places, &tessellation.vertices, &bends)
         };
         let drawn: Vec<Drawn> = (0..self.shards.len()).into_par_iter().map(draw).collect();
         tessellation.triangles.reserve_exact(drawn.iter().map(|drawn| drawn.triangles.len()).sum());
         complex.triangle_nodes.reserve_exact(tessellation.triangles.capacity());
-        for Drawn { triangles, nodes, middles } in drawn {
+        let mut normals = Vec::new();
+        for Drawn { normals: own, triangles, nodes, middles } in drawn {
+            normals.extend(own);
             let (first, corners) = (tessellation.vertices.len() as u32, complex.vertices as u32);
             // Middles were numbered from the number of all other vertices on.
             let place = |vertex: u32| if vertex < corners { vertex } else { vertex - corners + first };
@@ -62,6 +67,7 @@ impl Merged<'_> {
                 complex.vertex_origins.push(Origin::Middle { node });
             }
         }
+        tessellation.normals = tangents.map(|_| normals::collect(&tessellation, &normals));
         for &side in wires.iter().flatten() {
             let ends: Vec<u32> = self.vertices_of(side.edge() as u32).map(|vertex| at(&places, self.vertices.find(vertex))).collect();
             if let [vertex] = *ends {
@@ -108,10 +114,19 @@ impl Merged<'_> {
         places
     }
 
-    fn fill(&self, shard: usize, loops: &Loops, flip: &dyn Fn(usize) -> bool, places: &Places, vertices: &[DVec3]) -> Drawn {
+    fn fill(
+        &self,
+        shard: usize,
+        loops: &Loops,
+        flip: &dyn Fn(usize) -> bool,
+        places: &Places,
+        vertices: &[DVec3],
+        bends: &[Point],
+    ) -> Drawn {
         let faces = &self.shards[shard].faces;
+        let count = 2 * faces.len();
         let mut drawn =
-            Drawn { triangles: Vec::with_capacity(2 * faces.len()), nodes: Vec::with_capacity(2 * faces.len()), middles: Vec::new() };
+            Drawn { normals: Vec::new(), triangles: Vec::with_capacity(count), nodes: Vec::with_capacity(count), middles: Vec::new() };
         let mut outline = Vec::new();
         for (index, face) in faces.iter().enumerate() {
             outline.clear();
@@ -121,10 +136,23 @@ impl Merged<'_> {
             }
             let node = self.node(shard + 1, face.node);
             let centre = (vertices.len() + drawn.middles.len()) as u32;
+            let before = drawn.triangles.len();
             if fill(&outline, centre, vertices, &mut drawn.triangles) {
                 drawn.middles.push((face.middle, node));
             }
             drawn.nodes.resize(drawn.triangles.len(), node);
+            if !bends.is_empty() {
+                // The normals of this face follow those of the faces before, and one middle each.
+                let range = loops.range(index);
+                let own = &bends[range.start + index..=range.end + index];
+                let turned = flip(index);
+                let normal = |vertex: u32| {
+                    let place = outline.iter().position(|&other| other == vertex);
+                    let place = place.map_or(outline.len(), |place| if turned { outline.len() - 1 - place } else { place });
+                    own[place].map(|x| if turned { -x } else { x })
+                };
+                drawn.normals.extend(drawn.triangles[before..].iter().map(|triangle| triangle.map(normal)));
+            }
         }
         drawn
     }

@@ -12,6 +12,7 @@
 mod address;
 mod draw;
 mod merge;
+mod normals;
 mod shard;
 mod step;
 mod tally;
@@ -19,7 +20,7 @@ mod tally;
 pub use address::{CellAddress, CellComplex, Step};
 
 use super::cell::Point;
-use super::{Attractor, RefineError};
+use super::{Attractor, RefineError, TangentPlanes};
 use crate::automaton::topology::{Conflict, Topology, TopologyError, Union, View};
 use crate::automaton::{Automaton, LeafPrimitive, StateId};
 use crate::budget::Budget;
@@ -87,6 +88,8 @@ struct Face {
     /// Where its sides begin.
     outline: u32,
     middle: Point,
+    /// Where the normals of its corners begin, and that of its middle follows.
+    normals: u32,
 }
 
 /// Where the complex begins, worked out once: the cells of every root's closure, glued.
@@ -103,6 +106,11 @@ pub(crate) struct Start {
 }
 
 impl Start {
+    /// Whether cells of a state are drawn as part of the complex.
+    pub(super) fn is_drawn(&self, state: StateId) -> bool {
+        self.drawn[state.index()]
+    }
+
     /// Glues roots along the given boundaries, makes the ends of collapsed edges one, and tabulates the topology's views.
     pub(super) fn new(
         topology: &mut Topology,
@@ -189,12 +197,18 @@ const TRUNK_LEAVES: usize = 64;
 const MOST_SHARDS: usize = 128;
 
 /// Refines the given roots, which have a B-rep, into one complex.
-pub(super) fn refine(attractor: &Attractor, roots: &[usize], tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, RefineError> {
+pub(super) fn refine(
+    attractor: &Attractor,
+    roots: &[usize],
+    tangents: Option<&TangentPlanes>,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Tessellation, RefineError> {
     let Some((topology, start)) = attractor.brep.as_ref().filter(|_| !roots.is_empty()) else { return Ok(Tessellation::default()) };
     // What gluing took for equal is part of the error.
     let share = (tolerance.mm() - attractor.seam_mm).max(0.0);
     let steps = Steps::new(attractor.automaton());
-    let context = Context::new(attractor, topology, &steps, budget, share);
+    let context = Context::new(attractor, topology, &steps, tangents, budget, share);
     let nothing = Store::default();
     let mut trunk = Shard::new(&context, &nothing);
     trunk.plant(start, roots, frontier(attractor, roots))?;
@@ -208,7 +222,7 @@ pub(super) fn refine(attractor: &Attractor, roots: &[usize], tolerance: Toleranc
     let shards: Vec<_> = pending.par_chunks(chunk).map(grow).collect();
     let shards = shards.into_iter().collect::<Result<Vec<_>, _>>()?;
     context.check()?;
-    let mut tessellation = Merged::new(topology, trunk, shards).draw(attractor);
+    let mut tessellation = Merged::new(topology, trunk, shards).draw(attractor, tangents);
     tessellation.deviation_mm += attractor.seam_mm;
     Ok(tessellation)
 }

@@ -2,10 +2,10 @@
 
 use super::address::Origin;
 use super::step::Steps;
-use super::{Attractor, Edge, Face, NONE, RefineError, Seen, Side, Start};
+use super::{Attractor, Edge, Face, NONE, RefineError, Seen, Side, Start, TangentPlanes};
 use crate::attractor::cell::{Cell, ControlPoint, Point};
-use crate::automaton::StateId;
 use crate::automaton::topology::{Source, Topology, View};
+use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::Budget;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,6 +16,7 @@ pub(super) struct Context<'a> {
     attractor: &'a Attractor,
     topology: &'a Arc<Topology>,
     steps: &'a Steps,
+    tangents: Option<&'a TangentPlanes>,
     budget: &'a Budget,
     tolerance_mm: f64,
     leaves: AtomicU64,
@@ -27,10 +28,11 @@ impl<'a> Context<'a> {
         attractor: &'a Attractor,
         topology: &'a Arc<Topology>,
         steps: &'a Steps,
+        tangents: Option<&'a TangentPlanes>,
         budget: &'a Budget,
         tolerance_mm: f64,
     ) -> Self {
-        Self { attractor, topology, steps, budget, tolerance_mm, leaves: AtomicU64::new(0), bytes: AtomicU64::new(0) }
+        Self { attractor, topology, steps, tangents, budget, tolerance_mm, leaves: AtomicU64::new(0), bytes: AtomicU64::new(0) }
     }
 
     /// Whether what is held fits the limits. Sums only grow: at the end the answer does not depend on the number of threads.
@@ -91,6 +93,8 @@ pub(super) struct Shard<'a> {
     faces: Vec<Face>,
     /// Sides of the faces, one face after the other.
     outlines: Vec<Side>,
+    /// At the corners of every face and in its middle, if asked for.
+    normals: Vec<Point>,
     /// Root edges: all their leaves are drawn.
     wires: Vec<u32>,
     /// In the trunk: the depth at which cells are left to shards, and these cells.
@@ -109,6 +113,7 @@ pub(super) struct Grown {
     pub(super) split_here: BTreeMap<u32, u32>,
     pub(super) faces: Vec<Face>,
     pub(super) outlines: Vec<Side>,
+    pub(super) normals: Vec<Point>,
     pub(super) wires: Vec<u32>,
     pub(super) leaves: u64,
     pub(super) deviation: f64,
@@ -123,6 +128,7 @@ impl<'a> Shard<'a> {
             split_here: BTreeMap::new(),
             faces: Vec::new(),
             outlines: Vec::new(),
+            normals: Vec::new(),
             wires: Vec::new(),
             frontier: None,
             pending: Vec::new(),
@@ -202,8 +208,8 @@ impl<'a> Shard<'a> {
     }
 
     pub(super) fn finish(self) -> Grown {
-        let Self { own, split_here, faces, outlines, wires, leaves, deviation, .. } = self;
-        Grown { own, split_here, faces, outlines, wires, leaves, deviation }
+        let Self { own, split_here, faces, outlines, normals, wires, leaves, deviation, .. } = self;
+        Grown { own, split_here, faces, outlines, normals, wires, leaves, deviation }
     }
 
     fn vertex(&mut self, point: Point, origin: Origin) -> u32 {
@@ -267,7 +273,13 @@ impl<'a> Shard<'a> {
     fn count(&mut self) {
         let Store { vertices, edges, pieces, nodes, .. } = &self.own;
         let (vertices, edges, faces) = (vertices.len(), edges.len(), self.faces.len());
-        let held = 36 * vertices + 32 * edges + 4 * pieces.len() + 8 * nodes.len() + 36 * faces + 4 * self.outlines.len();
+        let held = 36 * vertices
+            + 32 * edges
+            + 4 * pieces.len()
+            + 8 * nodes.len()
+            + 40 * faces
+            + 4 * self.outlines.len()
+            + 24 * self.normals.len();
         let drawn = 24 * (vertices + faces) + 28 * faces + 8 * edges;
         let bytes = 2 * (held + drawn) as u64;
         self.context.leaves.fetch_add(self.leaves - self.counted.0, Ordering::Relaxed);
@@ -300,7 +312,8 @@ impl<'a> Shard<'a> {
             if let Some(outline) = &own.outline {
                 let middle =
                     if own.middle.is_empty() { attractor.centre(cell, points) } else { self.place(points, &own.middle, cell.root) };
-                self.faces.push(Face { node, outline: self.outlines.len() as u32, middle });
+                self.faces.push(Face { node, outline: self.outlines.len() as u32, middle, normals: self.normals.len() as u32 });
+                self.bend(cell, points, &middle);
                 for &(position, backwards) in outline {
                     let Seen { id, view } = seen[position];
                     let side = Side::new(id, backwards != self.turned(id, view));
@@ -331,6 +344,16 @@ impl<'a> Shard<'a> {
         }
         self.spare[depth as usize] = frame;
         Ok(())
+    }
+
+    /// Notes the normals of a leaf face.
+    fn bend(&mut self, cell: &Cell, points: &[ControlPoint], middle: &Point) {
+        let (attractor, Some(tangents)) = (self.context.attractor, self.context.tangents) else { return };
+        let rational = attractor.roots()[cell.root as usize].rational;
+        let LeafPrimitive::Polygon(corners) = &attractor.automaton().state(cell.state).leaf else { return };
+        let corners: Vec<Point> = corners.iter().map(|corner| attractor.barycentric(points, corner, rational)).collect();
+        tangents.normals(cell.state, points, rational, &corners, &mut self.normals);
+        self.normals.push(tangents.middle_normal(cell.state, points, rational, middle));
     }
 
     /// Whether an edge seen by a view runs the other way.

@@ -11,24 +11,32 @@ pub(super) struct Loops {
     pub(super) sides: Vec<Side>,
     /// Where each side starts.
     pub(super) corners: Vec<u32>,
+    /// Which corner of its face that is, or [`NONE`] between corners; empty unless asked for.
+    pub(super) own: Vec<u32>,
 }
 
 impl Loops {
-    pub(super) fn of(merged: &Merged, shard: usize) -> Self {
+    pub(super) fn of(merged: &Merged, shard: usize, corners: bool) -> Self {
         let grown = &merged.shards[shard];
         let mut loops = Self {
             starts: Vec::with_capacity(grown.faces.len() + 1),
             sides: Vec::with_capacity(grown.outlines.len()),
             corners: Vec::with_capacity(grown.outlines.len()),
+            own: Vec::new(),
         };
         loops.starts.push(0);
         for (index, face) in grown.faces.iter().enumerate() {
             let end = grown.faces.get(index + 1).map_or(grown.outlines.len(), |next| next.outline as usize);
-            for &side in &grown.outlines[face.outline as usize..end] {
+            for (corner, &side) in grown.outlines[face.outline as usize..end].iter().enumerate() {
+                let before = loops.sides.len();
                 merged.leaf_edges_in(shard + 1, side, &mut |side, corner| {
                     loops.sides.push(side);
                     loops.corners.push(corner);
                 });
+                if corners {
+                    let own = |place: usize| if place == before { corner as u32 } else { NONE };
+                    loops.own.extend((before..loops.sides.len()).map(own));
+                }
             }
             loops.starts.push(loops.sides.len() as u32);
         }
@@ -39,7 +47,7 @@ impl Loops {
         self.starts.len() - 1
     }
 
-    fn range(&self, face: usize) -> std::ops::Range<usize> {
+    pub(super) fn range(&self, face: usize) -> std::ops::Range<usize> {
         self.starts[face] as usize..self.starts[face + 1] as usize
     }
 
