@@ -385,6 +385,31 @@ impl Attractor {
         }
     }
 
+    /// The child of a face as [`Attractor::child_cell`] gives it, and its error. Where the bound of second order is within
+    /// the tolerance, the ball is not worked out, and left without bounds.
+    #[inline]
+    pub(super) fn child_with_error(&self, cell: &Cell, index: usize, points: &[ControlPoint], tolerance_mm: f64) -> (Cell, f64) {
+        let state = self.automaton().state(cell.state).transitions[index].to;
+        let smooth = match (self.precision(state), &self.automaton().state(state).leaf) {
+            (Some(precision), LeafPrimitive::Polygon(_)) if !self.roots()[cell.root as usize].rational => {
+                polygon_error(precision, self.bound(state).margin(), points)
+            }
+            _ => f64::INFINITY,
+        };
+        if smooth <= tolerance_mm {
+            let ball = Ball { centre: [0.0; 3], radius: f64::INFINITY };
+            return (Cell { state, root: cell.root, ball, stretch: 0.0 }, smooth);
+        }
+        let child = self.child_cell(cell, index, points);
+        let error = if smooth.is_finite() { smooth.min(2.0 * child.ball.radius) } else { self.leaf_error(&child, points) };
+        (child, error)
+    }
+
+    /// The centre of a cell's ball.
+    pub(super) fn centre(&self, cell: &Cell, points: &[ControlPoint]) -> Point {
+        self.ball(cell.state, points, self.roots()[cell.root as usize].rational, cell.stretch).centre
+    }
+
     /// Emits what stands for a leaf cell.
     #[inline]
     pub(crate) fn emit(&self, cell: &Cell, points: &[ControlPoint], sink: &mut impl FnMut(Site)) {

@@ -9,11 +9,13 @@ mod connected;
 mod cover;
 mod defect;
 mod early;
+mod invariant;
 mod near;
 mod needle;
 mod precision;
 mod refine;
 pub(crate) mod sites;
+mod tangent;
 mod walk;
 
 use crate::automaton::topology::{Topology, TopologyError};
@@ -25,8 +27,9 @@ pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
 pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use precision::LinearPrecision;
-pub use refine::{RefineError, Streamed, count_cells, refine, stream};
+pub use refine::{RefineError, Streamed, count_cells, refine, refine_with_normals, stream};
 use std::sync::Arc;
+pub use tangent::{NoTangentPlane, TangentPlanes};
 
 /// Where a shape begins: a state and its control points.
 #[derive(Clone, Debug, PartialEq)]

@@ -76,10 +76,10 @@ const MOST_UNKNOWNS: usize = 256;
 /// Multiplications of one elimination at most.
 const MOST_WORK: f64 = 4e7;
 /// Equations may miss by this much, relative to functionals of size 1.
-const MISS: f64 = 1e-10;
+pub(super) const MISS: f64 = 1e-10;
 /// Lengths of a curve's domain and areas of a face's that rounding may hide, as a share of the whole. A hole of that
 /// area is at most its root wide, which is charged.
-const SAME: f64 = 1e-12;
+pub(super) const SAME: f64 = 1e-12;
 /// Ratios of parameter maps at most.
 const MOST_RATIO: f64 = 0.99;
 /// Entries by which hulls may miss their children's: operators are rounded to fractions.
@@ -96,9 +96,11 @@ type Solution = Vec<Vec<f64>>;
 /// The precision of every state that has it: curves with proven ends, and faces with corners.
 pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
     let states = automaton.states();
-    let mut result = claimed(automaton, bounds);
+    let found = super::invariant::precisions(automaton, bounds);
+    let mut result: Vec<_> = claimed(automaton, bounds).into_iter().zip(found).map(|(claimed, found)| claimed.or(found)).collect();
     for component in components(automaton) {
-        if component.iter().all(|&index| result[index].is_some()) {
+        // What holds for all descendants of a state holds for none that has others.
+        if component.iter().any(|&index| result[index].is_some()) {
             continue;
         }
         // A product has what its factors have.
@@ -313,7 +315,7 @@ fn solve(automaton: &Automaton, component: &[usize], ratio: f64) -> Vec<Solution
 }
 
 /// A basis of the vectors that all rows annihilate, by elimination with full pivoting; entries are at most about 1.
-fn null_space(mut rows: Vec<Vec<f64>>, unknowns: usize) -> Vec<Vec<f64>> {
+pub(super) fn null_space(mut rows: Vec<Vec<f64>>, unknowns: usize) -> Vec<Vec<f64>> {
     let size = rows.iter().flatten().fold(0.0_f64, |a, x| a.max(x.abs()));
     let mut order: Vec<usize> = (0..unknowns).collect();
     let mut rank = 0;
@@ -351,7 +353,7 @@ fn null_space(mut rows: Vec<Vec<f64>>, unknowns: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn evaluate(parameters: &[[f64; 2]], point: &[f64]) -> [f64; 2] {
+pub(super) fn evaluate(parameters: &[[f64; 2]], point: &[f64]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for (parameter, weight) in parameters.iter().zip(point) {
         sum[0] += weight * parameter[0];
@@ -361,7 +363,7 @@ fn evaluate(parameters: &[[f64; 2]], point: &[f64]) -> [f64; 2] {
 }
 
 /// Corners of the parameter domain that a state's leaf primitive states, in barycentric coordinates.
-fn corners(leaf: &LeafPrimitive) -> Option<Vec<Vec<f64>>> {
+pub(super) fn corners(leaf: &LeafPrimitive) -> Option<Vec<Vec<f64>>> {
     match leaf {
         LeafPrimitive::Chord(ends) => Some(vec![ends.start.clone(), ends.end.clone()]),
         LeafPrimitive::Polygon(corners) => Some(corners.clone()),
@@ -434,7 +436,7 @@ fn area(polygon: &[[f64; 2]]) -> f64 {
 /// Whether the children's domains lie in the state's and, for faces, cover it: then the domains are invariant under
 /// the parameter maps, and by uniqueness of the invariant sets they are G A. For curves connectedness covers: A is a curve
 /// between its ends (see `automaton::connection`).
-fn fills(domain: &[[f64; 2]], children: &[Vec<[f64; 2]>]) -> bool {
+pub(super) fn fills(domain: &[[f64; 2]], children: &[Vec<[f64; 2]>]) -> bool {
     if domain.len() == 2 {
         let (low, high) = (domain[0][0].min(domain[1][0]), domain[0][0].max(domain[1][0]));
         let slack = SAME * (high - low);
@@ -490,7 +492,7 @@ fn overlap(subject: &[[f64; 2]], clip: &[[f64; 2]]) -> f64 {
 }
 
 /// Parameters in the state's own unit, with the fit; `None` if the domain is too thin to measure in.
-fn scaled(raw: &[[f64; 2]], domain: &[[f64; 2]], residual: f64, margin: f64) -> Option<LinearPrecision> {
+pub(super) fn scaled(raw: &[[f64; 2]], domain: &[[f64; 2]], residual: f64, margin: f64) -> Option<LinearPrecision> {
     let origin = domain[0];
     let to = |corner: &[f64; 2]| [corner[0] - origin[0], corner[1] - origin[1]];
     let (first, last) = (to(&domain[1]), to(&domain[domain.len() - 1]));

@@ -2,7 +2,7 @@
 
 use super::cell::{Point, Site, distance_squared};
 use super::walk::{Collector, Extent, walk};
-use super::{Attractor, complex};
+use super::{Attractor, TangentPlanes, complex};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::tessellation::Tessellation;
@@ -104,13 +104,38 @@ impl RefineError {
 /// # Errors
 /// [`RefineError`] when a limit is hit or somebody stops it.
 pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, RefineError> {
+    refine_whole(attractor, None, tolerance, budget)
+}
+
+/// As [`refine`], with the normals of the limit surface at the drawn vertices ([`Tessellation::normals`]).
+///
+/// # Errors
+/// As [`refine`].
+pub fn refine_with_normals(
+    attractor: &Attractor,
+    tangents: &TangentPlanes,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Tessellation, RefineError> {
+    refine_whole(attractor, Some(tangents), tolerance, budget)
+}
+
+fn refine_whole(
+    attractor: &Attractor,
+    tangents: Option<&TangentPlanes>,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Tessellation, RefineError> {
     let (with_brep, without): (Vec<usize>, Vec<usize>) = (0..attractor.roots().len()).partition(|&root| attractor.has_brep(root));
-    let mut whole = Part { tessellation: complex::refine(attractor, &with_brep, tolerance, budget)?, ..Part::default() };
+    let mut whole = Part { tessellation: complex::refine(attractor, &with_brep, tangents, tolerance, budget)?, ..Part::default() };
     let before = Extent { leaf_cells: whole.tessellation.leaf_cells, deviation_mm: whole.tessellation.deviation_mm };
     let extent = walk(attractor, &without, before, tolerance, budget, &mut |part: Part| -> Result<(), RefineError> {
         whole.append(part);
         whole.check_memory(tolerance, budget)
     })?;
+    // Triangles drawn cell by cell have none.
+    let triangles = whole.tessellation.triangles.len();
+    whole.tessellation.normals = whole.tessellation.normals.take().filter(|normals| normals.triangles.len() == triangles);
     whole.tessellation.leaf_cells = extent.leaf_cells;
     whole.tessellation.deviation_mm = extent.deviation_mm + rounding_mm(largest_coordinate(&whole.tessellation.vertices));
     Ok(whole.tessellation)

@@ -1,5 +1,6 @@
 //! Where every vertex, edge and face of an evaluation comes from.
 
+use super::merge::Numbers;
 use crate::automaton::StateId;
 use crate::automaton::topology::Topology;
 use std::fmt;
@@ -50,6 +51,14 @@ pub(super) enum Origin {
     Middle { node: u32 },
 }
 
+/// What one part of the evaluation made: its nodes (the parent, or `NONE`, and the child or root) and where its edges come
+/// from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Part {
+    pub(super) nodes: Vec<(u32, u32)>,
+    pub(super) edges: Vec<Origin>,
+}
+
 /// The cell complex behind a tessellation: counts, and the address of every vertex, edge and face.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CellComplex {
@@ -70,9 +79,11 @@ pub struct CellComplex {
     /// The B-rep of the states, and the state of every root.
     pub(super) topology: Arc<Topology>,
     pub(super) root_states: Vec<StateId>,
-    pub(super) nodes: Vec<(u32, u32)>,
     pub(super) vertex_origins: Vec<Origin>,
-    pub(super) edge_origins: Vec<Origin>,
+    /// Nodes and edges, part by part.
+    pub(super) parts: Vec<Part>,
+    pub(super) node_numbers: Numbers,
+    pub(super) edge_numbers: Numbers,
     /// The node of every triangle.
     pub(super) triangle_nodes: Vec<u32>,
     /// The edge of every segment.
@@ -102,7 +113,7 @@ impl CellComplex {
     /// The address of the edge that a segment of the tessellation stands for.
     #[must_use]
     pub fn segment_address(&self, segment: usize) -> Option<CellAddress> {
-        self.origin_address(self.edge_origins[*self.segment_edges.get(segment)? as usize])
+        self.origin_address(self.edge_origin(*self.segment_edges.get(segment)?))
     }
 
     /// The address of the face that a triangle of the tessellation belongs to.
@@ -111,12 +122,22 @@ impl CellComplex {
         Some(self.node_address(*self.triangle_nodes.get(triangle)?))
     }
 
+    fn node(&self, node: u32) -> (u32, u32) {
+        let (part, index) = self.node_numbers.find(node);
+        self.parts[part].nodes[index]
+    }
+
+    fn edge_origin(&self, edge: u32) -> Origin {
+        let (part, index) = self.edge_numbers.find(edge);
+        self.parts[part].edges[index]
+    }
+
     fn node_address(&self, node: u32) -> CellAddress {
         let mut steps = Vec::new();
-        let mut current = self.nodes[node as usize];
+        let mut current = self.node(node);
         while current.0 != super::NONE {
             steps.push(Step::Child(current.1 as usize));
-            current = self.nodes[current.0 as usize];
+            current = self.node(current.0);
         }
         steps.reverse();
         CellAddress { root: current.1 as usize, steps }
@@ -129,7 +150,7 @@ impl CellComplex {
         let mut current = origin;
         while let Origin::Edge { edge, piece } = current {
             pieces.push(piece as usize);
-            current = self.edge_origins[edge as usize];
+            current = self.edge_origin(edge);
         }
         let boundary = |path: &[usize]| path.iter().map(|&index| Step::Boundary(index)).collect::<Vec<_>>();
         let (mut address, mut state) = match current {
