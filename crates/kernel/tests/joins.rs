@@ -40,7 +40,11 @@ fn group(shapes: Vec<Shape>, joins: Vec<Join>) -> Shape {
 }
 
 fn assert_only(findings: &[Finding], code: &str, pointer: &str) {
-    assert_eq!(findings.iter().map(|finding| (finding.code, finding.pointer.as_str())).collect::<Vec<_>>(), [(code, pointer)], "{findings:?}");
+    assert_eq!(
+        findings.iter().map(|finding| (finding.code, finding.pointer.as_str())).collect::<Vec<_>>(),
+        [(code, pointer)],
+        "{findings:?}"
+    );
 }
 
 /// The uniform B-spline of degree 2 or 3 with these control points, at t in [0, number of spans].
@@ -148,8 +152,7 @@ fn part_of_a_border_is_joined_and_the_rest_stays_open() {
         // The cage's border goes on at both ends; its three middle spans are the surface's.
         let border: Vec<DVec3> = (0..6).map(|k| (points[1][k] + 4.0 * points[2][k] + points[3][k]) / 6.0).collect();
         let cage = sheet(&border, 2, DVec3::new(6.0, 0.0, 0.0));
-        let points: Vec<Vec<DVec3>> =
-            points.into_iter().map(|row| if reversed { row.into_iter().rev().collect() } else { row }).collect();
+        let points: Vec<Vec<DVec3>> = points.into_iter().map(|row| if reversed { row.into_iter().rev().collect() } else { row }).collect();
         let shape = group(vec![uniform(3, &points), cage], vec![join([vertices(1, [1, 2, 3, 4]), side(0, 0, true)])]);
         let tessellation = evaluated(&lower(shape).attractor, 1.0);
         assert_eq!(agreed(&tessellation), (1, 1, 1));
@@ -169,7 +172,8 @@ fn knots_that_are_not_uniform_are_joined_if_they_draw_the_same_spans() {
     let clamped = |list: &[DVec3]| vec![list.iter().map(|p| *p - DVec3::X * 9.0).collect::<Vec<_>>(), list.to_vec()];
     let linear = || vec![0.0, 0.0, 1.0, 1.0];
     let shape = spline_surface([1, 3], [linear(), vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]], &clamped(&bezier));
-    let joined = |shape: Shape, path: &[u32]| group(vec![cage.clone(), shape], vec![join([vertices(0, path.iter().copied()), side(1, 0, true)])]);
+    let joined =
+        |shape: Shape, path: &[u32]| group(vec![cage.clone(), shape], vec![join([vertices(0, path.iter().copied()), side(1, 0, true)])]);
     let tessellation = evaluated(&lower(joined(shape, &[1, 2])).attractor, 1.0);
     assert_eq!(agreed(&tessellation), (1, 1, 1));
     // The same points on uneven knots are another curve, and the place is told.
@@ -182,12 +186,14 @@ fn knots_that_are_not_uniform_are_joined_if_they_draw_the_same_spans() {
     let quadratic = spline_surface([1, 2], [linear(), vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]], &clamped(&raised));
     let other: Vec<DVec3> = {
         let cubic = [raised[0], (raised[0] + 2.0 * raised[1]) / 3.0, (2.0 * raised[1] + raised[2]) / 3.0, raised[2]];
-        vec![6.0 * cubic[0] - 7.0 * cubic[1] + 2.0 * cubic[2], 2.0 * cubic[1] - cubic[2], 2.0 * cubic[2] - cubic[1], 6.0 * cubic[3] - 7.0 * cubic[2] + 2.0 * cubic[1]]
+        vec![
+            6.0 * cubic[0] - 7.0 * cubic[1] + 2.0 * cubic[2],
+            2.0 * cubic[1] - cubic[2],
+            2.0 * cubic[2] - cubic[1],
+            6.0 * cubic[3] - 7.0 * cubic[2] + 2.0 * cubic[1],
+        ]
     };
-    let shape = group(
-        vec![sheet(&other, 1, DVec3::new(7.0, 0.0, 0.0)), quadratic],
-        vec![join([vertices(0, [1, 2]), side(1, 0, true)])],
-    );
+    let shape = group(vec![sheet(&other, 1, DVec3::new(7.0, 0.0, 0.0)), quadratic], vec![join([vertices(0, [1, 2]), side(1, 0, true)])]);
     assert_only(&refused(shape), "join.kind", "/joins/0");
 }
 
@@ -228,7 +234,9 @@ fn beside(spans: usize, place: impl Fn(f64, f64) -> [DVec3; 2]) -> [Vec<Vec<DVec
     let rows = |count: usize, first: f64| move |x: f64| (0..count).map(|k| (x, first + k as f64)).collect::<Vec<_>>();
     let cubic = [-3.0, -2.0, -1.0, 0.0, 1.0].map(rows(spans + 3, -1.0));
     let quadratic = [0.5, 1.5, 2.5].map(rows(spans + 2, -0.5));
-    let net = |columns: Vec<Vec<(f64, f64)>>, which: usize| columns.iter().map(|column| column.iter().map(|&(x, y)| place(x, y)[which]).collect()).collect();
+    let net = |columns: Vec<Vec<(f64, f64)>>, which: usize| {
+        columns.iter().map(|column| column.iter().map(|&(x, y)| place(x, y)[which]).collect()).collect()
+    };
     [net(cubic.to_vec(), 0), net(quadratic.to_vec(), 1)]
 }
 
@@ -236,7 +244,9 @@ fn beside(spans: usize, place: impl Fn(f64, f64) -> [DVec3; 2]) -> [Vec<Vec<DVec
 fn a_strip_between_parts_of_a_biquadratic_is_the_biquadratic() {
     // z = f(x, y) with a polynomial of degree 2 in each; the control points are blossoms: f less a sixth and an eighth of
     // its second derivatives' sum, per direction.
-    let f = |x: [f64; 3], y: [f64; 3]| 0.4 + 0.7 * x[1] - 0.3 * y[1] + 0.2 * x[2] - 0.5 * y[2] + 0.6 * x[1] * y[1] - 0.15 * x[2] * y[1] + 0.1 * x[2] * y[2];
+    let f = |x: [f64; 3], y: [f64; 3]| {
+        0.4 + 0.7 * x[1] - 0.3 * y[1] + 0.2 * x[2] - 0.5 * y[2] + 0.6 * x[1] * y[1] - 0.15 * x[2] * y[1] + 0.1 * x[2] * y[2]
+    };
     let powers = |t: f64, lowered: f64| [1.0, t, t * t - lowered];
     let place = |x: f64, y: f64| [1.0 / 3.0, 0.25].map(|lowered| DVec3::new(x, y, f(powers(x, lowered), powers(y, lowered))));
     for turned in [false, true] {

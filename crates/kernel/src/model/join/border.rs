@@ -56,10 +56,15 @@ pub(super) fn chain(border: &Border, parts: &[Borders], place: &str, draft: &mut
             let words = format!("side {} of part {part}", side_name(direction, last));
             (words, "/side", side(*counts, roots, direction, last))
         }
-        (BorderPath::Vertices(list), Borders::Edges(edges)) => (format!("the border of part {part}"), "/vertices", along_edges(list, edges)),
-        (BorderPath::Vertices(list), Borders::Vertices(spans)) => (format!("the border of part {part}"), "/vertices", along_vertices(list, spans)),
+        (BorderPath::Vertices(list), Borders::Edges(edges)) => {
+            (format!("the border of part {part}"), "/vertices", along_edges(list, edges))
+        }
+        (BorderPath::Vertices(list), Borders::Vertices(spans)) => {
+            (format!("the border of part {part}"), "/vertices", along_vertices(list, spans))
+        }
         (BorderPath::Vertices(_), Borders::Subdivided) => {
-            let message = "the mesh has so many kinds of patches that it is subdivided before, so its edges are no spans; join smaller meshes";
+            let message =
+                "the mesh has so many kinds of patches that it is subdivided before, so its edges are no spans; join smaller meshes";
             (String::new(), "/vertices", Err((String::new(), message.into())))
         }
         (BorderPath::Boundaries(list), &Borders::Cells { first, count }) => {

@@ -77,7 +77,8 @@ impl Limits<'_> {
         }
         // The child at every corner, and which of its corners that is.
         let at = own.each_ref().map(|corner| {
-            let find = |(child, (_, corners)): (usize, &(_, [Weights; 4]))| Some((child, corners.iter().position(|own| same(own, corner))?));
+            let find =
+                |(child, (_, corners)): (usize, &(_, [Weights; 4]))| Some((child, corners.iter().position(|own| same(own, corner))?));
             placed.iter().enumerate().find_map(find)
         });
         let half = 1 << (depth - 1);

@@ -118,7 +118,8 @@ fn shapes(chains: &[Chain; 2], place: &str, allowed: f64, limits: Limits<'_>, dr
         };
         let (gap, k) = shape.gap();
         if gap > allowed {
-            let message = format!("{}: span {} begins {gap:.3e} mm from where span {k} ends; list spans that follow each other", chain.words, k + 1);
+            let message =
+                format!("{}: span {} begins {gap:.3e} mm from where span {k} ends; list spans that follow each other", chain.words, k + 1);
             draft.error(place, "join.border", message);
             return None;
         }

@@ -93,7 +93,13 @@ fn known_states() -> Vec<BcifsState> {
         ("quadratic edge", selection(9, &edge(width, height, across, &|a, b| place(i + a, k + b))))
     });
     vec![
-        state("cubic edge", CellKind::Edge, 12, CUBIC.iter().map(cubic_edge).collect(), [0, 3].map(|k| ("cubic vertex", range(12, k, 9))).into()),
+        state(
+            "cubic edge",
+            CellKind::Edge,
+            12,
+            CUBIC.iter().map(cubic_edge).collect(),
+            [0, 3].map(|k| ("cubic vertex", range(12, k, 9))).into(),
+        ),
         state("cubic vertex", CellKind::Vertex, 9, vec![("cubic vertex", given(&kronecker(&cubic_end, &cubic_end)))], Vec::new()),
         state("quadratic patch", CellKind::Face, 9, faces("quadratic patch"), patch_edges.into()),
         state(
@@ -161,8 +167,10 @@ fn stated() -> Bcifs {
     let mut whole = faces(WHOLE);
     whole.push(("strip", given(&raised())));
     states.push(state(WHOLE, CellKind::Face, 9, whole, Vec::new()));
-    let incidence = |state: &str, boundary: usize, children: &[(usize, usize)]| Incidence { state: state.into(), boundary, children: children.into() };
-    let adjacency = |(state, between): (&str, [(usize, usize); 2])| Adjacency { state: state.into(), between, reversed: false, permutation: None };
+    let incidence =
+        |state: &str, boundary: usize, children: &[(usize, usize)]| Incidence { state: state.into(), boundary, children: children.into() };
+    let adjacency =
+        |(state, between): (&str, [(usize, usize); 2])| Adjacency { state: state.into(), between, reversed: false, permutation: None };
     let side = |path: [usize; 2]| Side { path: path.into(), boundary: Vec::new() };
     Bcifs {
         states,
@@ -223,7 +231,8 @@ pub(super) fn lower(chains: &[Chain; 2], limits: Limits<'_>, allowed: f64, place
         (3, 2) => (&own, &other),
         (2, 3) => (&other, &own),
         (degree, _) => {
-            let message = format!("both surfaces are of degree {degree} beside the border: a strip joins a bicubic and a biquadratic surface");
+            let message =
+                format!("both surfaces are of degree {degree} beside the border: a strip joins a bicubic and a biquadratic surface");
             draft.error(place, "join.strip-degrees", message);
             return None;
         }
