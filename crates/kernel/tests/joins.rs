@@ -266,3 +266,122 @@ fn a_strip_between_parts_of_a_biquadratic_is_the_biquadratic() {
         assert!(worst < 2e-14, "{worst:e}");
     }
 }
+
+/// The angle between two directions, up to sign.
+fn angle(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b).abs())
+}
+
+/// First derivatives of a bicubic or biquadratic uniform spline patch at (u, v) of its first span, from its net.
+fn tangents(degree: usize, net: &[Vec<DVec3>], u: f64, v: f64) -> [DVec3; 2] {
+    let weights = |t: f64, derived: bool| -> Vec<f64> {
+        let s = 1.0 - t;
+        match (degree, derived) {
+            (2, false) => vec![s * s / 2.0, (1.0 + 2.0 * t * s) / 2.0, t * t / 2.0],
+            (2, true) => vec![-s, s - t, t],
+            (_, false) => {
+                [s * s * s, 3.0 * t * t * t - 6.0 * t * t + 4.0, 3.0 * s * s * s - 6.0 * s * s + 4.0, t * t * t].map(|x| x / 6.0).to_vec()
+            }
+            (_, true) => [-s * s, 3.0 * t * t - 4.0 * t, -3.0 * s * s + 4.0 * s, t * t].map(|x| x / 2.0).to_vec(),
+        }
+    };
+    [(true, false), (false, true)].map(|(du, dv)| {
+        let (a, b) = (weights(u, du), weights(v, dv));
+        (0..=degree).flat_map(|i| (0..=degree).map(move |k| (i, k))).map(|(i, k)| a[i] * b[k] * net[i][k]).sum()
+    })
+}
+
+#[test]
+fn a_strip_meets_both_surfaces_with_their_tangent_planes() {
+    let mut random = Random(2014);
+    let mut jumps = [0.0_f64; 2];
+    for _ in 0..20 {
+        // Nets that have nothing to do with each other.
+        let mut bumpy = |columns: usize, rows: usize, x: f64| -> Vec<Vec<DVec3>> {
+            let mut point = |i: usize, k: usize| {
+                DVec3::new(x + i as f64, k as f64, 0.0) + 0.3 * random.points(1)[0] / 9.0 + DVec3::Z * random.between(-1.0, 1.0)
+            };
+            (0..columns).map(|i| (0..rows).map(|k| point(i, k)).collect()).collect()
+        };
+        let (cubic, quadratic) = (bumpy(4, 4, -3.0), bumpy(3, 3, 1.5));
+        let shape = group(vec![uniform(3, &cubic), uniform(2, &quadratic)], vec![strip([side(0, 0, true), side(1, 0, false)])]);
+        let attractor = lower(shape).attractor;
+        let automaton = attractor.automaton();
+        let root = &attractor.roots()[2];
+        assert_eq!((automaton.state(root.state).name.as_str(), attractor.roots().len()), ("strip", 3));
+        for _ in 0..20 {
+            // Down a random way along each edge; the rows of the edge say where it ends.
+            for right in [false, true] {
+                let (mut state, mut points) = (root.state, root.points.clone());
+                let (mut low, mut width) = (0.0, 1.0);
+                for _ in 0..22 {
+                    let upper = random.below(2);
+                    let child = &automaton.state(state).transitions[2 * upper + usize::from(right)];
+                    let image = |j: usize| -> [f64; 4] {
+                        let terms = points.iter().zip(child.operator.column(j));
+                        terms.fold([0.0; 4], |sum, (p, w)| std::array::from_fn(|axis| sum[axis] + w * p[axis]))
+                    };
+                    points = (0..child.operator.columns()).map(image).collect();
+                    state = child.to;
+                    width /= 2.0;
+                    low += width * upper as f64;
+                }
+                // Ends of the cell's sides, from the limits of its corners.
+                let boundaries = &automaton.state(state).boundaries;
+                let corner = |boundary: usize, end: usize| -> DVec3 {
+                    let edge = &boundaries[boundary];
+                    let vertex = &automaton.state(edge.state).boundaries[end];
+                    let weights = edge.incidence.apply(vertex.incidence.column(0));
+                    let sum = |axis: usize| points.iter().zip(&weights).map(|(p, w)| w * p[axis]).sum::<f64>();
+                    DVec3::new(sum(0), sum(1), sum(2))
+                };
+                // left, bottom, right, top
+                let (near, along, across) =
+                    if right { (corner(2, 0), corner(2, 1), corner(1, 0)) } else { (corner(0, 0), corner(0, 1), corner(1, 1)) };
+                let normal = (along - near).cross(across - near);
+                let (degree, net, u) = if right { (2, &quadratic, 0.0) } else { (3, &cubic, 1.0) };
+                let [du, dv] = tangents(degree, net, u, low + width / 2.0);
+                let jump = angle(normal, du.cross(dv));
+                jumps[usize::from(right)] = jumps[usize::from(right)].max(jump);
+            }
+        }
+    }
+    // Chords over 2^-22 turn by the curvature times that.
+    println!("largest angles of normals: cubic side {:e}, quadratic side {:e}", jumps[0], jumps[1]);
+    assert!(jumps.iter().all(|&jump| jump < 1e-4), "{jumps:?}");
+}
+
+#[test]
+fn strips_close_around_tubes_of_meshes_and_splines() {
+    let lower_rings = rings(&[(9.0, 0.0), (9.5, 4.0), (10.0, 8.0)], 0.0);
+    for (turn, start, backwards) in [(0.0, 0, false), (0.3, 2, true)] {
+        let mut upper = rings(&[(9.0, 14.0), (8.0, 18.0), (8.5, 22.0)], turn);
+        for ring in &mut upper {
+            ring.rotate_left(start);
+            if backwards {
+                ring.reverse();
+            }
+        }
+        let around = |part: usize, ring: u32| vertices(part, (0..8).chain([0]).map(|k| 8 * ring + k));
+        let primal = tube(Scheme::CatmullClark, &lower_rings, false, backwards);
+        let dual = tube(Scheme::DooSabin, &upper, false, false);
+        let spline = uniform(2, &wrapped(&upper, 2));
+        for (shapes, borders) in [
+            (vec![primal.clone(), dual.clone()], [around(0, 2), around(1, 0)]),
+            (vec![primal.clone(), spline], [around(0, 2), side(1, 0, false)]),
+            (
+                vec![
+                    uniform(3, &wrapped(&lower_rings[..], 3).iter().chain([&wrapped(&lower_rings, 3)[2]]).cloned().collect::<Vec<_>>()),
+                    dual,
+                ],
+                [side(0, 0, true), around(1, 0)],
+            ),
+        ] {
+            let lowered = lower(group(shapes, vec![strip(borders)]));
+            for tolerance in [4.0, 2.0] {
+                let tessellation = evaluated(&lowered.attractor, tolerance);
+                assert_eq!(agreed(&tessellation), (0, 2, 1), "an annulus");
+            }
+        }
+    }
+}
