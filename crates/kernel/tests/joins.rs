@@ -256,7 +256,7 @@ fn a_strip_between_parts_of_a_biquadratic_is_the_biquadratic() {
         }
         let shape = group(vec![uniform(2, &quadratic), uniform(3, &cubic)], vec![strip([side(1, 0, true), side(0, 0, false)])]);
         let lowered = lower(shape);
-        assert!(lowered.constraint_residual == 0.0, "{:e}", lowered.constraint_residual);
+        assert!(lowered.constraint_residual < 1e-15, "{:e}", lowered.constraint_residual);
         let tessellation = evaluated(&lowered.attractor, 0.02);
         assert_eq!(agreed(&tessellation), (1, 1, 1));
         let within = tessellation.vertices.iter().filter(|p| p.x > 1e-9 && p.x < 1.0 - 1e-9).count();

@@ -204,7 +204,54 @@ fn solved() -> Result<Bcifs, String> {
     // What was needed to find the operators is no part of the shape.
     model.relations.clear();
     model.states.retain(|state| state.name != WHOLE);
+    reduce(&mut model);
     Ok(model)
+}
+
+/// Edges and vertices that depend on several columns of control points draw curves of one column, and points: they are
+/// replaced by these, so that surfaces of any kind can share them.
+fn reduce(model: &mut Bcifs) {
+    let cubic = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
+    let (quadratic, none) = ([0.5; 2], [0.0]);
+    let columns = |weights: &[f64], count: usize| -> Rows {
+        let row = |k: usize, weight: f64| (0..count).map(|j| if j == k { weight } else { 0.0 }).collect();
+        (0..count).flat_map(|k| weights.iter().map(move |&weight| row(k, weight))).collect()
+    };
+    let column = |entries: &[f64]| -> Rows { entries.iter().map(|&entry| vec![entry]).collect() };
+    let product = |weights: &[f64]| column(&weights.iter().flat_map(|a| weights.iter().map(move |b| a * b)).collect::<Vec<_>>());
+    let changes = BTreeMap::from([
+        ("cubic edge", columns(&cubic, 4)),
+        ("cubic vertex", product(&cubic)),
+        ("quadratic edge", columns(&quadratic, 3)),
+        ("quadratic vertex", product(&quadratic)),
+    ]);
+    for state in model.states.iter_mut().filter(|state| !changes.contains_key(state.name.as_str())) {
+        let links = state.transitions.iter_mut().map(|link| (&link.to, &mut link.operator));
+        for (to, matrix) in links.chain(state.boundaries.iter_mut().map(|link| (&link.state, &mut link.incidence))) {
+            if let Some(change) = changes.get(to.as_str()) {
+                *matrix = times(matrix, change);
+            }
+        }
+    }
+    let ends = |name: &'static str, weights: &[f64]| -> Vec<(&str, Matrix)> {
+        [[weights, &none].concat(), [&none, weights].concat()].map(|end| (name, given(&column(&end)))).into()
+    };
+    let cubics = CUBIC.iter().map(|half| ("cubic edge", given(&rows(half)))).collect();
+    let quadratics = QUADRATIC.iter().map(|half| ("quadratic edge", given(&rows(half)))).collect();
+    model.states.retain(|state| !changes.contains_key(state.name.as_str()));
+    model.states.extend([
+        state("cubic edge", CellKind::Edge, 4, cubics, ends("cubic vertex", &cubic)),
+        state("cubic vertex", CellKind::Vertex, 1, Vec::new(), Vec::new()),
+        state("quadratic edge", CellKind::Edge, 3, quadratics, ends("quadratic vertex", &quadratic)),
+        state("quadratic vertex", CellKind::Vertex, 1, Vec::new(), Vec::new()),
+    ]);
+}
+
+/// A product of a solved matrix.
+fn times(matrix: &Matrix, other: &Rows) -> Matrix {
+    let value = |entry: &Entry| if let Entry::Number(value) = entry { *value } else { f64::NAN };
+    let entry = |row: &[Entry], j: usize| Entry::Number(row.iter().zip(other).map(|(entry, own)| value(entry) * own[j]).sum());
+    Matrix { rows: matrix.rows.iter().map(|row| (0..other[0].len()).map(|j| entry(row, j)).collect()).collect() }
 }
 
 /// Adds the strip between two borders; returns its own borders, that along the first and that along the second.
