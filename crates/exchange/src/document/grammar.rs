@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 
 use super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
+use super::join::SIDES;
 use crate::format::FORMATS;
 
 /// A kind of object.
@@ -733,7 +734,45 @@ pub(super) const TERRAIN: Object = Object {
 pub(super) const GROUP: Object = Object {
     title: "a group",
     about: "The union of several shapes.",
-    members: &[family!("group"), required("parts", "The shapes, each with an optional name and place.", || list(reference("Part"), 1))],
+    members: &[
+        family!("group"),
+        required("parts", "The shapes, each with an optional name and place.", || list(reference("Part"), 1)),
+        optional(
+            "joins",
+            "Borders of parts that become one, so that the parts share the edges and vertices there, or that a strip joins.",
+            || list(reference("Join"), 0),
+        ),
+    ],
+};
+
+pub(super) const JOIN: Object = Object {
+    title: "a join",
+    about: "Two borders of parts that become one: they are the same curve, span by span, whichever way each runs.",
+    members: &[
+        required("between", "The two borders.", || tuple(reference("Border"), 2)),
+        optional(
+            "strip",
+            "Whether a strip fills the space between the borders, of a bicubic and a biquadratic surface (NURBS with knots that are uniform along the border, regular Catmull-Clark and Doo-Sabin), and meets both with their tangent planes.",
+            flag,
+        ),
+    ],
+};
+
+pub(super) const BORDER: Object = Object {
+    title: "a border",
+    about: "A border of a part, or a piece of it. Exactly one of side, vertices and boundaries is given.",
+    members: &[
+        required("part", "Index of the part.", index),
+        optional("side", "Of a NURBS, Bezier, tensor or sum surface: the first or last value of u or v.", || {
+            one_of_words(&SIDES.map(|(name, _)| name))
+        }),
+        optional(
+            "vertices",
+            "Of a subdivision surface: the mesh's vertices along the border, in either direction; the first again at the end of a border that is taken all round. With catmull_clark and loop the edges between them are the spans, with doo_sabin the vertices.",
+            || list(index(), 1),
+        ),
+        optional("boundaries", "Of a BC-IFS: pairs [root cell, boundary of its state] along the border.", || list(index_pair(), 1)),
+    ],
 };
 
 /// What a part has besides its shape.

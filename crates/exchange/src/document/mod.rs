@@ -13,6 +13,7 @@ mod curve;
 mod grammar;
 mod ifs;
 mod job;
+mod join;
 mod mesh;
 mod model;
 mod node;

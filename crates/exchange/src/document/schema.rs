@@ -7,9 +7,9 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADDRESS_QUESTION, ADJACENCY, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE,
-    JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION,
-    ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema, reference,
+    ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
+    INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
+    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema, reference,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -45,7 +45,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 18] = [
+    const PLAIN: [(&str, &Object); 19] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -62,6 +62,7 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Crease", &CREASE),
         ("Corner", &CORNER),
         ("Coefficients", &COEFFICIENTS),
+        ("Join", &JOIN),
         ("JobParams", &JOB_PARAMS),
         ("JobLimits", &JOB_LIMITS),
     ];
@@ -83,6 +84,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("ControlPoint".into(), control_point_schema()));
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
+    schemas.push(("Border".into(), exactly_one(object(&BORDER, &[]), &["side", "vertices", "boundaries"])));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
     schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
     schemas.push(("AddressQuestion".into(), address_question()));

@@ -4,13 +4,14 @@
 //! defaults left out, parameters in their own order, every number the shortest that reads back to the
 //! same double, and no negative zero.
 
+use super::join::SIDES;
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, CellKind, Coefficients, ControlNet, Corner, CornerCutting, Crease,
-    Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model, Parametrization, Part, PolygonMesh, Primitive,
-    Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, CellKind, Coefficients, ControlNet, Corner,
+    CornerCutting, Crease, Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Parametrization, Part,
+    PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -348,7 +349,22 @@ object! {
             .put("levels", &terrain.levels)?
             .put_if(terrain.random_seed != 0, "random_seed", &terrain.random_seed)?
     };
-    Group: |group, members| members.put("family", &"group")?.put("parts", &list(&group.parts))?;
+    Group: |group, members| members
+        .put("family", &"group")?
+        .put("parts", &list(&group.parts))?
+        .put_if(!group.joins.is_empty(), "joins", &list(&group.joins))?;
+    Join: |join, members| members.put("between", &list(&join.between))?.put_if(join.strip, "strip", &true)?;
+    Border: |border, members| {
+        members.put("part", &border.part)?;
+        match &border.path {
+            BorderPath::Side { direction, last } => {
+                let side = SIDES.iter().find(|(_, side)| *side == (*direction, *last));
+                members.put_some("side", side.map(|(name, _)| name))?
+            }
+            BorderPath::Vertices(vertices) => members.put("vertices", vertices)?,
+            BorderPath::Boundaries(boundaries) => members.put("boundaries", boundaries)?,
+        }
+    };
 }
 
 impl Serialize for Wire<'_, Shape> {

@@ -1,6 +1,7 @@
 //! From shapes to one automaton: every family adds states and roots to a [`Draft`], which becomes an
 //! [`Attractor`] once.
 
+use super::join::{self, Borders};
 use super::{AffineMap, CellKind, Model, Shape};
 use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
 use crate::automaton::topology::{Declared, Topology, TopologyError};
@@ -45,6 +46,8 @@ pub(super) struct Draft {
     pub(super) gluings: Vec<Gluing>,
     /// Boundaries of roots that are single points in space: (root, boundary).
     pub(super) collapsed: Vec<(usize, usize)>,
+    /// What the shape that was lowered last says of its borders.
+    pub(super) borders: Borders,
     /// Largest distance between control points of glued boundaries.
     pub(super) seam_mm: f64,
     /// States whose names tell their content, by name.
@@ -127,7 +130,7 @@ impl Draft {
         StateId::new(self.states.len() - 1)
     }
 
-    fn has_errors(&self) -> bool {
+    pub(super) fn has_errors(&self) -> bool {
         self.findings.iter().any(|finding| !finding.warning)
     }
 
@@ -152,21 +155,28 @@ impl Draft {
             self.error("/parts", "automaton.empty", "the group has no part".into());
         }
         let place = self.place.clone();
+        let mut borders = Vec::with_capacity(group.parts.len());
         for (index, part) in group.parts.iter().enumerate() {
             self.place = format!("{place}/parts/{index}");
             if part.transform.as_ref().is_some_and(|map| !(map.linear.is_finite() && map.translation.is_finite())) {
                 self.error("/transform", "model.not-finite", "the transform has an entry that is not finite".into());
+                borders.push(Borders::None);
                 continue;
             }
             self.place = format!("{place}/parts/{index}/shape");
             let (first_root, first_solid) = (self.roots.len(), self.solids.len());
+            self.borders = Borders::None;
             self.shape(&part.shape);
+            borders.push(std::mem::take(&mut self.borders));
             if let Some(map) = &part.transform {
                 self.place = format!("{place}/parts/{index}");
                 self.transform(map, first_root, first_solid);
             }
         }
         self.place = place;
+        if !group.joins.is_empty() && !self.has_errors() {
+            join::lower(&group.joins, &borders, self);
+        }
     }
 
     fn transform(&mut self, map: &AffineMap, first_root: usize, first_solid: usize) {

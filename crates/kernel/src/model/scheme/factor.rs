@@ -9,6 +9,7 @@
 use crate::attractor::{Gluing, Root};
 use crate::automaton::{Boundary, Hull, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator, Transition};
 use crate::model::CellKind;
+use crate::model::join::Borders;
 use crate::model::lower::Draft;
 use std::collections::BTreeMap;
 
@@ -99,6 +100,9 @@ pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Gr
     }
     if factors.len() == 2 {
         product.collapse(&cells, &place);
+    }
+    if let &[u, v] = counts.as_slice() {
+        product.draft.borders = Borders::Grid { counts: [u, v], roots: place };
     }
     for cell in solid {
         let Cell { state, points, .. } = &cells[cell];
