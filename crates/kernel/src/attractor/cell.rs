@@ -392,7 +392,8 @@ impl Attractor {
         let state = self.automaton().state(cell.state).transitions[index].to;
         let smooth = match (self.precision(state), &self.automaton().state(state).leaf) {
             (Some(precision), LeafPrimitive::Polygon(_)) if !self.roots()[cell.root as usize].rational => {
-                polygon_error(precision, self.bound(state).margin(), points)
+                let mut buffer = [[0.0; 4]; PAIR];
+                polygon_error(precision, measured(precision, points, &mut buffer))
             }
             _ => f64::INFINITY,
         };
