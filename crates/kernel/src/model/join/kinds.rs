@@ -35,8 +35,8 @@ struct Alias {
 pub(super) struct Kinds<'a> {
     limits: Limits<'a>,
     aliases: BTreeMap<StateId, Alias>,
-    /// States of boundaries that gluings refer to by the order of their control points.
-    ordered: BTreeSet<StateId>,
+    /// States of boundaries of which gluings name orders of control points, and these orders.
+    ordered: BTreeMap<StateId, BTreeSet<Vec<usize>>>,
     /// States that models declare by the order of their control points.
     declared: BTreeSet<StateId>,
     /// Boundaries of roots that become one, and whether one is seen from its other end.
@@ -45,9 +45,11 @@ pub(super) struct Kinds<'a> {
 
 impl<'a> Kinds<'a> {
     pub(super) fn new(automaton: &'a Automaton, topology: &'a Topology, draft: &Draft) -> Self {
-        let (mut ordered, mut fixed) = (BTreeSet::new(), BTreeSet::new());
-        for gluing in draft.gluings.iter().filter(|gluing| gluing.permutation.is_some()) {
-            ordered.extend(boundary_state(draft, gluing.between[0]));
+        let (mut ordered, mut fixed) = (BTreeMap::<StateId, BTreeSet<Vec<usize>>>::new(), BTreeSet::new());
+        for gluing in &draft.gluings {
+            if let (Some(order), Some(state)) = (&gluing.permutation, boundary_state(draft, gluing.between[0])) {
+                ordered.entry(state).or_default().insert(order.clone());
+            }
         }
         for (state, declared) in automaton.states().iter().zip(&draft.declared) {
             for shared in declared.adjacencies.iter().filter(|shared| shared.permutation.is_some()) {
@@ -116,7 +118,7 @@ impl<'a> Kinds<'a> {
     fn unite(&mut self, left: StateId, right: StateId, turned: bool) -> Result<(), String> {
         let state = |id: StateId| self.limits.automaton.state(id);
         // The one with fewer control points stays; then the one whose points are referred to by their order.
-        let rank = |id: StateId| (state(id).dimension, !self.declared.contains(&id), !self.ordered.contains(&id), id);
+        let rank = |id: StateId| (state(id).dimension, !self.declared.contains(&id), !self.ordered.contains_key(&id), id);
         let (from, to) = if rank(left) > rank(right) { (left, right) } else { (right, left) };
         let before = self.aliases.clone();
         self.replace_all(from, to, turned).map_err(|pair| {
@@ -150,8 +152,12 @@ impl<'a> Kinds<'a> {
             let state = |id: StateId| self.limits.automaton.state(id);
             let (from, to) = if state(from).dimension < state(to).dimension { (to, from) } else { (from, to) };
             let change = self.change(from, to, turned).ok_or_else(failed)?;
-            if self.declared.contains(&from) || (self.ordered.contains(&from) && permutation(&change).is_none()) {
+            if self.declared.contains(&from) {
                 return Err(failed());
+            }
+            for order in self.ordered.get(&from).cloned().unwrap_or_default() {
+                let order = reordered(&change, &order).ok_or_else(failed)?;
+                self.ordered.entry(to).or_default().insert(order);
             }
             let children = [from, to].map(|id| self.limits.children(id).map(<[_]>::to_vec));
             let [Some(own), Some(mut other)] = children else { return Err(failed()) };
@@ -269,12 +275,10 @@ impl<'a> Kinds<'a> {
         for index in 0..draft.gluings.len() {
             let Some(state) = boundary_state(draft, draft.gluings[index].between[0]) else { continue };
             let alias = self.resolve(state);
-            if let Some(order) = draft.gluings[index].permutation.as_mut().filter(|order| alias.to != state && order.len() > 1)
-                && let Some(names) = permutation(&alias.change).filter(|names| names.len() == order.len())
+            if let Some(order) = draft.gluings[index].permutation.as_mut().filter(|_| alias.to != state)
+                && let Some(own) = reordered(&alias.change, order)
             {
-                // Point j of the one that stands for it is its point names[j].
-                let position = |point: usize| names.iter().position(|&name| name == point).unwrap_or(point);
-                *order = (0..names.len()).map(|j| position(order[names[j]])).collect();
+                *order = own;
             }
         }
     }
@@ -313,6 +317,20 @@ pub(super) fn fitted(own: &[Weights], other: &[Weights]) -> Option<SubdivisionOp
     let operator = SubdivisionOperator::exact(rows, entries.collect());
     let holds = |(own, other): (&Weights, &Weights)| operator.apply(other).iter().zip(own).all(|(x, y)| (x - y).abs() <= ROUNDING);
     own.iter().zip(other).all(holds).then_some(operator)
+}
+
+/// What an order of a state's control points is for those N that stand for them: if the first cell's points are the second's
+/// in that order, P = Q R, then P N = Q R N, and R N has the columns of N in another order.
+fn reordered(change: &SubdivisionOperator, order: &[usize]) -> Option<Vec<usize>> {
+    let moved = |j: usize| {
+        let mut column = vec![0.0; change.rows()];
+        change.column(j).iter().zip(order).for_each(|(&entry, &row)| column[row] = entry);
+        (0..change.columns()).find(|&k| change.column(k).iter().zip(&column).all(|(a, b)| (a - b).abs() <= ROUNDING))
+    };
+    if order.len() != change.rows() {
+        return None;
+    }
+    (0..change.columns()).map(moved).collect()
 }
 
 /// The order of a permutation matrix: column j has its one in row `order[j]`.

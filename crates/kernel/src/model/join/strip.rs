@@ -238,6 +238,8 @@ fn reduce(model: &mut Bcifs) {
     };
     let cubics = CUBIC.iter().map(|half| ("cubic edge", given(&rows(half)))).collect();
     let quadratics = QUADRATIC.iter().map(|half| ("quadratic edge", given(&rows(half)))).collect();
+    // Points have no children whose incidence could be stated; that of the rungs' ends is seen from their places.
+    model.incidences.retain(|incidence| incidence.state != "rung");
     model.states.retain(|state| !changes.contains_key(state.name.as_str()));
     model.states.extend([
         state("cubic edge", CellKind::Edge, 4, cubics, ends("cubic vertex", &cubic)),
