@@ -870,6 +870,11 @@ pub(super) const JOB_PARAMS: Object = Object {
             "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, absent for evaluate.",
             positive,
         ),
+        optional(
+            "normals",
+            "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",
+            flag,
+        ),
     ],
 };
 

@@ -149,9 +149,9 @@ fn job() -> Value {
     let kind =
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
-        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"] } } })),
+        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"], "not": { "required": ["normals"] } } } })),
         kind("evaluate", json!({ "properties": { "params": { "not": { "required": ["radius_mm"] } } } })),
-        kind("measure", json!({ "properties": { "outputs": { "maxItems": 0 } } })),
+        kind("measure", json!({ "properties": { "outputs": { "maxItems": 0 }, "params": { "not": { "required": ["normals"] } } } })),
     ]);
     schema
 }

@@ -256,7 +256,8 @@ object! {
     Input: |input, members| members.put("name", &input.name)?.put("model", &Wire(&input.model))?;
     lacuna_fabrication::job::Params: |params, members| members
         .put("tolerance_mm", &Number(params.tolerance_mm))?
-        .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?;
+        .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
+        .put_if(params.normals, "normals", &true)?;
     Limits: |limits, members| members
         .put("seconds", &Number(limits.seconds))?
         .put("triangles", &limits.triangles)?
