@@ -389,7 +389,8 @@ fn a_trimmed_part_moves_with_its_group_and_stands_beside_others() {
     let trim = Trim { outer: None, inner: vec![circle([0.5, 0.5], [0.2, 0.2])] };
     let moved = lacuna_kernel::model::AffineMap { linear: glam::DMat3::from_rotation_x(1.0), translation: DVec3::new(0.0, 0.0, 50.0) };
     let part = |shape: Shape, transform| Part { name: None, transform, shape };
-    let group = Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved.clone()))] });
+    let group =
+        Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved.clone()))], joins: Vec::new() });
     let mesh = drawn(group, 0.01);
     let complex = mesh.complex.as_ref().unwrap();
     assert_eq!((complex.euler, complex.boundary_loops, complex.components), (2, 2, 2));
@@ -465,9 +466,7 @@ fn nothing_trimmed_is_the_surface_itself_on_any_knots() {
     for (degree, count) in [([3, 2], [6, 5]), ([2, 4], [4, 7]), ([1, 3], [3, 5])] {
         let schemes = [0, 1].map(|k| CurveScheme::Nurbs { degree: degree[k], knots: knots(degree[k], count[k]) });
         let mut random = Random(5);
-        let points = (0..count[0] * count[1])
-            .map(|k| DVec3::new((k / count[1]) as f64, (k % count[1]) as f64, random.next()))
-            .collect();
+        let points = (0..count[0] * count[1]).map(|k| DVec3::new((k / count[1]) as f64, (k % count[1]) as f64, random.next())).collect();
         let weights = Some((0..count[0] * count[1]).map(|_| 0.5 + random.next()).collect());
         let surface = |trim| {
             let control_points = ControlNet { size: count.to_vec(), points, weights };

@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 use super::grammar::{
     ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
     INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
-    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES,
-    TURNED_MAP, control_point_schema, matrix_schema, reference, trim_point_schema,
+    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, control_point_schema, matrix_schema,
+    reference, trim_point_schema,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references

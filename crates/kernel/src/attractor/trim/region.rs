@@ -313,12 +313,12 @@ impl Builder {
             let mut pieces = Vec::with_capacity(2 * self.pieces.len());
             let mut starts = vec![0];
             for pair in self.starts.windows(2) {
-                for index in pair[0]..pair[1] {
-                    let Piece { arc, place } = &self.pieces[index];
-                    if halve[index] {
+                for (piece, halve) in self.pieces[pair[0]..pair[1]].iter().zip(&halve[pair[0]..pair[1]]) {
+                    let Piece { arc, place } = piece;
+                    if *halve {
                         pieces.extend(arc.halves().map(|arc| Piece { arc, place: *place }));
                     } else {
-                        pieces.push(self.pieces[index].clone());
+                        pieces.push(piece.clone());
                     }
                 }
                 starts.push(pieces.len());
@@ -336,7 +336,7 @@ impl Builder {
         let [low, high] = self.domain;
         let width = self.width;
         let beyond = |p: Parameter| (0..2).map(|k| (low[k] - p[k]).max(p[k] - high[k]) / width[k]).fold(0.0, f64::max);
-        for index in 0..self.pieces.len() {
+        for (index, halve) in halve.iter_mut().enumerate() {
             let arc = &self.pieces[index].arc;
             let over = arc.control_points().map(beyond).fold(0.0, f64::max);
             let ends = beyond(arc.start()).max(beyond(arc.end()));
@@ -348,7 +348,7 @@ impl Builder {
                 if self.size(index) <= RESOLUTION {
                     return Err(RegionFault::Outside { place: self.pieces[index].place, at: self.at(index) });
                 }
-                halve[index] = true;
+                *halve = true;
             } else {
                 (0..2).for_each(|k| self.moved[k] = self.moved[k].max(over * width[k]));
             }
@@ -356,7 +356,7 @@ impl Builder {
                 if self.size(index) <= RESOLUTION {
                     return Err(RegionFault::Cusp { place: self.pieces[index].place, at: self.at(index) });
                 }
-                halve[index] = true;
+                *halve = true;
             }
         }
         Ok(())

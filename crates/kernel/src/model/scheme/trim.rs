@@ -75,7 +75,7 @@ impl TrimCurve {
                     return None;
                 }
                 let weight = |k: usize| weights.as_ref().map_or(1.0, |weights| weights[k]);
-                for index in (0..control_points.len()).filter(|&k| !WEIGHTS.contains(&weight(k))) {
+                if let Some(index) = (0..control_points.len()).find(|&k| !WEIGHTS.contains(&weight(k))) {
                     let (least, most) = (WEIGHTS.start(), WEIGHTS.end());
                     let message = format!("the weight is {:e}, and must be positive, from {least:e} to {most:e}", weight(index));
                     draft.error(&format!("/weights/{index}"), "net.weights", message);
