@@ -181,6 +181,7 @@ fn problem(error: &AddressError) -> Problem {
     let pointer = match error {
         AddressError::Query { name: "within_mm", .. } => "/within_mm",
         AddressError::Query { .. } => "/near",
+        AddressError::Trimmed => "/model/shape",
         AddressError::Resolution(_) | AddressError::Cells { .. } | AddressError::Depth { .. } => "/tolerance_mm",
         AddressError::Stopped(_) => "",
         _ => "/at",

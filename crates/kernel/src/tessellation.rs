@@ -24,6 +24,25 @@ pub struct Tessellation {
     pub complex: Option<CellComplex>,
 }
 
+impl Tessellation {
+    /// Adds what another evaluation made of another part of the shape, the complex of which goes behind this one's.
+    /// Neither has vertices beyond its complex.
+    pub(crate) fn append(&mut self, other: Self) {
+        let offset = self.vertices.len() as u32;
+        self.vertices.extend(other.vertices);
+        self.points.extend(other.points.into_iter().map(|point| point + offset));
+        self.segments.extend(other.segments.into_iter().map(|ends| ends.map(|end| end + offset)));
+        self.triangles.extend(other.triangles.into_iter().map(|corners| corners.map(|corner| corner + offset)));
+        self.deviation_mm = self.deviation_mm.max(other.deviation_mm);
+        self.leaf_cells += other.leaf_cells;
+        match (&mut self.complex, other.complex) {
+            (Some(own), Some(other)) => own.append(other),
+            (own @ None, other) => *own = other,
+            (Some(_), None) => {}
+        }
+    }
+}
+
 /// Normals of a surface at the corners of its triangles. A vertex has one, but on creases and at corners one for each side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Normals {

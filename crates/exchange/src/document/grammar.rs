@@ -436,6 +436,77 @@ pub(super) const NURBS_CURVE: Object = Object {
     ],
 };
 
+fn parameter() -> Value {
+    tuple(number(), 2)
+}
+
+fn trim() -> Value {
+    reference("Trim")
+}
+
+fn trim_loop() -> Value {
+    list(reference("TrimCurve"), 1)
+}
+
+/// A parameter with an optional weight, as a schema without members.
+pub(super) fn trim_point_schema() -> Value {
+    json!({
+        "description": "A parameter [u, v], or [u, v, w] with a positive weight w (1 when absent). Parameters have no unit and are not multiplied by w.",
+        "type": "array", "items": number(), "minItems": 2, "maxItems": 3
+    })
+}
+
+fn trim_points() -> Value {
+    list(reference("TrimPoint"), 2)
+}
+
+const TRIM_MEMBER: Member = optional("trim", "Loops that cut the surface in its parameter plane; the whole surface when absent.", trim);
+
+pub(super) const TRIM: Object = Object {
+    title: "a trim",
+    about: "What is kept of a surface: the closed region of its parameter plane between an outer loop and inner loops. u is the first direction of the control points and v the second; the domain is that of the knots, or [0, 1] for Bezier surfaces. A loop is a closed chain of curves, either way round, within the domain; loops neither cross nor touch themselves or each other. Ends of curves that miss each other by 1e-6 of the domain or less are joined.",
+    members: &[
+        optional(
+            "outer",
+            "The curves of the outer loop, in order; the border of the domain when absent. It may run along that border.",
+            trim_loop,
+        ),
+        optional("inner", "Loops around holes: inside the outer loop, and not inside each other.", || list(trim_loop(), 0)),
+    ],
+};
+
+pub(super) const TRIM_POLYLINE: Object = Object {
+    title: "a polyline",
+    about: "Segments between successive parameters.",
+    members: &[family!("polyline"), required("points", "Parameters [u, v], in order.", || list(parameter(), 2))],
+};
+
+pub(super) const TRIM_BEZIER: Object = Object {
+    title: "a bezier_curve of parameters",
+    about: "A polynomial or rational Bezier curve in the parameter plane.",
+    members: &[
+        family!("bezier_curve"),
+        required("control_points", "The control points [u, v] or [u, v, w], in order.", trim_points),
+        WEIGHTS,
+    ],
+};
+
+pub(super) const TRIM_NURBS: Object = Object {
+    title: "a nurbs_curve of parameters",
+    about: "A polynomial or rational spline in the parameter plane.",
+    members: &[
+        NURBS_SCHEME.members[0],
+        NURBS_SCHEME.members[1],
+        NURBS_SCHEME.members[2],
+        required("control_points", "The control points [u, v] or [u, v, w], in order.", trim_points),
+        WEIGHTS,
+    ],
+};
+
+/// Curves that trim loops are made of, with the schema's name.
+pub(super) const TRIM_CURVES: [(&str, &str, &Object); 3] =
+    [("polyline", "TrimPolyline", &TRIM_POLYLINE), ("bezier_curve", "TrimBezier", &TRIM_BEZIER), ("nurbs_curve", "TrimNurbs", &TRIM_NURBS)];
+
 pub(super) const NURBS_SURFACE: Object = Object {
     title: "a nurbs_surface",
     about: "A polynomial or rational spline surface. Directions whose ends meet are closed; sides that are single points are poles.",
@@ -445,6 +516,7 @@ pub(super) const NURBS_SURFACE: Object = Object {
         required("knots", "A full knot vector for each direction.", || tuple(knots(), 2)),
         required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
         optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+        TRIM_MEMBER,
     ],
 };
 
@@ -467,6 +539,7 @@ pub(super) const BEZIER_SURFACE: Object = Object {
         family!("bezier_surface"),
         required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
         optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+        TRIM_MEMBER,
     ],
 };
 

@@ -25,6 +25,7 @@ mod solve;
 mod subdivision;
 mod terrain;
 mod transform;
+mod trim;
 mod units;
 mod walk;
 mod write;

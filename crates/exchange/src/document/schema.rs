@@ -9,7 +9,8 @@ use serde_json::{Map, Value, json};
 use super::grammar::{
     ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
     INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
-    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema, reference,
+    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, control_point_schema, matrix_schema,
+    reference, trim_point_schema,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -45,7 +46,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 19] = [
+    const PLAIN: [(&str, &Object); 20] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -63,6 +64,7 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Corner", &CORNER),
         ("Coefficients", &COEFFICIENTS),
         ("Join", &JOIN),
+        ("Trim", &TRIM),
         ("JobParams", &JOB_PARAMS),
         ("JobLimits", &JOB_LIMITS),
     ];
@@ -73,6 +75,9 @@ fn named_schemas() -> Vec<(String, Value)> {
     let schemes = any_of("A curve shape without control points.", SCHEMES.iter().map(|(_, name, _)| reference(name)));
     schemas.push(("CurveScheme".into(), schemes));
     schemas.push(("CurveShape".into(), any_of("A curve.", CURVES.iter().map(|(_, name, _)| reference(name)))));
+    schemas.extend(TRIM_CURVES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
+    schemas.push(("TrimCurve".into(), any_of("A curve in the parameter plane.", TRIM_CURVES.iter().map(|(_, name, _)| reference(name)))));
+    schemas.push(("TrimPoint".into(), trim_point_schema()));
     let placed = FAMILIES.iter().map(|(_, _, grammar)| object(grammar, PART_MEMBERS));
     let parts = std::iter::once(object(&PART, &[])).chain(placed);
     schemas.push((

@@ -5,13 +5,13 @@
 //! same double, and no negative zero.
 
 use super::join::SIDES;
-use glam::{DMat3, DVec3, DVec4};
+use glam::{DMat3, DVec2, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, CellKind, Coefficients, ControlNet, Corner,
     CornerCutting, Crease, Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Parametrization, Part,
-    PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase,
+    PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase, Trim, TrimCurve,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -326,7 +326,20 @@ object! {
                 members.put("family", &family)?.put("degree", &degrees)?.put("knots", &knots)?;
             }
         }
-        members.put("control_points", &points_of(&product.control_points))?.weights(&product.control_points)?
+        members
+            .put("control_points", &points_of(&product.control_points))?
+            .weights(&product.control_points)?
+            .put_some("trim", product.trim.as_ref().map(Wire).as_ref())?
+    };
+    Trim: |trim, members| members
+        .put_some("outer", trim.outer.as_ref().map(|curves| list(curves)).as_ref())?
+        .put_if(!trim.inner.is_empty(), "inner", &trim.inner.iter().map(|curves| list(curves)).collect::<Vec<_>>())?;
+    TrimCurve: |curve, members| match curve {
+        TrimCurve::Polyline(points) => members.put("family", &"polyline")?.put("points", &list(points))?,
+        TrimCurve::Spline { scheme, control_points, weights } => members
+            .scheme(scheme, None)?
+            .put("control_points", &list(control_points))?
+            .put_some("weights", weights.as_ref().map(|weights| numbers(weights)).as_ref())?,
     };
     Sum: |sum, members| members.put("family", &"sum")?.put("u", &Wire(&sum.u))?.put("v", &Wire(&sum.v))?;
     CurveScheme: |scheme, members| members.scheme(scheme, None)?;
@@ -415,6 +428,12 @@ struct Parameters<'m>(&'m [(String, f64)]);
 impl Serialize for Parameters<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, Number(*value))))
+    }
+}
+
+impl Serialize for Wire<'_, DVec2> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.to_array().map(Number))
     }
 }
 

@@ -63,6 +63,9 @@ pub enum AddressError {
         /// What may stand there.
         expected: &'static str,
     },
+    /// Cells of trimmed surfaces are not searched.
+    #[error("the model has a trimmed surface, whose cells cannot be searched; remove \"trim\" to ask about the whole surface")]
+    Trimmed,
     /// There is no such root.
     #[error("root cell {root} does not exist: root cells are numbered 0 to {}", .roots - 1)]
     Root {
@@ -170,6 +173,7 @@ impl AddressError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Syntax { .. } => "address.syntax",
+            Self::Trimmed => "address.trimmed",
             Self::Root { .. } => "address.unknown-root",
             Self::Letter { .. } => "address.no-such-transition",
             Self::Period { .. } => "address.period",

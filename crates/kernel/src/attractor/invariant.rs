@@ -33,7 +33,8 @@ pub(super) type Rows = [Vec<f64>; 3];
 /// The precision of every face state that has it.
 pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
     let rows = rows(automaton);
-    let unit: Vec<Option<LinearPrecision>> = rows.iter().enumerate().map(|(index, rows)| unit(automaton, bounds, index, rows.as_ref()?)).collect();
+    let unit: Vec<Option<LinearPrecision>> =
+        rows.iter().enumerate().map(|(index, rows)| unit(automaton, bounds, index, rows.as_ref()?)).collect();
     let checks: Vec<Option<Check>> = (0..unit.len()).map(|index| check(automaton, &unit, index)).collect();
     let holds = automaton.hereditary(checks.iter().map(Option::is_some).collect());
     let precision = |index: usize| {

@@ -46,6 +46,8 @@ pub(crate) struct SiteRule<'a> {
     inner: f64,
     outer: f64,
     choices: Vec<Choice>,
+    /// States that roots reach.
+    used: Vec<usize>,
 }
 
 /// Shares of a dilation's tolerance that sites may use, inner and outer: the outer share is taken from the
@@ -57,22 +59,30 @@ impl<'a> SiteRule<'a> {
     /// The rule for a dilation by `radius` to `tolerance`, both in mm.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
         let (inner, outer) = (INNER_SHARE * tolerance, OUTER_SHARE * tolerance);
-        let mut rule = Self { attractor, radius, inner, outer, choices: Vec::new() };
+        let mut starts: Vec<usize> = attractor.roots().iter().map(|root| root.state.index()).collect();
+        starts.sort_unstable();
+        starts.dedup();
+        let mut used: Vec<usize> = starts.iter().flat_map(|&state| reachable(attractor.automaton(), StateId::new(state))).collect();
+        used.sort_unstable();
+        used.dedup();
+        let mut rule = Self { attractor, radius, inner, outer, choices: Vec::new(), used };
         choose(&mut rule);
         rule
     }
 
     /// The share of the tolerance that must be kept from the lattice's outer error.
     pub(crate) fn outer_reserve(&self) -> f64 {
-        let exact = |(index, choice): (usize, &Choice)| {
-            *choice == Choice::Cover || self.attractor.automaton().states()[index].leaf == LeafPrimitive::Simplex
-        };
-        if self.choices.iter().enumerate().all(exact) { 0.0 } else { self.outer }
+        let exact = |&index: &usize| self.choices[index] == Choice::Cover || self.is_simplex(index);
+        if self.used.iter().all(exact) { 0.0 } else { self.outer }
     }
 
     /// The share that must be kept from the lattice's inner error.
     pub(crate) fn inner_reserve(&self) -> f64 {
-        if self.attractor.automaton().states().iter().all(|state| state.leaf == LeafPrimitive::Simplex) { 0.0 } else { self.inner }
+        if self.used.iter().all(|&index| self.is_simplex(index)) { 0.0 } else { self.inner }
+    }
+
+    fn is_simplex(&self, state: usize) -> bool {
+        self.attractor.automaton().states()[state].leaf == LeafPrimitive::Simplex
     }
 
     /// The errors of a cell if it is small enough to be replaced.

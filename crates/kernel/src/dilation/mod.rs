@@ -24,8 +24,8 @@ mod octree;
 mod stitch;
 mod tree;
 
-use crate::attractor::Attractor;
 use crate::attractor::sites::{SiteError, SiteRule};
+use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::measure::bounds::{AxisBox, bounding_box};
@@ -125,6 +125,9 @@ pub enum DilationError {
         "a closed mesh is taken as a solid, and crosses itself or has faces without area, so that its inside is not defined; mend it, or say \"interior\": \"surface\""
     )]
     Inside,
+    /// Trimmed surfaces cannot be drawn as finely as their share of the tolerance asks.
+    #[error("trimmed surfaces: {0}")]
+    Trimmed(RefineError),
     /// The mesh is no closed manifold: our bug.
     #[error("the extracted surface is not a closed manifold: {0}")]
     Defect(SolidError),
@@ -145,6 +148,7 @@ impl DilationError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
+            Self::Trimmed(error) => error.kind(),
             Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } => Kind::Unreachable,
             Self::Inside => Kind::Invalid,
@@ -157,6 +161,7 @@ impl DilationError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Stopped(stopped) => stopped.code(),
+            Self::Trimmed(error) => error.code(),
             Self::Triangles { .. } => "limit-triangles",
             Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
@@ -172,6 +177,11 @@ impl DilationError {
     pub fn limit(&self) -> Option<LimitFacts> {
         let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
         match *self {
+            Self::Trimmed(ref error) => error.limit().map(|facts| LimitFacts {
+                // What was asked of the trimmed surfaces is a share of the tolerance.
+                remedy: facts.remedy.map(|(name, value)| (name, if name == "tolerance_mm" { value / TRIM_SHARE } else { value })),
+                ..facts
+            }),
             Self::Stopped(_) | Self::Defect(_) | Self::Inside => None,
             Self::Cells { allowed } => {
                 Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
@@ -297,6 +307,47 @@ fn rounding(extent: f64) -> f64 {
 /// # Errors
 /// [`DilationError`]: a limit, with a value that would pass, or a stop.
 pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
+    let Some(Resolved { attractor: resolved, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
+        return dilate_cells(attractor, radius, tolerance, budget);
+    };
+    let dilation = dilate_cells(&resolved, radius, rest, budget)?;
+    Ok(Dilation {
+        inner_mm: dilation.inner_mm + deviation_mm,
+        outer_mm: dilation.outer_mm + deviation_mm,
+        bounds: bounding_box(attractor, budget)?,
+        ..dilation
+    })
+}
+
+/// Share of the tolerance that triangles which stand for trimmed surfaces may use.
+const TRIM_SHARE: f64 = 0.1;
+
+/// An attractor whose trimmed surfaces are triangles.
+struct Resolved {
+    attractor: Attractor,
+    /// Its Hausdorff distance from the one asked for, at most.
+    deviation_mm: f64,
+    /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
+    /// in D(r + d), so that d adds to both bounds.
+    rest: Tolerance,
+}
+
+/// Draws trimmed surfaces to their share of the tolerance; `None` when there are none.
+fn resolve(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Option<Resolved>, DilationError> {
+    if attractor.trimmed().is_empty() {
+        return Ok(None);
+    }
+    let aimed = tolerance.mm().min(0.5 * radius.mm());
+    let length = |mm: f64| Tolerance::new(mm).expect("a share of a positive length is positive");
+    let share = length((TRIM_SHARE * aimed).max(f64::MIN_POSITIVE));
+    let (attractor, deviation_mm) = attractor.resolved(share, budget).map_err(|error| match error {
+        RefineError::Stopped(stopped) => DilationError::Stopped(stopped),
+        other => DilationError::Trimmed(other),
+    })?;
+    Ok(Some(Resolved { attractor, deviation_mm, rest: length((aimed - deviation_mm).max(f64::MIN_POSITIVE)) }))
+}
+
+fn dilate_cells(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
     let plan = Planned::new(attractor, radius, tolerance, budget)?;
     let first = plan.pass(attractor, plan.coarsest, false, true, budget)?;
     let mut made = first.made;
@@ -354,6 +405,8 @@ const PREDICTION_WORK: f64 = 300_000.0;
 /// # Errors
 /// As [`dilate`], for what shows before the work.
 pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Prediction, DilationError> {
+    let resolved = resolve(attractor, radius, tolerance, budget)?;
+    let (attractor, tolerance) = resolved.as_ref().map_or((attractor, tolerance), |resolved| (&resolved.attractor, resolved.rest));
     let plan = Planned::new(attractor, radius, tolerance, budget)?;
     let unlimited = Budget {
         limits: crate::budget::Limits { triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },

@@ -3,6 +3,7 @@
 
 use super::join::{self, Borders};
 use super::{AffineMap, CellKind, Model, Shape};
+use crate::attractor::trim::TrimmedSurface;
 use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
 use crate::automaton::topology::{Declared, Topology, TopologyError};
 use crate::automaton::{Automaton, Boundary, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator};
@@ -38,6 +39,8 @@ pub(super) struct Draft {
     pub(super) states: Vec<State>,
     pub(super) roots: Vec<Root>,
     pub(super) solids: Vec<SolidSurface>,
+    /// Surfaces that loops cut.
+    pub(super) trimmed: Vec<TrimmedSurface>,
     pub(super) findings: Vec<Finding>,
     pub(super) constraint_residual: f64,
     /// What the model says of the states' subdivision, by state; may be shorter than the states.
@@ -164,12 +167,13 @@ impl Draft {
                 continue;
             }
             self.place = format!("{place}/parts/{index}/shape");
-            let (first_root, first_solid) = (self.roots.len(), self.solids.len());
+            let (first_root, first_solid, first_trimmed) = (self.roots.len(), self.solids.len(), self.trimmed.len());
             self.borders = Borders::None;
             self.shape(&part.shape);
             borders.push(std::mem::take(&mut self.borders));
             if let Some(map) = &part.transform {
                 self.place = format!("{place}/parts/{index}");
+                self.trimmed[first_trimmed..].iter_mut().for_each(|surface| surface.transform(|point| moved(map, point)));
                 self.transform(map, first_root, first_solid);
             }
         }
@@ -182,9 +186,7 @@ impl Draft {
     fn transform(&mut self, map: &AffineMap, first_root: usize, first_solid: usize) {
         for root in &mut self.roots[first_root..] {
             for point in &mut root.points {
-                let weight = point[3];
-                let moved = map.linear * glam::DVec3::new(point[0], point[1], point[2]) + weight * map.translation;
-                *point = [moved.x, moved.y, moved.z, weight];
+                *point = moved(map, point);
             }
         }
         let determinant = map.linear.determinant();
@@ -201,6 +203,13 @@ impl Draft {
             *surface = super::mesh::with_normals(std::mem::take(surface), &self.roots);
         }
     }
+}
+
+/// The image of a homogeneous point.
+fn moved(map: &AffineMap, point: &[f64; 4]) -> [f64; 4] {
+    let weight = point[3];
+    let moved = map.linear * glam::DVec3::new(point[0], point[1], point[2]) + weight * map.translation;
+    [moved.x, moved.y, moved.z, weight]
 }
 
 impl Model {
@@ -243,7 +252,11 @@ impl Model {
             Err(error) => return Err(fail(draft.findings, &error)),
         };
         match attractor.with_topology(topology, &draft.gluings, &draft.collapsed, draft.seam_mm) {
-            Ok(attractor) => Ok(Lowered { attractor, findings: draft.findings, constraint_residual: draft.constraint_residual }),
+            Ok(attractor) => Ok(Lowered {
+                attractor: attractor.with_trimmed(draft.trimmed),
+                findings: draft.findings,
+                constraint_residual: draft.constraint_residual,
+            }),
             Err(error) => Err(incoherent(draft.findings, &error)),
         }
     }

@@ -26,7 +26,7 @@ pub use ifs::{AffineMap, Ifs, Primitive};
 pub use join::{Border, BorderPath, Join};
 pub use lower::{Finding, Lowered};
 pub use mesh::{Interior, PolygonMesh};
-pub use scheme::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct};
+pub use scheme::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct, Trim, TrimCurve};
 pub use subdivision::{BoundaryRule, Coefficients, Corner, Crease, INFINITE_SHARPNESS, Scheme, Subdivision};
 pub use terrain::{Terrain, TerrainBase};
 

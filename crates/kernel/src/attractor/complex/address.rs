@@ -1,6 +1,8 @@
 //! Where every vertex, edge and face of an evaluation comes from.
 
 use super::merge::Numbers;
+use super::tally::count_complex;
+use crate::attractor::Attractor;
 use crate::automaton::StateId;
 use crate::automaton::topology::Topology;
 use std::fmt;
@@ -47,7 +49,7 @@ pub(super) enum Origin {
     Face { node: u32, piece: u32 },
     /// Inside an edge: which piece of its split.
     Edge { edge: u32, piece: u32 },
-    /// The middle of a face.
+    /// Inside a face, or on the rim that trimming gives it.
     Middle { node: u32 },
 }
 
@@ -91,6 +93,55 @@ pub struct CellComplex {
 }
 
 impl CellComplex {
+    /// The complex of triangles that fill faces: `nodes` are the faces' (the parent, or `NONE`, and the child or root),
+    /// `vertex_nodes` and `triangle_nodes` say to which the vertices and triangles belong.
+    pub(in crate::attractor) fn of_triangles(
+        attractor: &Attractor,
+        nodes: Vec<(u32, u32)>,
+        vertex_nodes: &[u32],
+        triangles: &[[u32; 3]],
+        triangle_nodes: Vec<u32>,
+    ) -> Self {
+        Self {
+            topology: attractor.brep.as_ref().map(|(topology, _)| Arc::clone(topology)).unwrap_or_default(),
+            root_states: attractor.roots().iter().map(|root| root.state).collect(),
+            vertex_origins: vertex_nodes.iter().map(|&node| Origin::Middle { node }).collect(),
+            node_numbers: Numbers::new([nodes.len()].into_iter()),
+            edge_numbers: Numbers::new([0].into_iter()),
+            parts: vec![Part { nodes, edges: Vec::new() }],
+            triangle_nodes,
+            ..count_complex(vertex_nodes.len(), triangles)
+        }
+    }
+
+    /// Adds the complex of other roots of the same automaton.
+    pub(crate) fn append(&mut self, other: Self) {
+        let (nodes, edges) = (self.node_numbers.count(), self.edge_numbers.count());
+        let node = |node: u32| if node == super::NONE { node } else { node + nodes };
+        let origin = |origin: Origin| match origin {
+            Origin::Root { .. } => origin,
+            Origin::Face { node, piece } => Origin::Face { node: node + nodes, piece },
+            Origin::Edge { edge, piece } => Origin::Edge { edge: edge + edges, piece },
+            Origin::Middle { node } => Origin::Middle { node: node + nodes },
+        };
+        self.faces += other.faces;
+        self.edges += other.edges;
+        self.vertices += other.vertices;
+        self.components += other.components;
+        self.boundary_edges += other.boundary_edges;
+        self.boundary_loops += other.boundary_loops;
+        self.euler += other.euler;
+        self.vertex_origins.extend(other.vertex_origins.into_iter().map(origin));
+        self.parts.extend(other.parts.into_iter().map(|part| Part {
+            nodes: part.nodes.into_iter().map(|(parent, child)| (node(parent), child)).collect(),
+            edges: part.edges.into_iter().map(origin).collect(),
+        }));
+        self.node_numbers = Numbers::new(self.parts.iter().map(|part| part.nodes.len()));
+        self.edge_numbers = Numbers::new(self.parts.iter().map(|part| part.edges.len()));
+        self.triangle_nodes.extend(other.triangle_nodes.into_iter().map(node));
+        self.segment_edges.extend(other.segment_edges.into_iter().map(|edge| edge + edges));
+    }
+
     /// Vertices of the tessellation that belong to the complex.
     #[must_use]
     pub fn drawn_vertices(&self) -> u64 {

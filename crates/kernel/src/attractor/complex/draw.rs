@@ -164,7 +164,7 @@ fn at(places: &Places, (part, index): (usize, usize)) -> u32 {
 
 /// Fills the outline of a face: three vertices are a triangle, four two triangles on the shorter diagonal, more a
 /// fan around the middle, which is then the vertex `centre`. Whether it is used.
-fn fill(outline: &[u32], centre: u32, vertices: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> bool {
+pub(in crate::attractor) fn fill(outline: &[u32], centre: u32, vertices: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> bool {
     match *outline {
         [a, b, c] => triangles.push([a, b, c]),
         [a, b, c, d] => {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub(super) struct Numbers(Vec<u32>);
 
 impl Numbers {
-    fn new(counts: impl Iterator<Item = usize>) -> Self {
+    pub(super) fn new(counts: impl Iterator<Item = usize>) -> Self {
         let mut sum = 0;
         Self(
             std::iter::once(0)
@@ -30,6 +30,11 @@ impl Numbers {
     pub(super) fn find(&self, id: u32) -> (usize, usize) {
         let part = if id < self.0[1] { 0 } else { self.0.partition_point(|&start| start <= id) - 1 };
         (part, (id - self.0[part]) as usize)
+    }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> u32 {
+        self.0.last().copied().unwrap_or(0)
     }
 
     /// The first number of a part.

@@ -26,6 +26,7 @@ use crate::automaton::{Automaton, LeafPrimitive, StateId};
 use crate::budget::Budget;
 use crate::tessellation::Tessellation;
 use crate::tolerance::Tolerance;
+pub(super) use draw::fill;
 use merge::Merged;
 use rayon::prelude::*;
 use shard::{Context, Shard, Store};
@@ -41,7 +42,7 @@ pub struct Gluing {
 }
 
 /// No index.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// An edge or vertex of the complex, as a face sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]

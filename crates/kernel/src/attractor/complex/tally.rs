@@ -305,3 +305,31 @@ fn curves(edges: Vec<[u32; 2]>) -> u64 {
     edges.into_iter().for_each(|[a, b]| sets.unite(place(a), place(b), false));
     (0..vertices.len() as u32).filter(|&vertex| sets.find(vertex).0 == vertex).count() as u64
 }
+
+/// Counts of the complex that triangles make, which use all of `vertices`.
+pub(super) fn count_complex(vertices: usize, triangles: &[[u32; 3]]) -> CellComplex {
+    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(3 * triangles.len());
+    for &[a, b, c] in triangles {
+        edges.extend([[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)]));
+    }
+    edges.sort_unstable();
+    let mut boundary = Vec::new();
+    let mut all = Vec::new();
+    for run in edges.chunk_by(|a, b| a == b) {
+        all.push(run[0]);
+        if run.len() == 1 {
+            boundary.push(run[0]);
+        }
+    }
+    let count = all.len();
+    CellComplex {
+        faces: triangles.len() as u64,
+        edges: count as u64,
+        vertices: vertices as u64,
+        components: curves(all),
+        boundary_edges: boundary.len() as u64,
+        boundary_loops: curves(boundary),
+        euler: vertices as i64 - count as i64 + triangles.len() as i64,
+        ..CellComplex::default()
+    }
+}

@@ -77,9 +77,19 @@ pub(in crate::model) struct Grid {
 /// to rounding.
 const CLOSED: f64 = 1e-12;
 
+/// Where a product's cells went.
+pub(super) struct Placed {
+    /// The root of every cell, the last direction fastest; `None` for cells that are single points.
+    pub(super) roots: Vec<Option<usize>>,
+    /// For every direction and span, whether it is joined to the next, or the last one to the first.
+    pub(super) joined: Vec<Vec<bool>>,
+    /// For every cell of a surface, whether its sides at both ends of the first and the second direction are points.
+    pub(super) collapsed: Vec<[bool; 4]>,
+}
+
 /// Adds the product's states and roots, glues its spans, closes it where its ends meet and collapses sides that are
 /// single points.
-pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Grid) {
+pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Grid) -> Placed {
     let scale = grid.points.iter().flat_map(project).fold(0.0_f64, |a, x| a.max(x.abs()));
     let mut product = Product { draft, factors, states: BTreeMap::new(), waiting: Vec::new(), limit: CLOSED * scale };
     let counts: Vec<usize> = factors.iter().map(|factor| factor.spans.len()).collect();
@@ -90,24 +100,22 @@ pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Gr
         let state = product.draft.point_state();
         let points = cells.first().map_or_else(Vec::new, |cell| vec![cell.points[0]]);
         product.draft.roots.push(Root { state, points, rational: grid.rational, solid: None });
-        return;
+        let joined = counts.iter().map(|&count| vec![true; count]).collect();
+        return Placed { roots: vec![None; cells.len()], joined, collapsed: vec![[true; 4]; cells.len()] };
     }
     let first = product.draft.roots.len();
     let mut place = vec![None; cells.len()];
     solid.iter().enumerate().for_each(|(position, &cell)| place[cell] = Some(first + position));
-    for direction in 0..factors.len() {
-        product.join(direction, &cells, &counts, &place);
-    }
-    if factors.len() == 2 {
-        product.collapse(&cells, &place);
-    }
+    let joined = (0..factors.len()).map(|direction| product.join(direction, &cells, &counts, &place)).collect();
+    let collapsed = if factors.len() == 2 { product.collapse(&cells, &place) } else { Vec::new() };
     if let &[u, v] = counts.as_slice() {
-        product.draft.borders = Borders::Grid { counts: [u, v], roots: place };
+        product.draft.borders = Borders::Grid { counts: [u, v], roots: place.clone() };
     }
     for cell in solid {
         let Cell { state, points, .. } = &cells[cell];
         product.draft.roots.push(Root { state: *state, points: points.clone(), rational: grid.rational, solid: None });
     }
+    Placed { roots: place, joined, collapsed }
 }
 
 /// All index lists below the given counts, the last index fastest.
@@ -271,12 +279,14 @@ impl Product<'_> {
         points.iter().all(|point| distance(point, &points[0]) <= self.limit)
     }
 
-    /// Glues the spans of one direction: those that meet whatever the control points, and ends that happen to meet.
-    fn join(&mut self, direction: usize, cells: &[Cell], counts: &[usize], place: &[Option<usize>]) {
+    /// Glues the spans of one direction: those that meet whatever the control points, and ends that happen to meet. For
+    /// every span, whether it is glued to the next one.
+    fn join(&mut self, direction: usize, cells: &[Cell], counts: &[usize], place: &[Option<usize>]) -> Vec<bool> {
         let count = counts[direction];
         let stride: usize = counts[direction + 1..].iter().product();
         let rows: Vec<usize> = (0..cells.len()).filter(|&cell| cells[cell].spans[direction] == 0).collect();
         let boundary = |end: usize| 2 * (counts.len() - 1 - direction) + end;
+        let mut joined = vec![false; count];
         for first in 0..count {
             let second = (first + 1) % count;
             let gaps: Vec<f64> = rows
@@ -291,6 +301,7 @@ impl Product<'_> {
             if !(self.factors[direction].joints.contains(&[first, second]) || widest <= self.limit) {
                 continue;
             }
+            joined[first] = true;
             self.draft.seam_mm = self.draft.seam_mm.max(widest);
             for &row in &rows {
                 if let (Some(left), Some(right)) = (place[row + first * stride], place[row + second * stride]) {
@@ -298,16 +309,22 @@ impl Product<'_> {
                 }
             }
         }
+        joined
     }
 
     /// Notes the sides of patches that are single points.
-    fn collapse(&mut self, cells: &[Cell], place: &[Option<usize>]) {
-        for (cell, root) in cells.iter().zip(place).filter_map(|(cell, root)| Some((cell, (*root)?))) {
+    fn collapse(&mut self, cells: &[Cell], place: &[Option<usize>]) -> Vec<[bool; 4]> {
+        let mut all = vec![[true; 4]; cells.len()];
+        for (index, (cell, root)) in cells.iter().zip(place).enumerate().filter_map(|(index, (cell, root))| Some((index, (cell, (*root)?))))
+        {
             for (direction, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                if self.is_point(&self.side(cell, direction, end)) {
+                let point = self.is_point(&self.side(cell, direction, end));
+                all[index][2 * direction + end] = point;
+                if point {
                     self.draft.collapsed.push((root, 2 * (1 - direction) + end));
                 }
             }
         }
+        all
     }
 }

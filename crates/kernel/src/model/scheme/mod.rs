@@ -7,12 +7,14 @@ mod net;
 mod own;
 mod polynomial;
 mod subdivision;
+mod trim;
 
 pub use net::ControlNet;
+pub use trim::{Trim, TrimCurve};
 
 use super::lower::Draft;
 use super::{AffineMap, BcifsState};
-use factor::{Factor, Grid, product};
+use factor::{Factor, Grid, Placed, product};
 use glam::DVec3;
 use knots::Form;
 
@@ -119,6 +121,8 @@ pub struct TensorProduct {
     /// Whether the model writes every scheme as a shape of its own (the family `tensor`), or all as one (NURBS and
     /// Bezier): where faults point to.
     pub separate: bool,
+    /// What is kept of a Bezier or spline surface; all when absent.
+    pub trim: Option<Trim>,
 }
 
 /// The surface u(s) + v(t): all translations of one curve along another. Its quadrilateral cells are parallelograms.
@@ -269,7 +273,11 @@ impl TensorProduct {
             let Some(factors) = factors.into_iter().collect::<Option<Vec<Factor>>>() else { return };
             let states: usize = factors.iter().map(|factor| factor.pieces.len()).product();
             if form == Form::Bezier || states <= MOST_STATES {
-                return lower_product(draft, &factors, &grid);
+                let placed = lower_product(draft, &factors, &grid);
+                if let (Some(trim), Some(placed)) = (&self.trim, placed) {
+                    trim.lower(draft, &self.schemes, &grid, &placed);
+                }
+                return;
             }
         }
     }
@@ -297,18 +305,20 @@ impl Sum {
 }
 
 /// Refuses what is too large, and adds the rest to the draft.
-fn lower_product(draft: &mut Draft, factors: &[Factor], grid: &Grid) {
+fn lower_product(draft: &mut Draft, factors: &[Factor], grid: &Grid) -> Option<Placed> {
     let points: usize = factors.iter().map(Factor::dimension).product();
     if points > MOST_CELL_POINTS {
         let message = format!("each cell has {points} control points, and {MOST_CELL_POINTS} are possible; lower the degrees");
-        return draft.error("", "tensor.dimension", message);
+        draft.error("", "tensor.dimension", message);
+        return None;
     }
     let cells =
         factors.iter().try_fold(1_usize, |total, factor| total.checked_mul(factor.spans.len())).filter(|&cells| cells <= MOST_CELLS);
     if cells.is_none() {
-        return draft.error("", "tensor.cells", format!("more than {MOST_CELLS} cells; split the model"));
+        draft.error("", "tensor.cells", format!("more than {MOST_CELLS} cells; split the model"));
+        return None;
     }
-    product(draft, factors, grid);
+    Some(product(draft, factors, grid))
 }
 
 /// Indices of the control points of successive spans of `width` points each.
