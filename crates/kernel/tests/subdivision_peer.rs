@@ -5,7 +5,7 @@ mod cages;
 
 use cages::{attractor, cube, evaluated, grid, inset_torus, patches, tetrahedron, torus};
 use glam::DVec3;
-use lacuna_kernel::attractor::refine_with_normals;
+use lacuna_kernel::attractor::{refine, refine_with_normals};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, Corner, Crease, Scheme, Subdivision};
 use lacuna_kernel::tolerance::Tolerance;
@@ -18,7 +18,7 @@ use std::process::{Command, Stdio};
 fn peer() -> Result<PathBuf, String> {
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/opensubdiv/limits.cpp");
     let binary = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("opensubdiv-limits");
-    let made = Command::new("g++").args(["-O1", "-o"]).arg(&binary).arg(source).arg("-losdCPU").output();
+    let made = Command::new("g++").args(["-O2", "-o"]).arg(&binary).arg(source).arg("-losdCPU").output();
     match made {
         Err(error) => Err(format!("no compiler: {error}")),
         Ok(output) if !output.status.success() => Err("OpenSubdiv is not installed (apt-get install libosd-dev)".into()),
@@ -26,8 +26,8 @@ fn peer() -> Result<PathBuf, String> {
     }
 }
 
-/// The peer's limit points and normals at a level.
-fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<[DVec3; 2]> {
+/// What the peer says of a surface.
+fn ask(peer: &PathBuf, surface: &Subdivision, level: usize, arguments: &[&str]) -> String {
     let mut text = String::new();
     let scheme = if surface.scheme == Scheme::Loop { "loop" } else { "catmark" };
     let _ = writeln!(text, "{scheme} {} {level}", i32::from(surface.boundary == BoundaryRule::SharpCorners));
@@ -43,13 +43,18 @@ fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<[DVec3; 2]
     surface.creases.iter().for_each(|c| writeln!(text, "{} {} {}", c.edge[0], c.edge[1], c.sharpness.min(10.0)).expect("text"));
     let _ = writeln!(text, "{}", surface.corners.len());
     surface.corners.iter().for_each(|c| writeln!(text, "{} {}", c.vertex, c.sharpness.min(10.0)).expect("text"));
-    let mut child = Command::new(peer).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("runs");
+    let mut child = Command::new(peer).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("runs");
     let mut stdin = child.stdin.take().expect("piped");
     let writer = std::thread::spawn(move || stdin.write_all(text.as_bytes()));
     let output = child.wait_with_output().expect("ends");
     writer.join().expect("no panic").expect("written");
     assert!(output.status.success());
-    let text = String::from_utf8(output.stdout).expect("text");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The peer's limit points and normals at a level.
+fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<[DVec3; 2]> {
+    let text = ask(peer, surface, level, &[]);
     let line = |line: &str| -> [DVec3; 2] {
         let numbers: Vec<f64> = line.split_whitespace().map(|word| word.parse().expect("a number")).collect();
         [0, 3].map(|k| DVec3::new(numbers[k], numbers[k + 1], numbers[k + 2]))
@@ -255,4 +260,51 @@ fn a_crease_has_one_normal_for_each_side() {
         }
     }
     assert!(seen >= 4 && hanging > 10, "{seen} {hanging}");
+}
+
+/// CPU seconds of this process so far, in hundredths; `None` where there is no /proc.
+fn cpu_seconds() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = text.rsplit(')').next()?.split_whitespace().collect();
+    Some((fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?) / 100.0)
+}
+
+/// Level 6 of a cage of 468 quads: the tolerance is the one at which as many faces are drawn. Alone in its process the CPU
+/// time is this evaluation's: `cargo test --test subdivision_peer -- --ignored --nocapture --test-threads 1`.
+#[test]
+#[ignore = "a measurement, to be run alone"]
+fn speed_beside_opensubdiv() {
+    let surface = cages::head();
+    let attractor = attractor(surface.clone());
+    let budget = Budget::default();
+    let evaluate = || {
+        let (clock, cpu) = (std::time::Instant::now(), cpu_seconds());
+        let drawn = refine(&attractor, Tolerance::new(5e-4).expect("positive"), &budget).expect("refines");
+        let cpu = cpu.zip(cpu_seconds()).map_or(f64::NAN, |(before, after)| after - before);
+        (cpu, clock.elapsed().as_secs_f64(), drawn.vertices.len())
+    };
+    let peer = peer();
+    for _ in 0..3 {
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let (cpu, wall, vertices) = pool.install(evaluate);
+            eprintln!(
+                "{threads} threads: {cpu:.2} s CPU, {wall:.2} s, {vertices} vertices, {:.3} us CPU a vertex",
+                1e6 * cpu / vertices as f64
+            );
+        }
+        match &peer {
+            Ok(peer) => {
+                let text = ask(peer, &surface, 6, &["time"]);
+                let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().expect("a number")).collect();
+                eprintln!(
+                    "OpenSubdiv: {} s CPU, {} vertices, {:.3} us CPU a vertex",
+                    numbers[0],
+                    numbers[1],
+                    1e6 * numbers[0] / numbers[1]
+                );
+            }
+            Err(reason) => eprintln!("skipped: {reason}"),
+        }
+    }
 }

@@ -7,8 +7,11 @@ mod oracle;
 
 use cages::{attractor, cube, evaluated, grid, tetrahedron, torus};
 use glam::DVec3;
+use lacuna_kernel::attractor::refine_with_normals;
 use lacuna_kernel::automaton::StateId;
+use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, CellKind, Corner, Crease, Scheme, Subdivision};
+use lacuna_kernel::tolerance::Tolerance;
 use oracle::{Oracle, Random};
 
 /// Faces with proven linear precision, and all.
@@ -97,5 +100,39 @@ fn errors_hold_against_finer_evaluations() {
             surface.creases.extend((0..2).map(|k| Crease { edge: [face[k], face[k + 1]], sharpness: sharpness[round % 3] }));
         }
         attack(&surface, 0.02 * scale, 12.0, &mut random);
+    }
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let mut random = Random(3);
+    for scheme in [Scheme::CatmullClark, Scheme::Loop, Scheme::DooSabin] {
+        for mut surface in [cube(scheme), torus(scheme, 12, 9), grid(scheme, 3, 2, |x, y| x * y)] {
+            surface.vertices.iter_mut().for_each(|v| *v += 0.2 * DVec3::new(random.unit(), random.unit(), random.unit()));
+            let attractor = attractor(surface);
+            let planes = attractor.tangent_planes().expect("smooth");
+            let run = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                pool.install(|| {
+                    refine_with_normals(&attractor, &planes, Tolerance::new(0.01).expect("positive"), &Budget::default()).expect("refines")
+                })
+            };
+            let one = run(1);
+            assert!(run(2) == one && run(5) == one, "{scheme:?}");
+        }
+    }
+}
+
+#[test]
+fn a_cage_of_a_million_faces_is_taken_or_refused_with_its_limit() {
+    // Four million face corners are allowed.
+    for (surface, taken) in [(torus(Scheme::CatmullClark, 1000, 1000), true), (torus(Scheme::CatmullClark, 1100, 1000), false)] {
+        let clock = std::time::Instant::now();
+        let result = cages::model(surface).lower();
+        eprintln!("lowered in {:.1} s", clock.elapsed().as_secs_f64());
+        match result {
+            Ok(lowered) => assert!(taken && lowered.attractor.automaton().states().len() < 10),
+            Err(findings) => assert!(!taken && findings[0].code == "subdivision.too-large", "{}", findings[0].code),
+        }
     }
 }

@@ -56,6 +56,9 @@ impl Numbers {
     }
 }
 
+/// Origins of a part's vertices and edges, and its nodes.
+type Provenance = (Vec<Origin>, Vec<Origin>, Vec<(u32, u32)>);
+
 /// Trunk and shards with common numbers.
 pub(super) struct Merged<'a> {
     pub(super) topology: &'a Arc<Topology>,
@@ -126,10 +129,12 @@ impl<'a> Merged<'a> {
     #[inline]
     pub(super) fn edge_id(&self, part: usize, local: u32) -> u32 {
         let base = self.edges.base();
-        if part > 0 && local >= base && self.stores[part].edges[(local - base) as usize].shared {
-            if let Some(&other) = self.dropped[part].get(&local) {
-                return other;
-            }
+        if part > 0
+            && local >= base
+            && self.stores[part].edges[(local - base) as usize].shared
+            && let Some(&other) = self.dropped[part].get(&local)
+        {
+            return other;
         }
         self.edges.shift(part, local)
     }
@@ -250,7 +255,7 @@ impl<'a> Merged<'a> {
             })
             .collect();
         self.stores = stores;
-        let renumber = |(part, (mut vertices, mut edges, mut nodes)): (usize, (Vec<Origin>, Vec<Origin>, Vec<(u32, u32)>))| {
+        let renumber = |(part, (mut vertices, mut edges, mut nodes)): (usize, Provenance)| {
             for origin in vertices.iter_mut().chain(&mut edges) {
                 match origin {
                     Origin::Face { node, .. } | Origin::Middle { node } => *node = self.nodes.shift(part, *node),
