@@ -116,6 +116,20 @@ pub fn answer(model: &Model, sought: &Sought, time: Duration) -> Result<AddressA
     found.map_err(|error| production::why_stopped(&budget).unwrap_or_else(|| problem(&error)))
 }
 
+/// The points at some addresses of one model, all within the time.
+///
+/// # Errors
+/// As [`answer`], for the first that fails.
+pub fn points(model: &Model, addresses: &[Address], time: Duration) -> Result<Vec<[f64; 3]>, Problem> {
+    let mut budget = Budget { cancel: CancelToken::new(), ..Budget::default() };
+    budget.limits.seconds = time.as_secs_f64();
+    let _watchdog = Watchdog::start(&budget.cancel, budget.limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
+    let lowered = guarded(|| model.lower())?.map_err(|findings| Problem::from(lacuna_fabrication::JobError::model(findings)))?;
+    let locate = |address: &Address| point_at(&lowered.attractor, address, &budget).map(|found| found.point);
+    let found = guarded(|| addresses.iter().map(locate).collect::<Result<Vec<_>, _>>())?;
+    found.map_err(|error| production::why_stopped(&budget).unwrap_or_else(|| problem(&error)))
+}
+
 /// A thousandth of the radius of a ball around the root cells, but a possible length.
 fn thousandth(attractor: &Attractor) -> f64 {
     let balls: Vec<Ball> = (0..attractor.roots().len()).map(|index| attractor.root_cell(index).ball).collect();
@@ -167,6 +181,7 @@ fn problem(error: &AddressError) -> Problem {
     let pointer = match error {
         AddressError::Query { name: "within_mm", .. } => "/within_mm",
         AddressError::Query { .. } => "/near",
+        AddressError::Trimmed => "/model/shape",
         AddressError::Resolution(_) | AddressError::Cells { .. } | AddressError::Depth { .. } => "/tolerance_mm",
         AddressError::Stopped(_) => "",
         _ => "/at",

@@ -163,6 +163,9 @@ pub(super) struct EvaluateArgs {
     /// Hausdorff bound on the result, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) tolerance: f64,
+    /// Write the normals of the limit surface beside its vertices, where the format has room for them (PLY, OBJ, GLB, VRML).
+    #[arg(long)]
+    pub(super) normals: bool,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]

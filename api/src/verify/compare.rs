@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::manifest::{BoundingBox, CaseKind, Manifest, Scalar};
+use super::manifest::{BoundingBox, CaseKind, ExpectedPoint, Manifest, Scalar};
 use super::report::Row;
 
 /// All comparisons of a case, those that every case implies included.
@@ -55,6 +55,13 @@ fn scalar_row(name: &str, scalar: &Scalar, got: Option<&Value>) -> Row {
         }
         (None, None) => Row::failure(name, "value, or lower and upper", &shown(got)),
     }
+}
+
+/// The comparison of a point at an address: its distance from the expected one.
+pub(super) fn point_row(name: &str, expected: &ExpectedPoint, got: &[f64; 3]) -> Row {
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let off = length(std::array::from_fn(|axis| got[axis] - expected.value[axis]));
+    Row::measured(name, &format!("{:?}", expected.value), &format!("{got:?}"), Some(off), expected.relative * length(expected.value))
 }
 
 fn box_rows(expected: &BoundingBox, tolerance: f64, got: &Value) -> Vec<Row> {

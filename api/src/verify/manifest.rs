@@ -18,6 +18,9 @@ pub(super) struct Manifest {
     pub(super) scalar: BTreeMap<String, Scalar>,
     #[serde(rename = "box")]
     pub(super) bounding_box: Option<BoundingBox>,
+    /// Points of the shape by their address.
+    #[serde(default)]
+    pub(super) point: BTreeMap<String, ExpectedPoint>,
     pub(super) refused: Option<Refused>,
     /// Values chosen for free parameters.
     #[serde(default)]
@@ -102,6 +105,17 @@ pub(super) struct BoundingBox {
     _reason: String,
 }
 
+/// The point at an address.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ExpectedPoint {
+    pub(super) value: [f64; 3],
+    /// Allowed distance as a share of the point's distance from the origin.
+    pub(super) relative: f64,
+    #[serde(rename = "source")]
+    _source: String,
+}
+
 /// The refusal that must come.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -133,12 +147,16 @@ impl Manifest {
             return Err("`solve` has no tolerance_mm, everything else needs it".into());
         }
         let of_solve = !self.values.is_empty() || !self.entry.is_empty() || self.refused.as_ref().is_some_and(|r| r.pointers.is_some());
-        if of_solve && !solves || solves && self.bounding_box.is_some() {
-            return Err("[values], [entry.*] and refused.pointers belong to `solve`, which has no [box]".into());
+        if of_solve && !solves || solves && (self.bounding_box.is_some() || !self.point.is_empty()) {
+            return Err("[values], [entry.*] and refused.pointers belong to `solve`, which has no [box] and no [point.*]".into());
         }
-        let stated = self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some() || !self.entry.is_empty();
-        if stated == self.refused.is_some() {
-            return Err("either [refused], or at least one of [exact], [scalar.*], [entry.*] and [box]".into());
+        let measured = self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some();
+        if (measured || !self.entry.is_empty() || !self.point.is_empty()) == self.refused.is_some() {
+            return Err("either [refused], or at least one of [exact], [scalar.*], [entry.*], [point.*] and [box]".into());
+        }
+        let number = |point: &ExpectedPoint| point.relative >= 0.0 && point.value.iter().all(|x| x.is_finite());
+        if let Some((address, _)) = self.point.iter().find(|(_, point)| !number(point)) {
+            return Err(format!("[point.\"{address}\"] has a number that is no width or value"));
         }
         for (name, scalar) in &self.scalar {
             let finite = [scalar.value, scalar.lower, scalar.upper, Some(scalar.absolute), Some(scalar.relative)];
@@ -187,6 +205,7 @@ mod tests {
         assert!(read("[exact]\ncomponents = 1\nsource = \"s\"").is_ok());
         assert!(read("[scalar.volume_mm3]\nvalue = 1\nsource = \"s\"\nreason = \"r\"").is_ok());
         assert!(read("[refused]\ncode = \"c\"").is_ok());
+        assert!(read("[point.\"0: 1 (0)\"]\nvalue = [1, 2, 3]\nrelative = 1e-12\nsource = \"s\"").is_ok());
         for bad in [
             "",
             "[exact]\ncomponents = 1",
@@ -194,6 +213,8 @@ mod tests {
             "[refused]\ncode = \"c\"\n[exact]\ngenus = 0\nsource = \"s\"",
             "[scalar.volume_mm3]\nvalue = 1\nlower = 0\nsource = \"s\"\nreason = \"r\"",
             "[scalar.volume_mm3]\nvalue = nan\nsource = \"s\"\nreason = \"r\"",
+            "[point.\"0\"]\nvalue = [1, 2, 3]\nrelative = -1\nsource = \"s\"",
+            "[point.\"0\"]\nvalue = [1, 2]\nrelative = 0\nsource = \"s\"",
             "colour = \"red\"\n[refused]\ncode = \"c\"",
         ] {
             assert!(read(bad).is_err(), "{bad}");

@@ -9,11 +9,13 @@ mod solve;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lacuna_fabrication::{Input, Job, JobKind, Params};
+use lacuna_kernel::attractor::Address;
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 
+use crate::addresses;
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::{documents, production};
@@ -22,6 +24,8 @@ pub use report::{CaseReport, Report, Row};
 
 /// Deepest folder in which cases are looked for.
 const DEEPEST: usize = 16;
+/// Time for the points of a case.
+const POINTS_TIME: Duration = Duration::from_secs(60);
 
 /// Does every case below a folder whose path contains `filter`.
 ///
@@ -82,7 +86,11 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
     let result = perform(folder, &document, kind, manifest);
     match (&manifest.refused, result) {
         (Some(refused), result) => vec![compare_refusal(refused, result)],
-        (None, Ok(certificate)) => compare::rows(manifest, &certificate),
+        (None, Ok(certificate)) => {
+            let mut rows = compare::rows(manifest, &certificate);
+            rows.extend(point_rows(folder, &document, manifest));
+            rows
+        }
         (None, Err(problem)) => vec![Row::failure("result", "a certificate", &told(&problem))],
     }
 }
@@ -94,7 +102,7 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
     let job = Job {
         kind,
         inputs: vec![Input { name, model }],
-        params: Params { tolerance_mm: manifest.tolerance_mm.unwrap_or(f64::NAN), radius_mm: manifest.radius_mm },
+        params: Params { tolerance_mm: manifest.tolerance_mm.unwrap_or(f64::NAN), radius_mm: manifest.radius_mm, normals: false },
         outputs: Vec::new(),
         limits: Limits::default(),
     };
@@ -102,6 +110,29 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
     let _watchdog = Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
     let outcome = production::compute(&job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
     serde_json::to_value(&outcome.certificate).map_err(|error| Problem::internal(error.to_string()))
+}
+
+/// The comparisons of `[point.*]`.
+fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest) -> Vec<Row> {
+    if manifest.point.is_empty() {
+        return Vec::new();
+    }
+    let model = match documents::read_model_in(document, Some(folder)) {
+        Ok(model) => model,
+        Err(problem) => return vec![Row::failure("points", "a model", &told(&problem))],
+    };
+    let name = |address: &String| format!("point {address}");
+    let parsed: Result<Vec<Address>, String> = manifest.point.keys().map(|text| text.parse().map_err(|_| text.clone())).collect();
+    let addresses = match parsed {
+        Ok(addresses) => addresses,
+        Err(text) => return vec![Row::failure(&name(&text), "an address", &text)],
+    };
+    match addresses::points(&model, &addresses, POINTS_TIME) {
+        Ok(found) => {
+            manifest.point.iter().zip(&found).map(|((text, expected), got)| compare::point_row(&name(text), expected, got)).collect()
+        }
+        Err(problem) => vec![Row::failure("points", "points at all addresses", &told(&problem))],
+    }
 }
 
 fn compare_refusal(refused: &Refused, result: Result<serde_json::Value, Problem>) -> Row {

@@ -24,6 +24,8 @@ pub struct Params {
     /// Radius of the dilating ball, in mm: required by `solidify`, optional for `measure` (without
     /// it the shape itself is measured).
     pub radius_mm: Option<f64>,
+    /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
+    pub normals: bool,
 }
 
 /// A model with the name that the job gives it.

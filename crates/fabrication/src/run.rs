@@ -1,6 +1,6 @@
 //! One entry for every door: `plan` predicts, `run` does, `validate` tells what is wrong.
 
-use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, stream};
+use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refine_with_normals, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
 use lacuna_kernel::dilation::{DilationError, dilate, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
@@ -169,7 +169,7 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let lowered = lower(job, budget)?;
     let attractor = &lowered.attractor;
     match (job.kind, radius) {
-        (JobKind::Evaluate, _) => evaluate(attractor, tolerance, budget),
+        (JobKind::Evaluate, _) => evaluate(attractor, tolerance, job.params.normals, budget),
         (JobKind::Solidify, Some(radius)) => {
             let dilation = dilate(attractor, radius, tolerance, budget)?;
             let certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
@@ -209,10 +209,25 @@ fn share_of(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Res
     Ok((bounds, Tolerance::new(share)?))
 }
 
-fn evaluate(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+fn evaluate(attractor: &Attractor, tolerance: Tolerance, normals: bool, budget: &Budget) -> Result<Outcome, JobError> {
     let (bounds, share) = share_of(attractor, tolerance, budget)?;
-    let tessellation = refine(attractor, share, budget)?;
-    let certificate = certificate::of_evaluation(attractor, &tessellation, &bounds, tolerance);
+    let mut remarks = Vec::new();
+    let planes = normals.then(|| attractor.tangent_planes());
+    let tessellation = match &planes {
+        Some(Ok(planes)) => refine_with_normals(attractor, planes, share, budget)?,
+        _ => refine(attractor, share, budget)?,
+    };
+    match (&planes, &tessellation.normals) {
+        (Some(Err(reason)), _) => remarks.push(format!("no normals: {reason}")),
+        (Some(Ok(planes)), Some(normals)) if normals.degenerate > 0 => {
+            let reason = planes.exception().map_or_else(|| "control points coincide".to_owned(), ToString::to_string);
+            remarks.push(format!("{} corners of triangles have the triangle's normal: {reason}", normals.degenerate));
+        }
+        (Some(Ok(_)), None) => remarks.push("no normals: parts of the shape are no surface that is evaluated as one complex".to_owned()),
+        _ => {}
+    }
+    let mut certificate = certificate::of_evaluation(attractor, &tessellation, &bounds, tolerance);
+    certificate.warnings.extend(remarks);
     Ok(Outcome { geometry: Geometry::Tessellation(tessellation), certificate })
 }
 

@@ -1,11 +1,14 @@
-//! Subdivision surfaces against OpenSubdiv (Debian's libosd-dev): limit points on random cages with creases, corners
-//! and boundaries. Skipped with a message where it is not installed.
+//! Subdivision surfaces against OpenSubdiv (Debian's libosd-dev): limit points and normals on random cages with creases,
+//! corners and boundaries. Skipped with a message where it is not installed.
 
 mod cages;
 
 use cages::{attractor, cube, evaluated, grid, inset_torus, patches, tetrahedron, torus};
 use glam::DVec3;
+use lacuna_kernel::attractor::{refine, refine_with_normals};
+use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, Corner, Crease, Scheme, Subdivision};
+use lacuna_kernel::tolerance::Tolerance;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -15,7 +18,7 @@ use std::process::{Command, Stdio};
 fn peer() -> Result<PathBuf, String> {
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/opensubdiv/limits.cpp");
     let binary = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("opensubdiv-limits");
-    let made = Command::new("g++").args(["-O1", "-o"]).arg(&binary).arg(source).arg("-losdCPU").output();
+    let made = Command::new("g++").args(["-O2", "-o"]).arg(&binary).arg(source).arg("-losdCPU").output();
     match made {
         Err(error) => Err(format!("no compiler: {error}")),
         Ok(output) if !output.status.success() => Err("OpenSubdiv is not installed (apt-get install libosd-dev)".into()),
@@ -23,8 +26,8 @@ fn peer() -> Result<PathBuf, String> {
     }
 }
 
-/// The peer's limit points at a level.
-fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<DVec3> {
+/// What the peer says of a surface.
+fn ask(peer: &PathBuf, surface: &Subdivision, level: usize, arguments: &[&str]) -> String {
     let mut text = String::new();
     let scheme = if surface.scheme == Scheme::Loop { "loop" } else { "catmark" };
     let _ = writeln!(text, "{scheme} {} {level}", i32::from(surface.boundary == BoundaryRule::SharpCorners));
@@ -40,16 +43,21 @@ fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<DVec3> {
     surface.creases.iter().for_each(|c| writeln!(text, "{} {} {}", c.edge[0], c.edge[1], c.sharpness.min(10.0)).expect("text"));
     let _ = writeln!(text, "{}", surface.corners.len());
     surface.corners.iter().for_each(|c| writeln!(text, "{} {}", c.vertex, c.sharpness.min(10.0)).expect("text"));
-    let mut child = Command::new(peer).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("runs");
+    let mut child = Command::new(peer).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("runs");
     let mut stdin = child.stdin.take().expect("piped");
     let writer = std::thread::spawn(move || stdin.write_all(text.as_bytes()));
     let output = child.wait_with_output().expect("ends");
     writer.join().expect("no panic").expect("written");
     assert!(output.status.success());
-    let text = String::from_utf8(output.stdout).expect("text");
-    let line = |line: &str| -> DVec3 {
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The peer's limit points and normals at a level.
+fn limits(peer: &PathBuf, surface: &Subdivision, level: usize) -> Vec<[DVec3; 2]> {
+    let text = ask(peer, surface, level, &[]);
+    let line = |line: &str| -> [DVec3; 2] {
         let numbers: Vec<f64> = line.split_whitespace().map(|word| word.parse().expect("a number")).collect();
-        DVec3::new(numbers[0], numbers[1], numbers[2])
+        [0, 3].map(|k| DVec3::new(numbers[k], numbers[k + 1], numbers[k + 2]))
     };
     text.lines().map(line).collect()
 }
@@ -156,7 +164,7 @@ fn limit_points_are_opensubdivs() {
         let surface = surface(round, scheme, &mut random).0;
         let scale = surface.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
         let level = 4;
-        let theirs = limits(&peer, &surface, level);
+        let theirs: Vec<DVec3> = limits(&peer, &surface, level).into_iter().map(|[point, _]| point).collect();
         let ours: Vec<DVec3> = patches(&attractor(surface.clone()), level).into_iter().flatten().collect();
         let (allowed, darts) = (1e-6 * scale, darts(&surface));
         let missing = [unmatched(&ours, &theirs, allowed), unmatched(&theirs, &ours, allowed)];
@@ -166,4 +174,137 @@ fn limit_points_are_opensubdivs() {
         compared += theirs.len();
     }
     eprintln!("{compared} limit points compared");
+}
+
+/// Vertices that stay, for which OpenSubdiv takes the plane of two neighbouring edges, whatever the faces do; darts; and
+/// vertices of a smooth boundary with one face, which have no tangent plane.
+fn corners(surface: &Subdivision) -> usize {
+    let mut sharp = vec![0; surface.vertices.len()];
+    let mut edges = std::collections::BTreeMap::new();
+    for face in &surface.faces {
+        for k in 0..face.len() {
+            let (a, b) = (face[k], face[(k + 1) % face.len()]);
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+        }
+    }
+    edges.retain(|&(a, b), count| {
+        *count == 1 || surface.creases.iter().any(|c| c.sharpness >= 10.0 && c.edge.contains(&a) && c.edge.contains(&b))
+    });
+    edges.keys().for_each(|&(a, b)| [a, b].iter().for_each(|&v| sharp[v as usize] += 1));
+    surface.corners.iter().filter(|c| c.sharpness >= 10.0).for_each(|c| sharp[c.vertex as usize] = 3);
+    let faces = |vertex: u32| surface.faces.iter().filter(|face| face.contains(&vertex)).count();
+    sharp.iter().enumerate().filter(|&(vertex, &count)| count == 1 || count > 2 || (count == 2 && faces(vertex as u32) == 1)).count()
+}
+
+#[test]
+fn limit_normals_are_opensubdivs() {
+    let peer = match peer() {
+        Ok(peer) => peer,
+        Err(reason) => return eprintln!("skipped: {reason}"),
+    };
+    let mut random = Random(13);
+    let (mut compared, mut surfaces) = (0, 0);
+    for round in 0..60 {
+        let scheme = if round % 2 == 0 { Scheme::CatmullClark } else { Scheme::Loop };
+        let surface = surface(round, scheme, &mut random).0;
+        let attractor = attractor(surface.clone());
+        let planes = attractor.tangent_planes().unwrap_or_else(|reason| panic!("round {round}: {reason}: {surface:?}"));
+        let scale = surface.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
+        let drawn =
+            refine_with_normals(&attractor, &planes, Tolerance::new(0.02 * scale).expect("positive"), &Budget::default()).expect("refines");
+        let normals = drawn.normals.as_ref().expect("asked for");
+        // All normals of a vertex.
+        let mut own: Vec<Vec<DVec3>> = vec![Vec::new(); drawn.vertices.len()];
+        for (triangle, corners) in drawn.triangles.iter().zip(&normals.triangles) {
+            triangle.iter().zip(corners).for_each(|(&vertex, &normal)| own[vertex as usize].push(normals.vectors[normal as usize]));
+        }
+        let (mut found, mut off) = (0, 0);
+        for [point, normal] in limits(&peer, &surface, 4) {
+            let Some(vertex) = drawn.vertices.iter().position(|vertex| vertex.distance(point) < 1e-7 * scale) else { continue };
+            found += 1;
+            let wrong = usize::from(own[vertex].iter().all(|own| own.distance(normal) > 1e-6));
+            off += wrong;
+        }
+        assert!(found >= surface.vertices.len(), "round {round}: {found} points found: {surface:?}");
+        assert!(off <= corners(&surface), "round {round}: {off} of {found} normals, {} corners: {surface:?}", corners(&surface));
+        compared += found;
+        surfaces += 1;
+    }
+    assert!(surfaces >= 20, "{surfaces} surfaces have normals");
+    eprintln!("{compared} limit normals compared on {surfaces} surfaces");
+}
+
+#[test]
+fn a_crease_has_one_normal_for_each_side() {
+    // Two squares, folded along an edge that is sharp: flat sides in the planes of the squares.
+    let mut folded = grid(Scheme::CatmullClark, 4, 2, |x, _| (x - 2.0).abs());
+    folded.boundary = BoundaryRule::SharpCorners;
+    folded.creases.extend([[6, 7], [7, 8]].map(|edge| Crease { edge, sharpness: f64::INFINITY }));
+    // One side is curved, so that it is finer.
+    folded.vertices[13].z += 0.7;
+    let attractor = attractor(folded);
+    let planes = attractor.tangent_planes().expect("smooth but for the crease");
+    let drawn = refine_with_normals(&attractor, &planes, Tolerance::new(0.01).expect("positive"), &Budget::default()).expect("refines");
+    let normals = drawn.normals.expect("asked for");
+    assert_eq!(normals.degenerate, 0);
+    let flat = DVec3::new(1.0, 0.0, 1.0).normalize();
+    let (mut seen, mut hanging) = (0, 0);
+    for (triangle, corners) in drawn.triangles.iter().zip(&normals.triangles) {
+        let at = triangle.map(|vertex| drawn.vertices[vertex as usize]);
+        if at.iter().all(|p| p.x < 2.0 + 1e-12) {
+            for (p, &normal) in at.iter().zip(corners) {
+                assert!(normals.vectors[normal as usize].cross(flat).length() < 1e-12, "{p}: {}", normals.vectors[normal as usize]);
+                hanging += usize::from(p.x > 2.0 - 1e-12);
+            }
+            seen += 1;
+        }
+    }
+    assert!(seen >= 4 && hanging > 10, "{seen} {hanging}");
+}
+
+/// CPU seconds of this process so far, in hundredths; `None` where there is no /proc.
+fn cpu_seconds() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = text.rsplit(')').next()?.split_whitespace().collect();
+    Some((fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?) / 100.0)
+}
+
+/// Level 6 of a cage of 468 quads: the tolerance is the one at which as many faces are drawn. Alone in its process the CPU
+/// time is this evaluation's: `cargo test --test subdivision_peer -- --ignored --nocapture --test-threads 1`.
+#[test]
+#[ignore = "a measurement, to be run alone"]
+fn speed_beside_opensubdiv() {
+    let surface = cages::head();
+    let attractor = attractor(surface.clone());
+    let budget = Budget::default();
+    let evaluate = || {
+        let (clock, cpu) = (std::time::Instant::now(), cpu_seconds());
+        let drawn = refine(&attractor, Tolerance::new(5e-4).expect("positive"), &budget).expect("refines");
+        let cpu = cpu.zip(cpu_seconds()).map_or(f64::NAN, |(before, after)| after - before);
+        (cpu, clock.elapsed().as_secs_f64(), drawn.vertices.len())
+    };
+    let peer = peer();
+    for _ in 0..3 {
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let (cpu, wall, vertices) = pool.install(evaluate);
+            eprintln!(
+                "{threads} threads: {cpu:.2} s CPU, {wall:.2} s, {vertices} vertices, {:.3} us CPU a vertex",
+                1e6 * cpu / vertices as f64
+            );
+        }
+        match &peer {
+            Ok(peer) => {
+                let text = ask(peer, &surface, 6, &["time"]);
+                let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().expect("a number")).collect();
+                eprintln!(
+                    "OpenSubdiv: {} s CPU, {} vertices, {:.3} us CPU a vertex",
+                    numbers[0],
+                    numbers[1],
+                    1e6 * numbers[0] / numbers[1]
+                );
+            }
+            Err(reason) => eprintln!("skipped: {reason}"),
+        }
+    }
 }

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec4;
-use lacuna_kernel::model::{Bcifs, BcifsState, BoundarySpec, CellKind, Entry, Matrix, RootCell, TransitionSpec};
+use lacuna_kernel::model::{Bcifs, BcifsState, BoundarySpec, CellKind, CurveScheme, Entry, Matrix, RootCell, TransitionSpec};
 
 use super::constraint::{adjacency, glue, incidence, relation};
 use super::grammar::{BCIFS, BOUNDARY, Member, ROOT_CELL, STATE, TRANSITION};
@@ -75,6 +75,18 @@ pub(super) fn bcifs(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member])
         glue: glue?,
         parameters: parameters?,
     })
+}
+
+/// The states of a curve in a product, and the one that it starts from: the first unless another is named.
+pub(super) fn curve_states(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<CurveScheme> {
+    let place = members.get("states")?;
+    let names = Names { states: outlines(place.node), parameters: Some(BTreeSet::new()) };
+    let states = states(walker, place, &names);
+    let start = match members.get("start") {
+        Some(place) => walker.text(place, "the name of a state").map(str::to_owned),
+        None => states.as_ref().and_then(|states| states.first()).map(|state| state.name.clone()),
+    };
+    Some(CurveScheme::Bcifs { states: states?, start: start? })
 }
 
 fn optional_list<T>(

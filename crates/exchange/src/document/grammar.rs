@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 
 use super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
+use super::join::SIDES;
 use crate::format::FORMATS;
 
 /// A kind of object.
@@ -435,6 +436,77 @@ pub(super) const NURBS_CURVE: Object = Object {
     ],
 };
 
+fn parameter() -> Value {
+    tuple(number(), 2)
+}
+
+fn trim() -> Value {
+    reference("Trim")
+}
+
+fn trim_loop() -> Value {
+    list(reference("TrimCurve"), 1)
+}
+
+/// A parameter with an optional weight, as a schema without members.
+pub(super) fn trim_point_schema() -> Value {
+    json!({
+        "description": "A parameter [u, v], or [u, v, w] with a positive weight w (1 when absent). Parameters have no unit and are not multiplied by w.",
+        "type": "array", "items": number(), "minItems": 2, "maxItems": 3
+    })
+}
+
+fn trim_points() -> Value {
+    list(reference("TrimPoint"), 2)
+}
+
+const TRIM_MEMBER: Member = optional("trim", "Loops that cut the surface in its parameter plane; the whole surface when absent.", trim);
+
+pub(super) const TRIM: Object = Object {
+    title: "a trim",
+    about: "What is kept of a surface: the closed region of its parameter plane between an outer loop and inner loops. u is the first direction of the control points and v the second; the domain is that of the knots, or [0, 1] for Bezier surfaces. A loop is a closed chain of curves, either way round, within the domain; loops neither cross nor touch themselves or each other. Ends of curves that miss each other by 1e-6 of the domain or less are joined.",
+    members: &[
+        optional(
+            "outer",
+            "The curves of the outer loop, in order; the border of the domain when absent. It may run along that border.",
+            trim_loop,
+        ),
+        optional("inner", "Loops around holes: inside the outer loop, and not inside each other.", || list(trim_loop(), 0)),
+    ],
+};
+
+pub(super) const TRIM_POLYLINE: Object = Object {
+    title: "a polyline",
+    about: "Segments between successive parameters.",
+    members: &[family!("polyline"), required("points", "Parameters [u, v], in order.", || list(parameter(), 2))],
+};
+
+pub(super) const TRIM_BEZIER: Object = Object {
+    title: "a bezier_curve of parameters",
+    about: "A polynomial or rational Bezier curve in the parameter plane.",
+    members: &[
+        family!("bezier_curve"),
+        required("control_points", "The control points [u, v] or [u, v, w], in order.", trim_points),
+        WEIGHTS,
+    ],
+};
+
+pub(super) const TRIM_NURBS: Object = Object {
+    title: "a nurbs_curve of parameters",
+    about: "A polynomial or rational spline in the parameter plane.",
+    members: &[
+        NURBS_SCHEME.members[0],
+        NURBS_SCHEME.members[1],
+        NURBS_SCHEME.members[2],
+        required("control_points", "The control points [u, v] or [u, v, w], in order.", trim_points),
+        WEIGHTS,
+    ],
+};
+
+/// Curves that trim loops are made of, with the schema's name.
+pub(super) const TRIM_CURVES: [(&str, &str, &Object); 3] =
+    [("polyline", "TrimPolyline", &TRIM_POLYLINE), ("bezier_curve", "TrimBezier", &TRIM_BEZIER), ("nurbs_curve", "TrimNurbs", &TRIM_NURBS)];
+
 pub(super) const NURBS_SURFACE: Object = Object {
     title: "a nurbs_surface",
     about: "A polynomial or rational spline surface. Directions whose ends meet are closed; sides that are single points are poles.",
@@ -444,6 +516,7 @@ pub(super) const NURBS_SURFACE: Object = Object {
         required("knots", "A full knot vector for each direction.", || tuple(knots(), 2)),
         required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
         optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+        TRIM_MEMBER,
     ],
 };
 
@@ -466,6 +539,7 @@ pub(super) const BEZIER_SURFACE: Object = Object {
         family!("bezier_surface"),
         required("control_points", "control_points[i][j], i along the first direction.", || nested(net_point, 2)),
         optional("weights", "Positive weights of the same shape, unless the points carry theirs.", || nested(positive, 2)),
+        TRIM_MEMBER,
     ],
 };
 
@@ -559,6 +633,22 @@ pub(super) const INTERPOLATION: Object = Object {
     ],
 };
 
+pub(super) const BCIFS_SCHEME: Object = Object {
+    title: "the states of a curve",
+    about: "A curve of one's own states: edges between two vertices. As many control points as the first state has.",
+    members: &[
+        family!("bcifs"),
+        required("states", "The kinds of cells: the curve's, those that it reaches, and their vertices.", || list(reference("State"), 1)),
+        optional("start", "The name of the curve's state; the first when absent.", text),
+    ],
+};
+
+pub(super) const IFS_SCHEME: Object = Object {
+    title: "the maps of a curve",
+    about: "The curve of affine maps whose images follow each other, drawn in the affine frame of four control points: o, o + x, o + y, o + z.",
+    members: &[family!("ifs"), required("maps", "The maps, in order along the curve.", || list(reference("AffineMap"), 2))],
+};
+
 pub(super) const TENSOR: Object = Object {
     title: "a tensor",
     about: "The tensor product of two or three curve schemes on a net of control points.",
@@ -587,7 +677,7 @@ pub(super) const SUM: Object = Object {
 };
 
 /// Curve schemes that products are made of, with the schema's name.
-pub(super) const SCHEMES: [(&str, &str, &Object); 7] = [
+pub(super) const SCHEMES: [(&str, &str, &Object); 9] = [
     ("bezier_curve", "BezierScheme", &BEZIER_SCHEME),
     ("nurbs_curve", "NurbsScheme", &NURBS_SCHEME),
     ("catmull_rom", "CatmullRomScheme", &CATMULL_ROM_SCHEME),
@@ -595,6 +685,8 @@ pub(super) const SCHEMES: [(&str, &str, &Object); 7] = [
     ("corner_cutting", "CornerCuttingScheme", &CORNER_CUTTING_SCHEME),
     ("four_point", "FourPointScheme", &FOUR_POINT_SCHEME),
     ("interpolation", "InterpolationScheme", &INTERPOLATION_SCHEME),
+    ("bcifs", "BcifsScheme", &BCIFS_SCHEME),
+    ("ifs", "IfsScheme", &IFS_SCHEME),
 ];
 
 /// Curves that sums are made of, with the schema's name.
@@ -715,7 +807,45 @@ pub(super) const TERRAIN: Object = Object {
 pub(super) const GROUP: Object = Object {
     title: "a group",
     about: "The union of several shapes.",
-    members: &[family!("group"), required("parts", "The shapes, each with an optional name and place.", || list(reference("Part"), 1))],
+    members: &[
+        family!("group"),
+        required("parts", "The shapes, each with an optional name and place.", || list(reference("Part"), 1)),
+        optional(
+            "joins",
+            "Borders of parts that become one, so that the parts share the edges and vertices there, or that a strip joins.",
+            || list(reference("Join"), 0),
+        ),
+    ],
+};
+
+pub(super) const JOIN: Object = Object {
+    title: "a join",
+    about: "Two borders of parts that become one: they are the same curve, span by span, whichever way each runs.",
+    members: &[
+        required("between", "The two borders.", || tuple(reference("Border"), 2)),
+        optional(
+            "strip",
+            "Whether a strip fills the space between the borders, of a bicubic and a biquadratic surface (NURBS with knots that are uniform along the border, regular Catmull-Clark and Doo-Sabin), and meets both with their tangent planes.",
+            flag,
+        ),
+    ],
+};
+
+pub(super) const BORDER: Object = Object {
+    title: "a border",
+    about: "A border of a part, or a piece of it. Exactly one of side, vertices and boundaries is given.",
+    members: &[
+        required("part", "Index of the part.", index),
+        optional("side", "Of a NURBS, Bezier, tensor or sum surface: the first or last value of u or v.", || {
+            one_of_words(&SIDES.map(|(name, _)| name))
+        }),
+        optional(
+            "vertices",
+            "Of a subdivision surface: the mesh's vertices along the border, in either direction; the first again at the end of a border that is taken all round. With catmull_clark and loop the edges between them are the spans, with doo_sabin the vertices.",
+            || list(index(), 1),
+        ),
+        optional("boundaries", "Of a BC-IFS: pairs [root cell, boundary of its state] along the border.", || list(index_pair(), 1)),
+    ],
 };
 
 /// What a part has besides its shape.
@@ -812,6 +942,11 @@ pub(super) const JOB_PARAMS: Object = Object {
             "radius_mm",
             "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, absent for evaluate.",
             positive,
+        ),
+        optional(
+            "normals",
+            "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",
+            flag,
         ),
     ],
 };

@@ -268,7 +268,17 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(radius) => Some(radius?),
         None => None,
     };
-    Some(Params { tolerance_mm: tolerance?, radius_mm })
+    if let (Some(JobKind::Solidify | JobKind::Measure), Some(normals)) = (kind, members.get("normals")) {
+        walker.fault(&normals, code::CONFLICTING_MEMBERS, || {
+            "only evaluate takes \"normals\"; remove it, or ask for the kind \"evaluate\"".into()
+        });
+        return None;
+    }
+    let normals = match members.get("normals") {
+        Some(place) => walker.flag(place)?,
+        None => false,
+    };
+    Some(Params { tolerance_mm: tolerance?, radius_mm, normals })
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {

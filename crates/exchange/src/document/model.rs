@@ -6,6 +6,7 @@ use super::bcifs::bcifs;
 use super::curve::{bezier_curve, corner_cutting};
 use super::grammar::{BEZIER_SURFACE, EMBEDDED_MODEL, FAMILIES, GROUP, MODEL, Member, NURBS_SURFACE, NURBS_VOLUME, PART, PART_MEMBERS};
 use super::ifs::ifs;
+use super::join::join;
 use super::mesh::mesh;
 use super::node::{Place, Value, number_text, quoted};
 use super::scheme;
@@ -13,7 +14,7 @@ use super::subdivision::subdivision;
 use super::terrain::terrain;
 use super::transform::affine_map;
 use super::units::{UNITS, Unit};
-use super::walk::{Walker, suggestion};
+use super::walk::{Walker, length, suggestion};
 use crate::diagnostic::code;
 
 /// The version of the grammar that is read.
@@ -89,8 +90,13 @@ fn shape(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<
 
 fn group(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]) -> Option<Group> {
     let members = walker.object_of(place, &GROUP, added)?;
-    let parts = members.get("parts").and_then(|place| walker.each_of(place, 1, "an array of parts", part))?;
-    Some(Group { parts })
+    let parts = members.get("parts").and_then(|place| walker.each_of(place, 1, "an array of parts", part));
+    let count = members.get("parts").and_then(|place| length(place.node)).unwrap_or(usize::MAX);
+    let joins = match members.get("joins") {
+        Some(place) => walker.each_of(place, 0, "an array of joins", |walker, place| join(walker, place, count)),
+        None => Some(Vec::new()),
+    };
+    Some(Group { parts: parts?, joins: joins? })
 }
 
 /// A part: a shape that has a name and a place besides its own members, or that is a member itself.

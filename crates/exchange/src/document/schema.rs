@@ -7,9 +7,10 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADDRESS_QUESTION, ADJACENCY, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE, INCIDENCE,
-    JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE, RELATION,
-    ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TURNED_MAP, control_point_schema, matrix_schema, reference,
+    ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
+    INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
+    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, control_point_schema, matrix_schema,
+    reference, trim_point_schema,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -45,7 +46,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 18] = [
+    const PLAIN: [(&str, &Object); 20] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -62,6 +63,8 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Crease", &CREASE),
         ("Corner", &CORNER),
         ("Coefficients", &COEFFICIENTS),
+        ("Join", &JOIN),
+        ("Trim", &TRIM),
         ("JobParams", &JOB_PARAMS),
         ("JobLimits", &JOB_LIMITS),
     ];
@@ -72,6 +75,9 @@ fn named_schemas() -> Vec<(String, Value)> {
     let schemes = any_of("A curve shape without control points.", SCHEMES.iter().map(|(_, name, _)| reference(name)));
     schemas.push(("CurveScheme".into(), schemes));
     schemas.push(("CurveShape".into(), any_of("A curve.", CURVES.iter().map(|(_, name, _)| reference(name)))));
+    schemas.extend(TRIM_CURVES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));
+    schemas.push(("TrimCurve".into(), any_of("A curve in the parameter plane.", TRIM_CURVES.iter().map(|(_, name, _)| reference(name)))));
+    schemas.push(("TrimPoint".into(), trim_point_schema()));
     let placed = FAMILIES.iter().map(|(_, _, grammar)| object(grammar, PART_MEMBERS));
     let parts = std::iter::once(object(&PART, &[])).chain(placed);
     schemas.push((
@@ -83,6 +89,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("ControlPoint".into(), control_point_schema()));
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
+    schemas.push(("Border".into(), exactly_one(object(&BORDER, &[]), &["side", "vertices", "boundaries"])));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
     schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
     schemas.push(("AddressQuestion".into(), address_question()));
@@ -147,9 +154,9 @@ fn job() -> Value {
     let kind =
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
-        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"] } } })),
+        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"], "not": { "required": ["normals"] } } } })),
         kind("evaluate", json!({ "properties": { "params": { "not": { "required": ["radius_mm"] } } } })),
-        kind("measure", json!({ "properties": { "outputs": { "maxItems": 0 } } })),
+        kind("measure", json!({ "properties": { "outputs": { "maxItems": 0 }, "params": { "not": { "required": ["normals"] } } } })),
     ]);
     schema
 }

@@ -3,9 +3,11 @@
 use glam::DVec3;
 use lacuna_kernel::model::{ControlNet, Curve, CurveScheme, Parametrization, Sum, TensorProduct};
 
+use super::bcifs::curve_states;
 use super::grammar::{CURVES, Member, NURBS_SURFACE, NURBS_VOLUME, Object, SCHEMES, SUM, TENSOR};
 use super::node::{Place, Value, quoted};
 use super::transform::{affine_map, control_point, point};
+use super::trim::trim;
 use super::walk::{Members, Walker, length, suggestion};
 use crate::diagnostic::code;
 
@@ -70,6 +72,10 @@ fn scheme_of(walker: &mut Walker<'_>, family: &str, members: &Members<'_>) -> Op
             CurveScheme::FourPoint { tension: tension?, closed: closed? }
         }
         "interpolation" => return interpolation(walker, members),
+        "bcifs" => return curve_states(walker, members),
+        "ifs" => CurveScheme::Ifs {
+            maps: members.get("maps").and_then(|place| walker.each_of(place, 2, "an array of affine maps", affine_map))?,
+        },
         _ => CurveScheme::Bezier,
     })
 }
@@ -92,11 +98,11 @@ fn interpolation(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Curve
     }
 }
 
-fn degree(walker: &mut Walker<'_>, place: Place<'_>) -> Option<usize> {
+pub(super) fn degree(walker: &mut Walker<'_>, place: Place<'_>) -> Option<usize> {
     walker.integer(place, "a degree").and_then(|degree| usize::try_from(degree).ok())
 }
 
-fn knots(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Vec<f64>> {
+pub(super) fn knots(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Vec<f64>> {
     walker.each_of(place, 4, "an array of knots", |walker, knot| walker.number(knot))
 }
 
@@ -116,7 +122,11 @@ pub(super) fn surface(walker: &mut Walker<'_>, place: Place<'_>, grammar: &Objec
         Some(vec![CurveScheme::Bezier; directions])
     };
     let control_points = net(walker, &members, directions);
-    Some(TensorProduct { schemes: schemes?, control_points: control_points?, separate: false })
+    let trim = match members.get("trim") {
+        Some(place) => trim(walker, place).map(Some),
+        None => Some(None),
+    };
+    Some(TensorProduct { schemes: schemes?, control_points: control_points?, separate: false, trim: trim? })
 }
 
 /// As many values as directions.
@@ -142,7 +152,7 @@ pub(super) fn tensor(walker: &mut Walker<'_>, place: Place<'_>, added: &[Member]
         ["u", "v", "w"].into_iter().filter_map(|name| members.get(name)).map(|place| factor(walker, place)).collect();
     let control_points = net(walker, &members, if members.get("w").is_some() { 3 } else { 2 });
     let schemes = factors.into_iter().collect::<Option<Vec<_>>>()?;
-    Some(TensorProduct { schemes, control_points: control_points?, separate: true })
+    Some(TensorProduct { schemes, control_points: control_points?, separate: true, trim: None })
 }
 
 /// A curve scheme without control points.
@@ -154,7 +164,7 @@ fn factor(walker: &mut Walker<'_>, place: Place<'_>) -> Option<CurveScheme> {
 }
 
 /// The family of a curve, one of those given.
-fn family<'p>(walker: &mut Walker<'_>, place: Place<'p>, names: impl Iterator<Item = &'static str>) -> Option<&'p str> {
+pub(super) fn family<'p>(walker: &mut Walker<'_>, place: Place<'p>, names: impl Iterator<Item = &'static str>) -> Option<&'p str> {
     let Value::Object(entries) = &place.node.value else {
         return walker.wrong_type(&place, "an object (a curve with its family)");
     };

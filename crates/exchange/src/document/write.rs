@@ -4,13 +4,14 @@
 //! defaults left out, parameters in their own order, every number the shortest that reads back to the
 //! same double, and no negative zero.
 
-use glam::{DMat3, DVec3, DVec4};
+use super::join::SIDES;
+use glam::{DMat3, DVec2, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, CellKind, Coefficients, ControlNet, Corner, CornerCutting, Crease,
-    Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model, Parametrization, Part, PolygonMesh, Primitive,
-    Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, CellKind, Coefficients, ControlNet, Corner,
+    CornerCutting, Crease, Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Parametrization, Part,
+    PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase, Trim, TrimCurve,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -106,6 +107,8 @@ impl<M: SerializeMap> Members<M> {
             CurveScheme::BetaSpline { .. } => "beta_spline",
             CurveScheme::FourPoint { .. } => "four_point",
             CurveScheme::Interpolation { .. } | CurveScheme::AffineInterpolation { .. } => "interpolation",
+            CurveScheme::Bcifs { .. } => "bcifs",
+            CurveScheme::Ifs { .. } => "ifs",
         };
         self.put("family", &family)?;
         if let CurveScheme::Nurbs { degree, knots } = scheme {
@@ -131,7 +134,8 @@ impl<M: SerializeMap> Members<M> {
             }
             CurveScheme::FourPoint { tension, closed } => self.put("w", &Number(*tension))?.put_if(*closed, "closed", &true),
             CurveScheme::Interpolation { vertical_scaling } => self.put("vertical_scaling", &numbers(vertical_scaling)),
-            CurveScheme::AffineInterpolation { maps } => self.put("maps", &list(maps)),
+            CurveScheme::AffineInterpolation { maps } | CurveScheme::Ifs { maps } => self.put("maps", &list(maps)),
+            CurveScheme::Bcifs { states, start } => self.put("states", &list(states))?.put("start", start),
         }
     }
 
@@ -252,7 +256,8 @@ object! {
     Input: |input, members| members.put("name", &input.name)?.put("model", &Wire(&input.model))?;
     lacuna_fabrication::job::Params: |params, members| members
         .put("tolerance_mm", &Number(params.tolerance_mm))?
-        .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?;
+        .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
+        .put_if(params.normals, "normals", &true)?;
     Limits: |limits, members| members
         .put("seconds", &Number(limits.seconds))?
         .put("triangles", &limits.triangles)?
@@ -321,7 +326,20 @@ object! {
                 members.put("family", &family)?.put("degree", &degrees)?.put("knots", &knots)?;
             }
         }
-        members.put("control_points", &points_of(&product.control_points))?.weights(&product.control_points)?
+        members
+            .put("control_points", &points_of(&product.control_points))?
+            .weights(&product.control_points)?
+            .put_some("trim", product.trim.as_ref().map(Wire).as_ref())?
+    };
+    Trim: |trim, members| members
+        .put_some("outer", trim.outer.as_ref().map(|curves| list(curves)).as_ref())?
+        .put_if(!trim.inner.is_empty(), "inner", &trim.inner.iter().map(|curves| list(curves)).collect::<Vec<_>>())?;
+    TrimCurve: |curve, members| match curve {
+        TrimCurve::Polyline(points) => members.put("family", &"polyline")?.put("points", &list(points))?,
+        TrimCurve::Spline { scheme, control_points, weights } => members
+            .scheme(scheme, None)?
+            .put("control_points", &list(control_points))?
+            .put_some("weights", weights.as_ref().map(|weights| numbers(weights)).as_ref())?,
     };
     Sum: |sum, members| members.put("family", &"sum")?.put("u", &Wire(&sum.u))?.put("v", &Wire(&sum.v))?;
     CurveScheme: |scheme, members| members.scheme(scheme, None)?;
@@ -345,7 +363,22 @@ object! {
             .put("levels", &terrain.levels)?
             .put_if(terrain.random_seed != 0, "random_seed", &terrain.random_seed)?
     };
-    Group: |group, members| members.put("family", &"group")?.put("parts", &list(&group.parts))?;
+    Group: |group, members| members
+        .put("family", &"group")?
+        .put("parts", &list(&group.parts))?
+        .put_if(!group.joins.is_empty(), "joins", &list(&group.joins))?;
+    Join: |join, members| members.put("between", &list(&join.between))?.put_if(join.strip, "strip", &true)?;
+    Border: |border, members| {
+        members.put("part", &border.part)?;
+        match &border.path {
+            BorderPath::Side { direction, last } => {
+                let side = SIDES.iter().find(|(_, side)| *side == (*direction, *last));
+                members.put_some("side", side.map(|(name, _)| name))?
+            }
+            BorderPath::Vertices(vertices) => members.put("vertices", vertices)?,
+            BorderPath::Boundaries(boundaries) => members.put("boundaries", boundaries)?,
+        }
+    };
 }
 
 impl Serialize for Wire<'_, Shape> {
@@ -395,6 +428,12 @@ struct Parameters<'m>(&'m [(String, f64)]);
 impl Serialize for Parameters<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, Number(*value))))
+    }
+}
+
+impl Serialize for Wire<'_, DVec2> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.to_array().map(Number))
     }
 }
 

@@ -5,7 +5,7 @@ use super::read::{Fan, MeshFile, each_face, face_count};
 use super::{Carries, text};
 use glam::DVec3;
 use lacuna_kernel::solid::{Solid, TriMesh};
-use lacuna_kernel::tessellation::Tessellation;
+use lacuna_kernel::tessellation::{Normals, Tessellation};
 
 /// A mesh and the name under which a file shows it.
 #[derive(Clone, Copy, Debug)]
@@ -71,13 +71,24 @@ pub(crate) struct Piece<'a> {
     fans: &'a [Fan],
     pub(crate) segments: &'a [[u32; 2]],
     pub(crate) points: &'a [u32],
+    /// At the corners of the triangles.
+    pub(crate) normals: Option<&'a Normals>,
     /// Whether the coordinates must be single-precision numbers already.
     exact: bool,
 }
 
 impl<'a> Piece<'a> {
     fn closed(name: Option<&'a str>, mesh: &'a TriMesh) -> Self {
-        Self { name, vertices: &mesh.vertices, triangles: &mesh.triangles, fans: &[], segments: &[], points: &[], exact: true }
+        Self {
+            name,
+            vertices: &mesh.vertices,
+            triangles: &mesh.triangles,
+            fans: &[],
+            segments: &[],
+            points: &[],
+            normals: None,
+            exact: true,
+        }
     }
 }
 
@@ -134,12 +145,57 @@ impl<'a> Geometry<'a> {
                 fans: &[],
                 segments: &sample.segments,
                 points: &sample.points,
+                normals: sample.normals.as_ref(),
                 exact: false,
             }],
             Self::Polygons { file, .. } => {
                 vec![Piece { fans: &file.fans, exact: false, ..Piece::closed(None, &file.mesh) }]
             }
         }
+    }
+}
+
+/// A piece with one normal for each vertex: vertices on creases occur once for every side.
+pub(crate) struct Split {
+    /// Vertices added at the end: of which each is a copy.
+    pub(crate) copies: Vec<u32>,
+    /// Of the piece's vertices, then of the copies.
+    pub(crate) normals: Vec<DVec3>,
+    /// The triangles over all of them.
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+impl Split {
+    /// `None` for pieces without normals. Linear, but for vertices with many normals.
+    pub(crate) fn of(piece: &Piece<'_>) -> Option<Self> {
+        const NONE: u32 = u32::MAX;
+        let given = piece.normals?;
+        let count = piece.vertices.len();
+        // The normal of every vertex, and its next copy.
+        let (mut normal, mut next) = (vec![NONE; count], vec![NONE; count]);
+        let mut copies = Vec::new();
+        let mut place = |vertex: u32, wanted: u32| {
+            let mut current = vertex as usize;
+            loop {
+                if normal[current] == NONE || normal[current] == wanted {
+                    normal[current] = wanted;
+                    return current as u32;
+                }
+                if next[current] == NONE {
+                    next[current] = normal.len() as u32;
+                    copies.push(vertex);
+                    normal.push(wanted);
+                    next.push(NONE);
+                    return normal.len() as u32 - 1;
+                }
+                current = next[current] as usize;
+            }
+        };
+        let triangles = piece.triangles.iter().zip(&given.triangles);
+        let triangles = triangles.map(|(corners, normals)| std::array::from_fn(|k| place(corners[k], normals[k]))).collect();
+        // Vertices of no triangle have none; formats want unit vectors.
+        let normals = normal.into_iter().map(|index| given.vectors.get(index as usize).copied().unwrap_or(DVec3::Z)).collect();
+        Some(Self { copies, normals, triangles })
     }
 }
 

@@ -3,11 +3,11 @@
 //! Format: Khronos, glTF 2.0 Specification (ISO/IEC 12113:2022), sections 3.6 (accessors), 3.7
 //! (meshes) and 4 (GLB). glTF is in metres with Y up. The buffer keeps the millimetres and the Z
 //! axis of the mesh, so that its numbers are the proven ones, and the root node scales and turns.
-//! Normals are left out: a viewer then shades the facets as they are, which the specification
+//! Normals are left out unless the geometry has some: a viewer then shades the facets as they are, which the specification
 //! demands of it.
 
 use super::error::{FormatError, Place};
-use super::geometry::{Piece, counts};
+use super::geometry::{Piece, Split, counts};
 use super::off::flush_full;
 use super::scanner::Scanner;
 use super::text::{CHUNK_BYTES, singles};
@@ -52,7 +52,12 @@ impl Layout {
         self.accessors.len() - 1
     }
 
-    fn positions(&mut self, piece: &Piece<'_>) -> usize {
+    fn normals(&mut self, count: usize) -> usize {
+        let accessor = json!({ "bufferView": self.views.len(), "componentType": FLOAT, "count": count, "type": "VEC3" });
+        self.add(count as u64 * 12, ARRAY_BUFFER, accessor)
+    }
+
+    fn positions(&mut self, piece: &Piece<'_>, count: usize) -> usize {
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for vertex in piece.vertices {
             for (axis, value) in singles(vertex).into_iter().enumerate() {
@@ -61,10 +66,10 @@ impl Layout {
             }
         }
         let accessor = json!({
-            "bufferView": self.views.len(), "componentType": FLOAT, "count": piece.vertices.len(), "type": "VEC3",
+            "bufferView": self.views.len(), "componentType": FLOAT, "count": count, "type": "VEC3",
             "min": low, "max": high,
         });
-        self.add(piece.vertices.len() as u64 * 12, ARRAY_BUFFER, accessor)
+        self.add(count as u64 * 12, ARRAY_BUFFER, accessor)
     }
 
     fn indices(&mut self, count: usize) -> usize {
@@ -75,7 +80,7 @@ impl Layout {
     }
 }
 
-fn document(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> Result<(Value, u64), FormatError> {
+fn document(pieces: &[Piece<'_>], splits: &[Option<Split>], metadata: &Metadata<'_>) -> Result<(Value, u64), FormatError> {
     let mut layout = Layout::default();
     let (mut meshes, mut nodes) = (Vec::new(), Vec::new());
     let root_name = metadata.title.unwrap_or("model");
@@ -85,14 +90,18 @@ fn document(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> Result<(Value, u64
         "name": root_name, "rotation": Z_UP_TO_Y_UP, "scale": scale, "children": children,
     }));
     for (number, piece) in pieces.iter().enumerate() {
-        let position = layout.positions(piece);
+        let split = splits[number].as_ref();
+        let position = layout.positions(piece, split.map_or(piece.vertices.len(), |split| split.normals.len()));
+        let normal = split.map(|split| layout.normals(split.normals.len()));
         let mut primitives = Vec::new();
         for (mode, count) in [(TRIANGLES, piece.triangles.len() * 3), (LINES, piece.segments.len() * 2), (POINTS, piece.points.len())] {
             if count > 0 {
                 let indices = layout.indices(count);
-                primitives.push(json!({
-                    "attributes": { "POSITION": position }, "indices": indices, "mode": mode, "material": 0,
-                }));
+                let mut attributes = json!({ "POSITION": position });
+                if let Some(normal) = normal.filter(|_| mode == TRIANGLES) {
+                    attributes["NORMAL"] = json!(normal);
+                }
+                primitives.push(json!({ "attributes": attributes, "indices": indices, "mode": mode, "material": 0 }));
             }
         }
         let name = piece.name.map_or_else(|| format!("part {}", number + 1), str::to_owned);
@@ -123,7 +132,8 @@ fn document(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> Result<(Value, u64
 }
 
 pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
-    let (document, binary_bytes) = document(pieces, metadata)?;
+    let splits: Vec<Option<Split>> = pieces.iter().map(Split::of).collect();
+    let (document, binary_bytes) = document(pieces, &splits, metadata)?;
     let mut words = serde_json::to_vec(&document)?;
     while !words.len().is_multiple_of(4) {
         words.push(b' ');
@@ -139,14 +149,17 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     bytes.extend_from_slice(&words);
     bytes.extend_from_slice(&length(binary_bytes)?.to_le_bytes());
     bytes.extend_from_slice(BINARY_CHUNK);
-    for piece in pieces {
-        for vertex in piece.vertices {
-            for number in singles(vertex) {
+    for (piece, split) in pieces.iter().zip(&splits) {
+        let (copies, normals) = split.as_ref().map_or((&[][..], &[][..]), |split| (&split.copies[..], &split.normals[..]));
+        let copies = copies.iter().map(|&vertex| &piece.vertices[vertex as usize]);
+        for vector in piece.vertices.iter().chain(copies).chain(normals) {
+            for number in singles(vector) {
                 bytes.extend_from_slice(&number.to_le_bytes());
             }
             flush_full(&mut bytes, sink)?;
         }
-        for run in [piece.triangles.as_flattened(), piece.segments.as_flattened(), piece.points] {
+        let triangles = split.as_ref().map_or(piece.triangles, |split| &split.triangles);
+        for run in [triangles.as_flattened(), piece.segments.as_flattened(), piece.points] {
             for index in run {
                 bytes.extend_from_slice(&index.to_le_bytes());
                 flush_full(&mut bytes, sink)?;
@@ -201,7 +214,7 @@ fn verify_layout<R: Read>(pieces: &[Piece<'_>], words: &[u8], scanner: &Scanner<
     let found: Value = serde_json::from_slice(words)?;
     let mut layout = Layout::default();
     for piece in pieces {
-        layout.positions(piece);
+        layout.positions(piece, piece.vertices.len());
         layout.indices(piece.triangles.len() * 3);
     }
     for (name, expected) in [("accessors", Value::from(layout.accessors)), ("bufferViews", Value::from(layout.views))] {

@@ -23,7 +23,7 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
     if let Some(title) = metadata.title {
         text.extend_from_slice(format!("# {}\n", one_line(title)).as_bytes());
     }
-    let mut first = 1;
+    let (mut first, mut first_normal) = (1, 1);
     for (number, piece) in pieces.iter().enumerate() {
         let name = one_line(piece.name.unwrap_or("part"));
         text.extend_from_slice(format!("o {} {name}\n", number + 1).as_bytes());
@@ -33,7 +33,28 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
             text.push(b'\n');
             flush_full(&mut text, sink)?;
         }
-        piece.each_face(|corners| element(b'f', corners, first, &mut text, sink))?;
+        if let Some(normals) = piece.normals {
+            for normal in &normals.vectors {
+                text.extend_from_slice(b"vn ");
+                push_position(&mut text, normal);
+                text.push(b'\n');
+                flush_full(&mut text, sink)?;
+            }
+            for (corners, own) in piece.triangles.iter().zip(&normals.triangles) {
+                text.push(b'f');
+                for (&vertex, &normal) in corners.iter().zip(own) {
+                    text.push(b' ');
+                    push_integer(&mut text, first + u64::from(vertex));
+                    text.extend_from_slice(b"//");
+                    push_integer(&mut text, first_normal + u64::from(normal));
+                }
+                text.push(b'\n');
+                flush_full(&mut text, sink)?;
+            }
+            first_normal += normals.vectors.len() as u64;
+        } else {
+            piece.each_face(|corners| element(b'f', corners, first, &mut text, sink))?;
+        }
         piece.segments.iter().try_for_each(|ends| element(b'l', ends, first, &mut text, sink))?;
         piece.points.iter().try_for_each(|&point| element(b'p', &[point], first, &mut text, sink))?;
         first += piece.vertices.len() as u64;

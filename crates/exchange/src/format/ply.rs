@@ -8,7 +8,7 @@ mod read;
 pub(crate) use read::read;
 
 use super::error::{FormatError, Place};
-use super::geometry::{Piece, counts};
+use super::geometry::{Piece, Split, counts};
 use super::off::flush_full;
 use super::scanner::Scanner;
 use super::text::{CHUNK_BYTES, one_line, singles};
@@ -17,19 +17,19 @@ use glam::DVec3;
 use std::io::{Read, Seek, SeekFrom, Write};
 
 pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
-    let counts = counts(pieces);
-    // Indices are of the type `int`, the only one that every reader takes.
-    let most = i32::MAX as u64;
-    if counts.vertices > most {
-        return Err(FormatError::limit(Place::File, "vertices", counts.vertices, most));
+    // Normals are properties of vertices: pieces with some and others without do not occur together.
+    if let [piece] = pieces
+        && let Some(split) = Split::of(piece)
+    {
+        return write_with_normals(piece, &split, metadata, sink);
     }
+    let counts = counts(pieces);
+    check_count(counts.vertices)?;
     let wide = counts_are_wide(pieces);
     let mut bytes = Vec::with_capacity(CHUNK_BYTES + 4096);
     bytes.extend_from_slice(header(pieces, metadata).as_bytes());
     for vertex in pieces.iter().flat_map(|piece| piece.vertices) {
-        for number in singles(vertex) {
-            bytes.extend_from_slice(&number.to_le_bytes());
-        }
+        push(vertex, &mut bytes);
         flush_full(&mut bytes, sink)?;
     }
     let mut before = 0;
@@ -57,6 +57,42 @@ pub(crate) fn write<W: Write>(pieces: &[Piece<'_>], metadata: &Metadata<'_>, sin
             flush_full(&mut bytes, sink)?;
         }
         before += piece.vertices.len() as u32;
+    }
+    sink.write_all(&bytes)?;
+    sink.flush()?;
+    Ok(())
+}
+
+/// Indices are of the type `int`, the only one that every reader takes.
+fn check_count(vertices: u64) -> Result<(), FormatError> {
+    let most = i32::MAX as u64;
+    if vertices > most { Err(FormatError::limit(Place::File, "vertices", vertices, most)) } else { Ok(()) }
+}
+
+fn push(vector: &DVec3, bytes: &mut Vec<u8>) {
+    singles(vector).into_iter().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+}
+
+/// As [`write()`], with the properties nx, ny, nz.
+fn write_with_normals<W: Write>(piece: &Piece<'_>, split: &Split, metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
+    check_count(split.normals.len() as u64)?;
+    let counts = [split.normals.len() as u64, split.triangles.len() as u64, piece.segments.len() as u64];
+    let header = header_of(counts, false, metadata);
+    let z = "property float z\n";
+    let mut bytes = header.replacen(z, &format!("{z}property float nx\nproperty float ny\nproperty float nz\n"), 1).into_bytes();
+    let copies = split.copies.iter().map(|&vertex| &piece.vertices[vertex as usize]);
+    for (vertex, normal) in piece.vertices.iter().chain(copies).zip(&split.normals) {
+        push(vertex, &mut bytes);
+        push(normal, &mut bytes);
+        flush_full(&mut bytes, sink)?;
+    }
+    for triangle in &split.triangles {
+        bytes.extend_from_slice(&face(triangle, 0));
+        flush_full(&mut bytes, sink)?;
+    }
+    for index in piece.segments.as_flattened() {
+        bytes.extend_from_slice(&index.to_le_bytes());
+        flush_full(&mut bytes, sink)?;
     }
     sink.write_all(&bytes)?;
     sink.flush()?;

@@ -49,6 +49,12 @@ fn write_piece<W: Write>(number: usize, piece: &Piece<'_>, text: &mut Vec<u8>, s
         coordinates(text, sink)?;
         text.extend_from_slice(b"] }\ncoordIndex [\n");
         piece.each_face(|corners| write_indices(corners, text, sink))?;
+        if let Some(normals) = piece.normals {
+            text.extend_from_slice(b"]\nnormal Normal { vector [\n");
+            write_points(normals.vectors.iter(), text, sink)?;
+            text.extend_from_slice(b"] }\nnormalIndex [\n");
+            normals.triangles.iter().try_for_each(|corners| write_indices(corners, text, sink))?;
+        }
         text.extend_from_slice(b"] } }\n");
     }
     if !piece.segments.is_empty() {

@@ -63,6 +63,9 @@ pub enum AddressError {
         /// What may stand there.
         expected: &'static str,
     },
+    /// Cells of trimmed surfaces are not searched.
+    #[error("the model has a trimmed surface, whose cells cannot be searched; remove \"trim\" to ask about the whole surface")]
+    Trimmed,
     /// There is no such root.
     #[error("root cell {root} does not exist: root cells are numbered 0 to {}", .roots - 1)]
     Root {
@@ -170,6 +173,7 @@ impl AddressError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Syntax { .. } => "address.syntax",
+            Self::Trimmed => "address.trimmed",
             Self::Root { .. } => "address.unknown-root",
             Self::Letter { .. } => "address.no-such-transition",
             Self::Period { .. } => "address.period",
@@ -491,14 +495,14 @@ impl<'a> Locator<'a> {
         let mut norms = vec![1.0];
         for &(state, index) in steps {
             product *= contraction.step_norms[state.index()][index];
-            power *= contraction.upper;
+            power *= contraction.rate();
             norms.push(f64::min(product, power));
         }
         norms
     }
 
     /// The fixed point of a cycle, with a bound of its error in the adapted norm: for the residual r = f(y) - y the
-    /// error is sum L^k r, so at most |C r| / (1 - g_p), or |C r| transient / (1 - upper^p).
+    /// error is sum L^k r, so at most |C r| / (1 - g_p), or |C r| transient / (1 - rate^p).
     fn fixed_point(&mut self, cycle: &[Step], budget: &Budget) -> Result<(Vec<f64>, f64), AddressError> {
         let state = cycle[0].0;
         let dimension = self.attractor.automaton().state(state).dimension - 1;
@@ -516,7 +520,7 @@ impl<'a> Locator<'a> {
         let factors = Factors::of(matrix);
         let contraction = self.attractor.contraction();
         let norm = self.norms(cycle)[cycle.len()];
-        let power = contraction.upper.powf(cycle.len() as f64);
+        let power = contraction.rate().powf(cycle.len() as f64);
         let geometric = (contraction.transient / (1.0 - power)).min(if norm < 1.0 { 1.0 / (1.0 - norm) } else { f64::INFINITY });
         let mut best = (y.clone(), f64::INFINITY);
         let mut residual: Vec<f64> = start;

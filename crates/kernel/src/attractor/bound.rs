@@ -8,6 +8,10 @@
 //! cell's frame has the radius |F reach|, its spectral norm. In both kinds the bound holds for the
 //! attractor *and* for the centres, control points and drawings of all descendants, so that it may prune
 //! searches over leaves.
+//!
+//! Products. The points of a product's attractor are the products x_A x x_B of points of the factors' attractors, whose
+//! subdivisions are independent, and |x_A x x_B|_1 = |x_A|_1 |x_B|_1. As 1 + 2 m = sup |x|_1, the margins obey
+//! 1 + 2 m = (1 + 2 m_A)(1 + 2 m_B), exactly; with products of the factors' centres as centres, these too.
 
 use crate::automaton::{Automaton, Contraction, LeafPrimitive, State, StateId};
 use std::cmp::Ordering;
@@ -77,14 +81,40 @@ pub(super) fn bound_states(automaton: &Automaton, contraction: &Contraction) -> 
             if state.frame {
                 return frame_bound(index, contraction, &centres[index], radii[index], all_similar);
             }
+            if is_product(automaton, index) {
+                // Filled in below.
+                return StateBound::Hull { centre: Vec::new(), margin: 0.0 };
+            }
             let margin = if hull_holds(automaton, index) { 0.0 } else { margin(automaton, contraction, &centres, &radii, index) };
             // Inside the hull any convex weights will do, and equal ones are closest to the middle.
             let centre = if margin == 0.0 { vec![1.0 / state.dimension as f64; state.dimension] } else { centres[index].clone() };
             StateBound::Hull { centre, margin }
         })
         .collect();
+    for index in 0..states.len() {
+        let factors = automaton.factors(StateId::new(index));
+        if !factors.is_empty() {
+            bounds[index] = product_bound(factors, &bounds, &centres);
+        }
+    }
     shrink_boxes(automaton, &mut bounds);
     bounds
+}
+
+/// See the module's comment.
+fn product_bound(factors: &[StateId], bounds: &[StateBound], centres: &[Vec<f64>]) -> StateBound {
+    let excess = factors.iter().map(|factor| 1.0 + 2.0 * bounds[factor.index()].margin()).product::<f64>() - 1.0;
+    let margin = if excess > 0.0 { 0.5 * excess * (1.0 + 1e-9) } else { 0.0 };
+    let dimension: usize = factors.iter().map(|factor| centres[factor.index()].len()).product();
+    let centre = if margin == 0.0 { vec![1.0 / dimension as f64; dimension] } else { product_point(factors, centres) };
+    StateBound::Hull { centre, margin }
+}
+
+/// The product of points of the factors.
+fn product_point(factors: &[StateId], points: &[Vec<f64>]) -> Vec<f64> {
+    factors
+        .iter()
+        .fold(vec![1.0], |product, factor| product.iter().flat_map(|x| points[factor.index()].iter().map(move |y| x * y)).collect())
 }
 
 /// Tightens the coordinate boxes: each is replaced by its intersection with the hull of its children's
@@ -153,17 +183,25 @@ fn is_similarity(operator: &crate::automaton::SubdivisionOperator) -> bool {
     (0..3).all(|a| (0..3).all(|b| (dot(a, b) - if a == b { square } else { 0.0 }).abs() <= 1e-13 * square))
 }
 
+/// Whether a state is the product of others: then its bounds are made of theirs.
+fn is_product(automaton: &Automaton, index: usize) -> bool {
+    !automaton.factors(StateId::new(index)).is_empty()
+}
+
 /// A point near the middle of each state's attractor: the fixed point of averaging over transitions for
-/// barycentric states, the middle of the box of a sample for frames.
+/// barycentric states, the middle of the box of a sample for frames; none for products.
 fn centres(automaton: &Automaton) -> Vec<Vec<f64>> {
     let states = automaton.states();
-    let mut centres: Vec<Vec<f64>> = states.iter().map(|state| vec![1.0 / state.dimension as f64; state.dimension]).collect();
+    let start = |(index, state): (usize, &State)| {
+        if is_product(automaton, index) { Vec::new() } else { vec![1.0 / state.dimension as f64; state.dimension] }
+    };
+    let mut centres: Vec<Vec<f64>> = states.iter().enumerate().map(start).collect();
     for _ in 0..200 {
         let next: Vec<Vec<f64>> = states
             .iter()
             .zip(&centres)
             .map(|(state, own)| {
-                if state.transitions.is_empty() {
+                if state.transitions.is_empty() || own.is_empty() {
                     return own.clone();
                 }
                 let mut mean = vec![0.0; state.dimension];
@@ -220,7 +258,7 @@ fn middle(automaton: &Automaton, centres: &[Vec<f64>], index: usize) -> Vec<f64>
 }
 
 /// Radii R_v in the adapted norm: T_e(ball_w) lies in ball_v for every transition when steps contract,
-/// else R bounds the sum of all steps of any path. Drawings lie in their balls too.
+/// else R bounds the sum of all steps of any path. Drawings lie in their balls too. Products have no part in it.
 fn radii(automaton: &Automaton, contraction: &Contraction, centres: &[Vec<f64>]) -> Vec<f64> {
     let states = automaton.states();
     let drawn: Vec<f64> = (0..states.len()).map(|index| drawing_radius(&states[index], contraction, &centres[index], index)).collect();
@@ -232,10 +270,13 @@ fn radii(automaton: &Automaton, contraction: &Contraction, centres: &[Vec<f64>])
                 let image = transition.operator.apply(&centres[transition.to.index()]);
                 contraction.distance(StateId::new(index), &centres[index], &image)
             };
-            state.transitions.iter().map(step).collect()
+            if is_product(automaton, index) { Vec::new() } else { state.transitions.iter().map(step).collect() }
         })
         .collect();
-    let largest = contraction.step_norms.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
+    let alone = |(index, norms): (usize, &'_ Vec<f64>)| {
+        if is_product(automaton, index) { 0.0 } else { norms.iter().fold(0.0_f64, |a, &b| a.max(b)) }
+    };
+    let largest = contraction.step_norms.iter().enumerate().map(alone).fold(0.0_f64, f64::max);
     let longest = steps.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
     let global = contraction.sum_of_norms() * longest + contraction.transient * drawn.iter().fold(0.0_f64, |a, &b| a.max(b));
     if largest >= 0.999 {
@@ -251,7 +292,7 @@ fn radii(automaton: &Automaton, contraction: &Contraction, centres: &[Vec<f64>])
                 let reach = |(position, transition): (usize, &crate::automaton::Transition)| {
                     steps[index][position] + contraction.step_norms[index][position] * radii[transition.to.index()]
                 };
-                states[index].transitions.iter().enumerate().map(reach).fold(drawn[index], f64::max)
+                states[index].transitions.iter().enumerate().take(steps[index].len()).map(reach).fold(drawn[index], f64::max)
             })
             .collect();
     }

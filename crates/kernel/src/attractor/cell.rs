@@ -120,9 +120,109 @@ fn combine<const N: usize, const M: usize>(parent: &[ControlPoint], entries: &[f
     }
 }
 
+/// Control points of a pair of factors that are combined without another buffer.
+const PAIR: usize = 128;
+/// Points at most that measure the error of a cell, as a buffer holds them.
+pub(super) const MOST_MEASURED: usize = PAIR;
+
+/// The points that measure the deviation of a cell from an affine map.
+#[inline]
+fn measured<'p>(precision: &LinearPrecision, points: &'p [ControlPoint], buffer: &'p mut [ControlPoint; PAIR]) -> &'p [ControlPoint] {
+    match &precision.hull {
+        None => points,
+        Some(hull) => {
+            let buffer = &mut buffer[..hull.columns()];
+            child_points(points, hull, buffer);
+            buffer
+        }
+    }
+}
+
+/// P (U x V), direction after direction.
+fn combine_pair(parent: &[ControlPoint], u: &SubdivisionOperator, v: &SubdivisionOperator, child: &mut [ControlPoint]) {
+    let size = |operator: &SubdivisionOperator| (operator.rows(), operator.columns());
+    match (size(u), size(v)) {
+        ((3, 3), (3, 3)) => combine_square::<3, 9>(parent, u.entries(), v.entries(), child),
+        ((4, 4), (4, 4)) => combine_square::<4, 16>(parent, u.entries(), v.entries(), child),
+        ((_, columns), (rows, _)) if columns * rows <= PAIR => {
+            let mut half = [[0.0; 4]; PAIR];
+            combine_direction(parent, u, rows, &mut half[..columns * rows]);
+            combine_direction(&half[..columns * rows], v, 1, child);
+        }
+        _ => combine_factors(parent, &[u.clone(), v.clone()], child),
+    }
+}
+
+/// As [`combine_pair`] for n x n operators, with the size known: `M` is n^2.
+#[inline]
+fn combine_square<const N: usize, const M: usize>(parent: &[ControlPoint], u: &[f64], v: &[f64], child: &mut [ControlPoint]) {
+    let parent: &[ControlPoint; M] = parent.try_into().expect("the parent has the operator's rows");
+    let mut half = [[0.0; 4]; M];
+    for i in 0..N {
+        for k in 0..N {
+            let weight = u[i * N + k];
+            for j in 0..N {
+                for axis in 0..4 {
+                    half[i * N + j][axis] += weight * parent[k * N + j][axis];
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        for j in 0..N {
+            let mut sum = [0.0; 4];
+            for k in 0..N {
+                for axis in 0..4 {
+                    sum[axis] += v[j * N + k] * half[i * N + k][axis];
+                }
+            }
+            child[i * N + j] = sum;
+        }
+    }
+}
+
+/// As [`combine_pair`] for any number of factors.
+fn combine_factors(parent: &[ControlPoint], factors: &[SubdivisionOperator], child: &mut [ControlPoint]) {
+    let mut current = parent.to_vec();
+    let mut inner = parent.len();
+    for factor in factors {
+        inner /= factor.rows();
+        let mut image = vec![[0.0; 4]; current.len() / factor.rows() * factor.columns()];
+        combine_direction(&current, factor, inner, &mut image);
+        current = image;
+    }
+    child[..current.len()].copy_from_slice(&current);
+}
+
+/// One direction of a grid, `inner` points to a step of its index.
+#[inline]
+fn combine_direction(parent: &[ControlPoint], operator: &SubdivisionOperator, inner: usize, child: &mut [ControlPoint]) {
+    let (rows, columns) = (operator.rows(), operator.columns());
+    let entries = operator.entries();
+    for (source, target) in parent.chunks_exact(rows * inner).zip(child.chunks_exact_mut(columns * inner)) {
+        for (weights, target) in entries.chunks_exact(rows).zip(target.chunks_exact_mut(inner)) {
+            for (position, point) in target.iter_mut().enumerate() {
+                let mut sum = [0.0; 4];
+                for (row, &weight) in weights.iter().enumerate() {
+                    let from = &source[row * inner + position];
+                    for (total, &coordinate) in sum.iter_mut().zip(from) {
+                        *total += weight * coordinate;
+                    }
+                }
+                *point = sum;
+            }
+        }
+    }
+}
+
 /// The child's control points P T. Unrolled for the common sizes.
 #[inline]
 pub(crate) fn child_points(parent: &[ControlPoint], operator: &SubdivisionOperator, child: &mut [ControlPoint]) {
+    match operator.factors() {
+        [] => {}
+        [u, v] => return combine_pair(parent, u, v, child),
+        factors => return combine_factors(parent, factors, child),
+    }
     let entries = operator.entries();
     match (operator.rows(), operator.columns()) {
         (2, 2) => combine::<2, 2>(parent, entries, child),
@@ -261,11 +361,14 @@ impl Attractor {
                 let chord = points.iter().map(off).fold(0.0, f64::max).sqrt();
                 let margin = self.bound(cell.state).margin();
                 let first_order = if margin > 0.0 { chord + margin * diameter_bound(points) } else { chord };
-                match self.precision(cell.state) {
-                    Some(precision) if rational => first_order.min(rational_chord_error(precision, points, ends)),
-                    Some(precision) => first_order.min(chord_error(precision, margin, points, &start, &end)),
-                    None => first_order,
-                }
+                let Some(precision) = self.precision(cell.state) else { return first_order };
+                let mut buffer = [[0.0; 4]; PAIR];
+                let measured = measured(precision, points, &mut buffer);
+                first_order.min(if rational {
+                    rational_chord_error(precision, points, measured, ends)
+                } else {
+                    chord_error(precision, measured, &start, &end)
+                })
             }
             // Points of the cell, and segments between them, are in the ball too.
             LeafPrimitive::Star(_) => 2.0 * cell.ball.radius,
@@ -273,14 +376,39 @@ impl Attractor {
             // no two points of them are farther apart than its diameter.
             LeafPrimitive::Polygon(_) => {
                 let first_order = 2.0 * cell.ball.radius;
-                match self.precision(cell.state) {
-                    Some(precision) if rational => first_order.min(rational_polygon_error(precision, points)),
-                    Some(precision) => first_order.min(polygon_error(precision, self.bound(cell.state).margin(), points)),
-                    None => first_order,
-                }
+                let Some(precision) = self.precision(cell.state) else { return first_order };
+                let mut buffer = [[0.0; 4]; PAIR];
+                let measured = measured(precision, points, &mut buffer);
+                first_order.min(if rational { rational_polygon_error(precision, measured) } else { polygon_error(precision, measured) })
             }
             LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
         }
+    }
+
+    /// The child of a face as [`Attractor::child_cell`] gives it, and its error. Where the bound of second order is within
+    /// the tolerance, the ball is not worked out, and left without bounds.
+    #[inline]
+    pub(super) fn child_with_error(&self, cell: &Cell, index: usize, points: &[ControlPoint], tolerance_mm: f64) -> (Cell, f64) {
+        let state = self.automaton().state(cell.state).transitions[index].to;
+        let smooth = match (self.precision(state), &self.automaton().state(state).leaf) {
+            (Some(precision), LeafPrimitive::Polygon(_)) if !self.roots()[cell.root as usize].rational => {
+                let mut buffer = [[0.0; 4]; PAIR];
+                polygon_error(precision, measured(precision, points, &mut buffer))
+            }
+            _ => f64::INFINITY,
+        };
+        if smooth <= tolerance_mm {
+            let ball = Ball { centre: [0.0; 3], radius: f64::INFINITY };
+            return (Cell { state, root: cell.root, ball, stretch: 0.0 }, smooth);
+        }
+        let child = self.child_cell(cell, index, points);
+        let error = if smooth.is_finite() { smooth.min(2.0 * child.ball.radius) } else { self.leaf_error(&child, points) };
+        (child, error)
+    }
+
+    /// The centre of a cell's ball.
+    pub(super) fn centre(&self, cell: &Cell, points: &[ControlPoint]) -> Point {
+        self.ball(cell.state, points, self.roots()[cell.root as usize].rational, cell.stretch).centre
     }
 
     /// Emits what stands for a leaf cell.
@@ -352,19 +480,19 @@ impl Attractor {
 
 /// eta for the affine map that takes a curve's parameters to its chord; see `precision`.
 #[inline]
-fn chord_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
+fn chord_error(precision: &LinearPrecision, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
     let chord = subtract(end, start);
     let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
         let linear: Point = std::array::from_fn(|i| start[i] + parameter[0] * chord[i]);
         distance_squared(&[point[0], point[1], point[2]], &linear)
     };
-    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
-    (1.0 + 2.0 * margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
+    let largest = points.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
+    (1.0 + 2.0 * precision.margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
 }
 
 /// 2 eta for the affine map that fits a face's control points best; see `precision`.
 #[inline]
-fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoint]) -> f64 {
+fn polygon_error(precision: &LinearPrecision, points: &[ControlPoint]) -> f64 {
     let mut map = [[0.0; 3]; 3];
     for (point, fit) in points.iter().zip(&precision.fit) {
         for (column, weight) in map.iter_mut().zip(fit) {
@@ -375,17 +503,17 @@ fn polygon_error(precision: &LinearPrecision, margin: f64, points: &[ControlPoin
         let linear: Point = std::array::from_fn(|i| map[0][i] + parameter[0] * map[1][i] + parameter[1] * map[2][i]);
         distance_squared(&[point[0], point[1], point[2]], &linear)
     };
-    let largest = points.iter().zip(&precision.parameters).map(off).fold(0.0, f64::max).sqrt();
+    let largest = points.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
     let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
-    2.0 * (1.0 + 2.0 * margin) * largest + precision.residual * slope
+    2.0 * (1.0 + 2.0 * precision.margin) * largest + precision.residual * slope
 }
 
 /// As [`chord_error`] for weights; see [`homogeneous_error`].
-fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], ends: &Ends) -> f64 {
+fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], measured: &[ControlPoint], ends: &Ends) -> f64 {
     let place = |weights: &[f64]| -> ControlPoint { std::array::from_fn(|i| points.iter().zip(weights).map(|(p, w)| w * p[i]).sum()) };
     let (start, end) = (place(&ends.start), place(&ends.end));
     let linear: [ControlPoint; 3] = [start, std::array::from_fn(|i| end[i] - start[i]), [0.0; 4]];
-    homogeneous_error(precision, points, &linear)
+    homogeneous_error(precision, measured, &linear)
 }
 
 /// As [`polygon_error`] for weights; see [`homogeneous_error`].
@@ -418,7 +546,7 @@ fn homogeneous_error(precision: &LinearPrecision, points: &[ControlPoint], linea
         (dot(&seen, &seen).sqrt(), v[3].abs())
     };
     let (mut off, mut skew, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
-    for (point, parameter) in points.iter().zip(&precision.parameters) {
+    for (point, parameter) in points.iter().zip(&precision.measured) {
         let linear = at(parameter);
         let (n, d) = size(&std::array::from_fn(|i| point[i] - linear[i]));
         (off, skew, least) = (off.max(n), skew.max(d), least.min(point[3]));

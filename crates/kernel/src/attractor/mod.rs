@@ -9,24 +9,31 @@ mod connected;
 mod cover;
 mod defect;
 mod early;
+mod invariant;
 mod near;
 mod needle;
 mod precision;
 mod refine;
 pub(crate) mod sites;
+mod tangent;
+pub(crate) mod trim;
 mod walk;
 
 use crate::automaton::topology::{Topology, TopologyError};
-use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, StateId, convergence};
+use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, State, StateId, convergence};
+use crate::budget::Budget;
 use crate::error::Kind;
+use crate::tolerance::Tolerance;
 pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
 pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use precision::LinearPrecision;
-pub use refine::{RefineError, Streamed, count_cells, refine, stream};
+pub use refine::{RefineError, Streamed, count_cells, refine, refine_with_normals, stream};
 use std::sync::Arc;
+pub use tangent::{NoTangentPlane, TangentPlanes};
+use trim::TrimmedSurface;
 
 /// Where a shape begins: a state and its control points.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,6 +83,9 @@ pub struct Attractor {
     brep: Option<(Arc<Topology>, complex::Start)>,
     /// Largest distance between control points of glued boundaries, in mm.
     seam_mm: f64,
+    /// Surfaces that are cut along loops, and for every root which of them it belongs to.
+    trimmed: Vec<TrimmedSurface>,
+    trims: Vec<Option<u32>>,
 }
 
 /// Why an automaton has no attractor that can be evaluated.
@@ -204,8 +214,21 @@ impl Attractor {
         let covers = cover::covers(&automaton, &bounds, &contraction);
         let connected = connected::connected(&automaton, &bounds, &contraction);
         let precisions = precision::precisions(&automaton, &bounds);
-        let attractor =
-            Self { automaton, roots, solids, bounds, covers, connected, precisions, contraction, warnings, brep: None, seam_mm: 0.0 };
+        let attractor = Self {
+            automaton,
+            roots,
+            solids,
+            bounds,
+            covers,
+            connected,
+            precisions,
+            contraction,
+            warnings,
+            brep: None,
+            seam_mm: 0.0,
+            trimmed: Vec::new(),
+            trims: Vec::new(),
+        };
         attractor.check_roots()?;
         Ok(attractor)
     }
@@ -227,6 +250,52 @@ impl Attractor {
         self.brep = Some((Arc::new(topology), start));
         self.seam_mm = seam_mm;
         Ok(self)
+    }
+
+    /// Cuts surfaces along loops: those of their roots are drawn that are inside.
+    #[must_use]
+    pub(crate) fn with_trimmed(mut self, trimmed: Vec<TrimmedSurface>) -> Self {
+        self.trims = vec![None; self.roots.len()];
+        for (index, surface) in trimmed.iter().enumerate() {
+            surface.cells.iter().filter_map(|cell| cell.root).for_each(|root| self.trims[root] = Some(index as u32));
+        }
+        self.trimmed = trimmed;
+        self
+    }
+
+    /// Surfaces that are cut along loops.
+    pub(crate) fn trimmed(&self) -> &[TrimmedSurface] {
+        &self.trimmed
+    }
+
+    /// The attractor whose trimmed surfaces are triangles, and its Hausdorff distance from this one, at most.
+    ///
+    /// # Errors
+    /// [`RefineError`], of drawing them.
+    pub(crate) fn resolved(&self, tolerance: Tolerance, budget: &Budget) -> Result<(Self, f64), RefineError> {
+        let drawn = trim::refine(self, tolerance, budget)?;
+        let mut roots: Vec<Root> =
+            (0..self.roots.len()).filter(|&root| self.trim_of(root).is_none()).map(|root| self.roots[root].clone()).collect();
+        let triangle = |state: &State| state.leaf == LeafPrimitive::Simplex && state.dimension == 3;
+        let state = self.automaton.states().iter().position(triangle).map(StateId::new);
+        let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
+        let triangles = drawn
+            .triangles
+            .iter()
+            .filter_map(|corners| Some(Root { state: state?, points: corners.iter().map(corner).collect(), rational: false, solid: None }));
+        roots.extend(triangles);
+        let deviation = drawn.deviation_mm + refine::rounding_mm(refine::largest_coordinate(&drawn.vertices));
+        let mut solids = self.solids.clone();
+        for solid in &mut solids {
+            solid.first_root -= (0..solid.first_root).filter(|&root| self.trim_of(root).is_some()).count();
+        }
+        let trims = vec![None; roots.len()];
+        Ok((Self { roots, solids, brep: None, trimmed: Vec::new(), trims, ..self.clone() }, deviation))
+    }
+
+    /// The trimmed surface that a root belongs to.
+    pub(crate) fn trim_of(&self, root: usize) -> Option<usize> {
+        self.trims.get(root).copied().flatten().map(|index| index as usize)
     }
 
     fn check_roots(&self) -> Result<(), AttractorError> {

@@ -124,6 +124,9 @@ pub fn addresses_near(attractor: &Attractor, query: &NearQuery, budget: &Budget)
     if query.most == 0 {
         return Err(AddressError::Query { name: "most", value: 0.0, expected: "one cell or more" });
     }
+    if !attractor.trimmed().is_empty() {
+        return Err(AddressError::Trimmed);
+    }
     let mut search = Search::new(attractor, query, budget);
     let (lower, complete) = search.run()?;
     let leaves = std::mem::take(&mut search.leaves);

@@ -13,11 +13,18 @@
 //! 2 eta. If L interpolates the ends of a curve, the chord *is* L(D_s), and its distance at most eta.
 //! r_k vanishes for control points in linear position, so eta is of second order in the size of smooth cells.
 //!
+//! Products of curves: if G_A maps the attractor of one onto [0, 1], and G_B that of the other, then x_A x x_B, of which
+//! the product's attractor consists, is mapped onto the unit square by (G_A x 1, 1 x G_B), whatever the ratios.
+//!
+//! The r_k may be those of other points H than the control points if the attractor lies in their hull: Q x = (Q H) y with
+//! y >= 0 of sum 1. Bezier points of a spline's span are closer to it than its control points.
+//!
 //! G is found by elimination over all states at once. What it misses, |G_s T_e - l G_w - t_e 1^T| <= e entrywise, moves
 //! parameters by at most (1 + 2 m) e / (1 - l), which is kept and charged.
 
 use super::StateBound;
-use crate::automaton::{Automaton, LeafPrimitive, StateId, SubdivisionOperator};
+use super::cell::MOST_MEASURED;
+use crate::automaton::{Automaton, Hull, LeafPrimitive, Smooth, StateId, SubdivisionOperator};
 
 /// Parameters of a state's points.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,11 +37,31 @@ pub struct LinearPrecision {
     pub domain: Vec<[f64; 2]>,
     /// Parameters of the attractor may be this far from D, and D from them.
     pub residual: f64,
-    /// Row k: what control point k adds to the origin and the two derivatives of the affine map that fits best.
+    /// The points that measure the deviation from an affine map: images of the control points, in whose hull the
+    /// attractor lies; the control points themselves when absent.
+    pub(super) hull: Option<SubdivisionOperator>,
+    /// m for these points.
+    pub(super) margin: f64,
+    /// Parameters of these points.
+    pub(super) measured: Vec<[f64; 2]>,
+    /// Row k: what measuring point k adds to the origin and the two derivatives of the affine map that fits best.
     pub(super) fit: Vec<[f64; 3]>,
 }
 
 impl LinearPrecision {
+    /// Measures at these points from now on, in whose hull the attractor lies, unless they are too many; `None` if they
+    /// allow no fit.
+    fn measure_at(&mut self, hull: &SubdivisionOperator) -> Option<()> {
+        if hull.columns() > MOST_MEASURED {
+            return Some(());
+        }
+        self.measured = (0..hull.columns()).map(|k| evaluate(&self.parameters, hull.column(k))).collect();
+        self.fit = if self.domain.len() == 2 { Vec::new() } else { fit(&self.measured)? };
+        self.margin = 0.0;
+        self.hull = Some(hull.clone());
+        Some(())
+    }
+
     /// The parameter of a barycentric point.
     #[must_use]
     pub fn parameter(&self, point: &[f64]) -> [f64; 2] {
@@ -49,10 +76,17 @@ const MOST_UNKNOWNS: usize = 256;
 /// Multiplications of one elimination at most.
 const MOST_WORK: f64 = 4e7;
 /// Equations may miss by this much, relative to functionals of size 1.
-const MISS: f64 = 1e-10;
+pub(super) const MISS: f64 = 1e-10;
 /// Lengths of a curve's domain and areas of a face's that rounding may hide, as a share of the whole. A hole of that
 /// area is at most its root wide, which is charged.
-const SAME: f64 = 1e-12;
+pub(super) const SAME: f64 = 1e-12;
+/// Ratios of parameter maps at most.
+const MOST_RATIO: f64 = 0.99;
+/// Entries by which hulls may miss their children's: operators are rounded to fractions.
+const HULL: f64 = 1e-13;
+/// Every step of a path misses by the entries of a column, and what is missed contracts: ten entries of every point of
+/// the state, and paths of which the first ten steps count.
+const HULL_CHARGE: f64 = 1e3;
 /// Children of a face whose overlaps are examined.
 const MOST_CHILDREN: usize = 64;
 
@@ -62,9 +96,15 @@ type Solution = Vec<Vec<f64>>;
 /// The precision of every state that has it: curves with proven ends, and faces with corners.
 pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
     let states = automaton.states();
-    let mut result = claimed(automaton, bounds);
+    let found = super::invariant::precisions(automaton, bounds);
+    let mut result: Vec<_> = claimed(automaton, bounds).into_iter().zip(found).map(|(claimed, found)| claimed.or(found)).collect();
     for component in components(automaton) {
-        if component.iter().all(|&index| result[index].is_some()) {
+        // What holds for all descendants of a state holds for none that has others.
+        if component.iter().any(|&index| result[index].is_some()) {
+            continue;
+        }
+        // A product has what its factors have.
+        if component.iter().any(|&index| !automaton.factors(StateId::new(index)).is_empty()) {
             continue;
         }
         let drawn = |&index: &usize| matches!(states[index].leaf, LeafPrimitive::Chord(_) | LeafPrimitive::Polygon(_));
@@ -88,50 +128,125 @@ pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Op
             }
         }
     }
+    for index in 0..states.len() {
+        let factors = automaton.factors(StateId::new(index));
+        if let [left, right] = factors {
+            result[index] = product(&states[index].leaf, [&result[left.index()], &result[right.index()]], bounds[index].margin());
+        }
+    }
     result
 }
 
-/// The precision of states whose model claims parameters, where the claims hold for them and all their descendants.
-fn claimed(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
-    const RATIO: f64 = 0.5;
-    let (states, claims) = (automaton.states(), automaton.claimed_parameters());
-    let claim = |index: usize| claims.get(&StateId::new(index));
-    let domain = |index: usize| -> Option<Vec<[f64; 2]>> {
-        let parameters = claim(index)?;
-        Some(corners(&states[index].leaf)?.iter().map(|corner| evaluate(parameters, corner)).collect())
+/// The precision of a product of two curves, whose outline is the unit square; see the module's comment.
+fn product(leaf: &LeafPrimitive, factors: [&Option<LinearPrecision>; 2], margin: f64) -> Option<LinearPrecision> {
+    let [Some(left), Some(right)] = factors else { return None };
+    let interval = |factor: &LinearPrecision| factor.domain.len() == 2;
+    if !interval(left) || !interval(right) {
+        return None;
+    }
+    let raw: Vec<[f64; 2]> = left.parameters.iter().flat_map(|u| right.parameters.iter().map(move |v| [u[0], v[0]])).collect();
+    let domain: Vec<[f64; 2]> = corners(leaf)?.iter().map(|corner| evaluate(&raw, corner)).collect();
+    // The four corners of the square, each once, in order around it.
+    let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let off = |first: usize, backwards: bool| {
+        let corner = |k: usize| square[(first + if backwards { 4 - k } else { k }) % 4];
+        domain.iter().enumerate().map(|(k, place)| apart(place, &corner(k))).fold(0.0, f64::max)
     };
-    let domains: Vec<Option<Vec<[f64; 2]>>> = (0..states.len()).map(domain).collect();
-    let mut misses = vec![None; states.len()];
-    for index in (0..states.len()).filter(|&index| domains[index].is_some()) {
-        let own = claim(index).map_or(&[][..], Vec::as_slice);
-        let (mut miss, mut children) = (0.0_f64, Vec::new());
-        for transition in &states[index].transitions {
-            let (Some(child), Some(corners)) = (claim(transition.to.index()), corners(&states[transition.to.index()].leaf)) else { break };
-            miss = miss.max(missed(own, child, &transition.operator, RATIO));
-            children.push(corners.iter().map(|corner| evaluate(own, &transition.operator.apply(corner))).collect::<Vec<_>>());
-        }
-        let complete = children.len() == states[index].transitions.len() && !children.is_empty();
-        if complete && miss <= MISS && domains[index].as_ref().is_some_and(|domain| fills(domain, &children)) {
-            misses[index] = Some(miss);
-        }
+    let least = (0..4).flat_map(|first| [off(first, false), off(first, true)]).fold(f64::INFINITY, f64::min);
+    if domain.len() != 4 || least > MISS {
+        return None;
     }
-    // What leads to a state without precision has none.
-    while let Some(broken) = (0..states.len()).find(|&index| {
-        misses[index].is_some() && states[index].transitions.iter().any(|transition| misses[transition.to.index()].is_none())
-    }) {
-        misses[broken] = None;
+    let rounding = (1.0 + 2.0 * margin) * 1e-14 + 2.0 * least;
+    let mut precision = scaled(&raw, &domain, left.residual.hypot(right.residual) + rounding, margin)?;
+    if left.hull.is_some() || right.hull.is_some() {
+        let hull = |factor: &LinearPrecision| factor.hull.clone().unwrap_or_else(|| SubdivisionOperator::identity(factor.parameters.len()));
+        precision.measure_at(&SubdivisionOperator::product(vec![hull(left), hull(right)]))?;
+        // As for the margins of bounds: see there.
+        precision.margin = 0.5 * ((1.0 + 2.0 * left.margin) * (1.0 + 2.0 * right.margin) - 1.0);
     }
-    let holds = |index: &usize| misses[*index].is_some();
-    let miss = misses.iter().flatten().copied().fold(0.0, f64::max);
-    let margin = (0..states.len()).filter(holds).map(|index| bounds[index].margin()).fold(0.0, f64::max);
+    Some(precision)
+}
+
+/// What holds of the transitions of a curve's state.
+struct Checked {
+    miss: f64,
+    ratio: f64,
+    /// How far hulls miss their children's; `None` if they do.
+    hull: Option<f64>,
+}
+
+/// The precision of curves whose model claims parameters, where the claims hold for them and all their descendants. The
+/// ratios of their parameter maps may differ: nothing but their being below 1 matters.
+fn claimed(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
+    let (states, claims) = (automaton.states(), automaton.claimed_smooth());
+    let mut checked: Vec<Option<Checked>> = (0..states.len()).map(|index| check(automaton, index)).collect();
+    let holds = automaton.hereditary(checked.iter().map(Option::is_some).collect());
+    checked.iter_mut().zip(&holds).for_each(|(own, &holds)| *own = own.take().filter(|_| holds));
+    let hulls = automaton.hereditary(checked.iter().map(|own| own.as_ref().is_some_and(|own| own.hull.is_some())).collect());
+    let off = checked.iter().flatten().filter_map(|own| own.hull).fold(f64::EPSILON, f64::max);
+    let known = || checked.iter().flatten();
+    let (miss, ratio) = (known().map(|own| own.miss).fold(0.0, f64::max), known().map(|own| own.ratio).fold(0.0, f64::max));
+    let margin = (0..states.len()).filter(|&index| checked[index].is_some()).map(|index| bounds[index].margin()).fold(0.0, f64::max);
     let precision = |index: usize| {
-        let domain = domains[index].as_ref().filter(|_| holds(&index))?;
-        let hidden = if domain.len() == 2 { SAME } else { SAME.sqrt() };
-        let mut precision = scaled(claim(index)?, domain, (1.0 + 2.0 * margin) * (miss + 1e-15) / (1.0 - RATIO))?;
-        precision.residual += 4.0 * hidden / (1.0 - RATIO);
+        checked[index].as_ref()?;
+        let Smooth { parameters, hull } = claims.get(&StateId::new(index))?;
+        let raw: Vec<[f64; 2]> = parameters.iter().map(|&u| [u, 0.0]).collect();
+        let domain: Vec<[f64; 2]> = corners(&states[index].leaf)?.iter().map(|corner| evaluate(&raw, corner)).collect();
+        let residual = (1.0 + 2.0 * margin) * (miss + 1e-15) / (1.0 - ratio);
+        let mut precision = scaled(&raw, &domain, residual, bounds[index].margin())?;
+        precision.residual += 4.0 * SAME / (1.0 - ratio);
+        if let Some(hull) = hull.as_ref().filter(|_| hulls[index]) {
+            precision.measure_at(&hull.points)?;
+            precision.residual += HULL_CHARGE * off * precision.parameters.iter().fold(1.0_f64, |a, u| a.max(u[0].abs()));
+        }
         Some(precision)
     };
     (0..states.len()).map(precision).collect()
+}
+
+/// Checks what is claimed of a curve's transitions.
+fn check(automaton: &Automaton, index: usize) -> Option<Checked> {
+    let claims = automaton.claimed_smooth();
+    let claim = |id: StateId| {
+        let LeafPrimitive::Chord(ends) = &automaton.state(id).leaf else { return None };
+        Some((claims.get(&id)?, ends))
+    };
+    let at = |parameters: &[f64], point: &[f64]| parameters.iter().zip(point).map(|(u, x)| u * x).sum::<f64>();
+    let (own, ends) = claim(StateId::new(index))?;
+    let parameter = |point: &[f64]| at(&own.parameters, point);
+    let [low, high] = [parameter(&ends.start), parameter(&ends.end)];
+    let mut checked = Checked { miss: 0.0, ratio: 0.0, hull: own.hull.as_ref().map(|_| 0.0) };
+    let transitions = &automaton.state(StateId::new(index)).transitions;
+    for (position, transition) in transitions.iter().enumerate() {
+        let (child, ends) = claim(transition.to)?;
+        let [start, end] = [&ends.start, &ends.end].map(|end| (at(&child.parameters, end), parameter(&transition.operator.apply(end))));
+        let ratio = (end.1 - start.1) / (end.0 - start.0);
+        let off = |(k, u): (usize, &f64)| (parameter(transition.operator.column(k)) - start.1 - ratio * (u - start.0)).abs();
+        checked.miss = child.parameters.iter().enumerate().map(off).fold(checked.miss, f64::max);
+        checked.ratio = checked.ratio.max(ratio.abs());
+        let slack = SAME * (high - low).abs();
+        let inside = |u: f64| u >= low.min(high) - slack && u <= low.max(high) + slack;
+        if !(inside(start.1) && inside(end.1)) {
+            return None;
+        }
+        let off = hull_off(own.hull.as_ref(), position, child.hull.as_ref(), &transition.operator);
+        checked.hull = checked.hull.zip(off).map(|(a, b)| a.max(b)).filter(|&off| off <= HULL);
+    }
+    // Written so that what is not a number fails.
+    (!transitions.is_empty() && checked.miss <= MISS && checked.ratio <= MOST_RATIO && high != low).then_some(checked)
+}
+
+/// The largest entry of T H' - H K; `None` where K or H has negative entries.
+fn hull_off(own: Option<&Hull>, position: usize, child: Option<&Hull>, operator: &SubdivisionOperator) -> Option<f64> {
+    let (own, child) = (own?, child?);
+    let inner = own.children.get(position)?;
+    let fits = inner.rows() == own.points.columns() && inner.columns() == child.points.columns();
+    if !fits || !inner.is_nonnegative() || !own.points.is_nonnegative() {
+        return None;
+    }
+    let (left, right) = (operator.times(&child.points), own.points.times(inner));
+    Some(left.entries().iter().zip(right.entries()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
 }
 
 /// States joined by transitions.
@@ -200,7 +315,7 @@ fn solve(automaton: &Automaton, component: &[usize], ratio: f64) -> Vec<Solution
 }
 
 /// A basis of the vectors that all rows annihilate, by elimination with full pivoting; entries are at most about 1.
-fn null_space(mut rows: Vec<Vec<f64>>, unknowns: usize) -> Vec<Vec<f64>> {
+pub(super) fn null_space(mut rows: Vec<Vec<f64>>, unknowns: usize) -> Vec<Vec<f64>> {
     let size = rows.iter().flatten().fold(0.0_f64, |a, x| a.max(x.abs()));
     let mut order: Vec<usize> = (0..unknowns).collect();
     let mut rank = 0;
@@ -238,7 +353,7 @@ fn null_space(mut rows: Vec<Vec<f64>>, unknowns: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn evaluate(parameters: &[[f64; 2]], point: &[f64]) -> [f64; 2] {
+pub(super) fn evaluate(parameters: &[[f64; 2]], point: &[f64]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for (parameter, weight) in parameters.iter().zip(point) {
         sum[0] += weight * parameter[0];
@@ -248,7 +363,7 @@ fn evaluate(parameters: &[[f64; 2]], point: &[f64]) -> [f64; 2] {
 }
 
 /// Corners of the parameter domain that a state's leaf primitive states, in barycentric coordinates.
-fn corners(leaf: &LeafPrimitive) -> Option<Vec<Vec<f64>>> {
+pub(super) fn corners(leaf: &LeafPrimitive) -> Option<Vec<Vec<f64>>> {
     match leaf {
         LeafPrimitive::Chord(ends) => Some(vec![ends.start.clone(), ends.end.clone()]),
         LeafPrimitive::Polygon(corners) => Some(corners.clone()),
@@ -294,7 +409,7 @@ fn precision(automaton: &Automaton, bounds: &[StateBound], index: usize, ratio: 
     let margin = below.iter().map(|&state| bounds[state].margin()).fold(0.0, f64::max);
     let residual = (1.0 + 2.0 * margin) * (miss + 1e-15) / (1.0 - ratio);
     let hidden = if curve { SAME } else { SAME.sqrt() } / (1.0 - ratio);
-    let mut precision = scaled(&combined[index], domains[index].as_ref()?, residual)?;
+    let mut precision = scaled(&combined[index], domains[index].as_ref()?, residual, bounds[index].margin())?;
     // The domains below are of the size of this one, or the functionals would not fit.
     let largest = |state: usize| domains[state].iter().flatten().flatten().fold(0.0_f64, |a, x| a.max(x.abs()));
     let all = below.iter().map(|&state| largest(state)).fold(0.0, f64::max);
@@ -321,7 +436,7 @@ fn area(polygon: &[[f64; 2]]) -> f64 {
 /// Whether the children's domains lie in the state's and, for faces, cover it: then the domains are invariant under
 /// the parameter maps, and by uniqueness of the invariant sets they are G A. For curves connectedness covers: A is a curve
 /// between its ends (see `automaton::connection`).
-fn fills(domain: &[[f64; 2]], children: &[Vec<[f64; 2]>]) -> bool {
+pub(super) fn fills(domain: &[[f64; 2]], children: &[Vec<[f64; 2]>]) -> bool {
     if domain.len() == 2 {
         let (low, high) = (domain[0][0].min(domain[1][0]), domain[0][0].max(domain[1][0]));
         let slack = SAME * (high - low);
@@ -377,7 +492,7 @@ fn overlap(subject: &[[f64; 2]], clip: &[[f64; 2]]) -> f64 {
 }
 
 /// Parameters in the state's own unit, with the fit; `None` if the domain is too thin to measure in.
-fn scaled(raw: &[[f64; 2]], domain: &[[f64; 2]], residual: f64) -> Option<LinearPrecision> {
+pub(super) fn scaled(raw: &[[f64; 2]], domain: &[[f64; 2]], residual: f64, margin: f64) -> Option<LinearPrecision> {
     let origin = domain[0];
     let to = |corner: &[f64; 2]| [corner[0] - origin[0], corner[1] - origin[1]];
     let (first, last) = (to(&domain[1]), to(&domain[domain.len() - 1]));
@@ -396,7 +511,9 @@ fn scaled(raw: &[[f64; 2]], domain: &[[f64; 2]], residual: f64) -> Option<Linear
     let residual = residual * norm;
     let parameters: Vec<[f64; 2]> = raw.iter().map(map).collect();
     let fit = if domain.len() == 2 { Vec::new() } else { fit(&parameters)? };
-    (residual <= MISS && norm.is_finite()).then(|| LinearPrecision { parameters, domain: domain.iter().map(map).collect(), residual, fit })
+    let domain = domain.iter().map(map).collect();
+    let measured = parameters.clone();
+    (residual <= MISS && norm.is_finite()).then(|| LinearPrecision { parameters, domain, residual, hull: None, margin, measured, fit })
 }
 
 /// The pseudo-inverse of the rows 1, G: least squares of an affine map.

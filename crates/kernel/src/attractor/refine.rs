@@ -2,7 +2,7 @@
 
 use super::cell::{Point, Site, distance_squared};
 use super::walk::{Collector, Extent, walk};
-use super::{Attractor, complex};
+use super::{Attractor, TangentPlanes, complex, trim};
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::tessellation::Tessellation;
@@ -104,13 +104,39 @@ impl RefineError {
 /// # Errors
 /// [`RefineError`] when a limit is hit or somebody stops it.
 pub fn refine(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, RefineError> {
-    let (with_brep, without): (Vec<usize>, Vec<usize>) = (0..attractor.roots().len()).partition(|&root| attractor.has_brep(root));
-    let mut whole = Part { tessellation: complex::refine(attractor, &with_brep, tolerance, budget)?, ..Part::default() };
+    refine_whole(attractor, None, tolerance, budget)
+}
+
+/// As [`refine`], with the normals of the limit surface at the drawn vertices ([`Tessellation::normals`]).
+///
+/// # Errors
+/// As [`refine`].
+pub fn refine_with_normals(
+    attractor: &Attractor,
+    tangents: &TangentPlanes,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Tessellation, RefineError> {
+    refine_whole(attractor, Some(tangents), tolerance, budget)
+}
+
+fn refine_whole(
+    attractor: &Attractor,
+    tangents: Option<&TangentPlanes>,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Tessellation, RefineError> {
+    let (with_brep, without): (Vec<usize>, Vec<usize>) = untrimmed(attractor).into_iter().partition(|&root| attractor.has_brep(root));
+    let mut whole = Part { tessellation: complex::refine(attractor, &with_brep, tangents, tolerance, budget)?, ..Part::default() };
+    whole.tessellation.append(trim::refine(attractor, tolerance, budget)?);
     let before = Extent { leaf_cells: whole.tessellation.leaf_cells, deviation_mm: whole.tessellation.deviation_mm };
     let extent = walk(attractor, &without, before, tolerance, budget, &mut |part: Part| -> Result<(), RefineError> {
         whole.append(part);
         whole.check_memory(tolerance, budget)
     })?;
+    // Triangles of trimmed surfaces and those drawn cell by cell have none.
+    let triangles = whole.tessellation.triangles.len();
+    whole.tessellation.normals = whole.tessellation.normals.take().filter(|normals| normals.triangles.len() == triangles);
     whole.tessellation.leaf_cells = extent.leaf_cells;
     whole.tessellation.deviation_mm = extent.deviation_mm + rounding_mm(largest_coordinate(&whole.tessellation.vertices));
     Ok(whole.tessellation)
@@ -131,7 +157,7 @@ pub struct Streamed {
 /// A piece's indices refer to its own vertices: segments that meet at the border of two pieces have each their own
 /// vertex there. Its `leaf_cells` and `deviation_mm` (rounding not included) are its own. All pieces together hold
 /// what [`refine`] gives, in its order, for any number of threads; only cells with a B-rep are drawn one by one here,
-/// not as a complex.
+/// not as a complex. Trimmed surfaces come first, as one piece.
 ///
 /// # Errors
 /// [`RefineError`] when a limit is hit or somebody stops it, or what `sink` returns.
@@ -141,9 +167,13 @@ pub fn stream<E: From<RefineError>>(
     budget: &Budget,
     sink: &mut dyn FnMut(Tessellation) -> Result<(), E>,
 ) -> Result<Streamed, E> {
-    let mut largest = 0.0_f64;
-    let all: Vec<usize> = (0..attractor.roots().len()).collect();
-    let extent = walk(attractor, &all, Extent::default(), tolerance, budget, &mut |part: Part| {
+    let trimmed = trim::refine(attractor, tolerance, budget)?;
+    let mut largest = largest_coordinate(&trimmed.vertices);
+    let before = Extent { leaf_cells: trimmed.leaf_cells, deviation_mm: trimmed.deviation_mm };
+    if !trimmed.vertices.is_empty() {
+        sink(trimmed)?;
+    }
+    let extent = walk(attractor, &untrimmed(attractor), before, tolerance, budget, &mut |part: Part| {
         largest = largest.max(largest_coordinate(&part.tessellation.vertices));
         sink(part.tessellation)
     })?;
@@ -151,22 +181,29 @@ pub fn stream<E: From<RefineError>>(
 }
 
 /// Products of depth 60 lose less than 1e-12 relative; the bound declares ten times that.
-fn rounding_mm(largest_coordinate: f64) -> f64 {
+pub(super) fn rounding_mm(largest_coordinate: f64) -> f64 {
     1e-11 * largest_coordinate
 }
 
-fn largest_coordinate(vertices: &[glam::DVec3]) -> f64 {
+pub(super) fn largest_coordinate(vertices: &[glam::DVec3]) -> f64 {
     vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max)
 }
 
-/// Visits all leaf cells at the tolerance without storing them, and counts them: for benchmarks and plans.
+/// Visits all leaf cells at the tolerance without storing them (but those of trimmed surfaces), and counts them: for
+/// benchmarks and plans.
 ///
 /// # Errors
 /// As [`refine`].
 pub fn count_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<u64, RefineError> {
-    let all: Vec<usize> = (0..attractor.roots().len()).collect();
+    let trimmed = trim::refine(attractor, tolerance, budget)?;
+    let before = Extent { leaf_cells: trimmed.leaf_cells, deviation_mm: trimmed.deviation_mm };
     let mut drop = |_: Unseen| -> Result<(), RefineError> { Ok(()) };
-    walk(attractor, &all, Extent::default(), tolerance, budget, &mut drop).map(|extent| extent.leaf_cells)
+    walk(attractor, &untrimmed(attractor), before, tolerance, budget, &mut drop).map(|extent| extent.leaf_cells)
+}
+
+/// Roots that are drawn whole.
+fn untrimmed(attractor: &Attractor) -> Vec<usize> {
+    (0..attractor.roots().len()).filter(|&root| attractor.trim_of(root).is_none()).collect()
 }
 
 /// Sites that are computed and dropped.

@@ -2,7 +2,7 @@
 
 use super::Attractor;
 use super::cell::{Cell, ControlPoint, Point, Site, child_points, dot, frame_columns, subtract, times};
-use crate::automaton::{Automaton, LeafPrimitive, State, StateId};
+use crate::automaton::{Automaton, LeafPrimitive, StateId};
 
 /// Errors of replacing a cell of A by its sites S, in mm: d(x, A) <= d(x, S) + outer, and
 /// d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
@@ -44,6 +44,8 @@ pub(crate) struct SiteRule<'a> {
     radius: f64,
     tolerance: f64,
     choices: Vec<Choice>,
+    /// States that roots reach.
+    used: Vec<usize>,
 }
 
 /// The share of r^2 - (r - e)^2 that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
@@ -55,25 +57,30 @@ const OUTER_SHARE: f64 = 0.5;
 impl<'a> SiteRule<'a> {
     /// The rule for a dilation by `radius` to `tolerance`, both in mm.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
-        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new() };
+        let mut starts: Vec<usize> = attractor.roots().iter().map(|root| root.state.index()).collect();
+        starts.sort_unstable();
+        starts.dedup();
+        let mut used: Vec<usize> = starts.iter().flat_map(|&state| reachable(attractor.automaton(), StateId::new(state))).collect();
+        used.sort_unstable();
+        used.dedup();
+        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new(), used };
         choose(&mut rule);
         rule
     }
 
-    /// Whether all sites are cells themselves, without error.
-    fn exact(&self) -> bool {
-        self.attractor.automaton().states().iter().all(|state| state.leaf == LeafPrimitive::Simplex)
-    }
-
-    /// The share of r^2 - (r - e)^2 that is the lattice's.
+    /// The share of r^2 - (r - e)^2 that is the lattice's: all of it where sites are cells themselves, without error.
     pub(crate) fn lattice_share(&self) -> f64 {
-        if self.exact() { 1.0 } else { 1.0 - SITE_SHARE }
+        if self.used.iter().all(|&index| self.is_simplex(index)) { 1.0 } else { 1.0 - SITE_SHARE }
     }
 
     /// How far sites may be from the attractor.
     pub(crate) fn outer_reserve(&self) -> f64 {
-        let exact = |(choice, state): (&Choice, &State)| *choice == Choice::Cover || state.leaf == LeafPrimitive::Simplex;
-        if self.choices.iter().zip(self.attractor.automaton().states()).all(exact) { 0.0 } else { OUTER_SHARE * self.tolerance }
+        let exact = |&index: &usize| self.choices[index] == Choice::Cover || self.is_simplex(index);
+        if self.used.iter().all(exact) { 0.0 } else { OUTER_SHARE * self.tolerance }
+    }
+
+    fn is_simplex(&self, state: usize) -> bool {
+        self.attractor.automaton().states()[state].leaf == LeafPrimitive::Simplex
     }
 
     /// The errors of a cell if it is small enough to be replaced.

@@ -9,10 +9,12 @@
 //! paths whose leaves contract (`paths`), in ellipsoidal norms adapted to the automaton (`ellipsoid`) and, when
 //! those leave the interval across 1, in the 1-norm, which is exact on V by a formula: half the largest distance
 //! of two columns. Operators without negative entries never expand it. Only transitions within a strongly
-//! connected component are on cycles, so only these are searched.
+//! connected component are on cycles, so only these are searched. States that are products of others are left out: what
+//! holds for them follows from their factors (`product`).
 
 mod ellipsoid;
 mod paths;
+mod product;
 #[cfg(test)]
 mod tests;
 
@@ -20,6 +22,7 @@ use super::matrix::Dense;
 use super::{Automaton, State, StateId};
 use ellipsoid::{AdaptedNorm, Scaled, adapted_norms};
 use paths::{Lower, Norm, Step, Upper, components, search};
+use product::StateNorm;
 
 /// Bounds of the joint spectral radius, and the norm in which they were proven.
 #[derive(Clone, Debug)]
@@ -35,7 +38,7 @@ pub struct Contraction {
     /// Every product along a path of length k has adapted norm at most `transient * rate^k`, with the rate
     /// `upper`, but 1/2 at least.
     pub transient: f64,
-    norms: Vec<AdaptedNorm>,
+    norms: Vec<StateNorm>,
     /// Adapted norm of every transition's restriction, by state and transition.
     pub(crate) step_norms: Vec<Vec<f64>>,
 }
@@ -43,21 +46,23 @@ pub struct Contraction {
 impl Contraction {
     /// The adapted norm, at a state, of the difference of two barycentric points.
     pub(crate) fn distance(&self, state: StateId, from: &[f64], to: &[f64]) -> f64 {
-        let difference: Vec<f64> = from.iter().zip(to).skip(1).map(|(from, to)| to - from).collect();
+        let difference: Vec<f64> = from.iter().zip(to).map(|(from, to)| to - from).collect();
         self.norms[state.index()].length(&difference)
     }
 
     /// C y for a point y of an affine frame: coordinates in which the adapted norm is the Euclidean one.
+    ///
+    /// # Panics
+    /// For a product, which is no frame.
     pub(crate) fn rounded(&self, state: StateId, y: &[f64; 3]) -> [f64; 3] {
-        let factor = &self.norms[state.index()].factor;
+        let factor = &self.norms[state.index()].ellipsoid().expect("frames are no products").factor;
         std::array::from_fn(|row| (row..3).map(|column| factor.at(row, column) * y[column]).sum())
     }
 
     /// Columns u_j of C^-1: the ellipsoid {sum_j u_j x_j, |x| <= 1} is the unit ball of the norm, in the
     /// coordinates of e_i - e_0.
     pub(crate) fn unit_ball(&self, state: StateId) -> Vec<Vec<f64>> {
-        let inverse = &self.norms[state.index()].inverse;
-        (0..inverse.columns).map(|column| (0..inverse.rows).map(|row| inverse.at(row, column)).collect()).collect()
+        self.norms[state.index()].unit_ball()
     }
 
     /// A bound of |y|_1 / |y| over V.
@@ -65,9 +70,14 @@ impl Contraction {
         self.norms[state.index()].sum_ratio()
     }
 
+    /// The rate that goes with [`Self::transient`].
+    pub(crate) fn rate(&self) -> f64 {
+        self.upper.max(LEAST_RATE)
+    }
+
     /// Bounds the sum over k of the norms of all products of one infinite path.
     pub(crate) fn sum_of_norms(&self) -> f64 {
-        self.transient / (1.0 - self.upper.max(LEAST_RATE))
+        self.transient / (1.0 - self.rate())
     }
 }
 
@@ -90,6 +100,15 @@ struct Restriction {
 /// Cost: a few tens of milliseconds at most, and a few passes over the automaton when that is larger.
 #[must_use]
 pub fn contraction(automaton: &Automaton) -> Contraction {
+    let own: Vec<StateId> = (0..automaton.states().len()).map(StateId::new).filter(|&id| automaton.factors(id).is_empty()).collect();
+    if own.len() == automaton.states().len() {
+        return searched(automaton);
+    }
+    product::extended(automaton, &own, searched(&automaton.restricted_to(&own)))
+}
+
+/// As [`contraction`], for an automaton without products.
+fn searched(automaton: &Automaton) -> Contraction {
     let restricted: Vec<Vec<Restriction>> = automaton.states().iter().map(restrictions).collect();
     let successors: Vec<Vec<usize>> = restricted.iter().map(|steps| steps.iter().map(|step| step.to).collect()).collect();
     let component = components(&successors);
@@ -118,6 +137,7 @@ pub fn contraction(automaton: &Automaton) -> Contraction {
     // A bound of norms is proven under rounding; a radius is computed, and gives way to it.
     let rate = upper.rate.max(lower.rate.min(if upper.rate < 1.0 { upper.rate } else { f64::INFINITY }));
     let cycle = lower.cycle.map_or((StateId::new(0), Vec::new()), |(state, word)| (StateId::new(state), word));
+    let norms = norms.into_iter().map(StateNorm::Ellipsoid).collect();
     let mut result = Contraction { lower: lower.rate.min(rate), upper: rate, cycle, depth: upper.depth, transient: 1.0, norms, step_norms };
     result.transient = transient(&result, &upper, &successors, &component);
     result

@@ -110,13 +110,32 @@ pub struct State {
     pub frame: bool,
 }
 
+/// What a model claims of the cells of a curve.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub(crate) struct Smooth {
+    /// Parameters of its control points with which it has linear precision: those of a child are an affine image.
+    pub(crate) parameters: Vec<f64>,
+    /// Points in whose hull its attractor lies, if that is smaller than the control points'.
+    pub(crate) hull: Option<Hull>,
+}
+
+/// Points H of a state, and for every transition the matrix K without negative entries for which T H' = H K, H' being
+/// the child's points: so the hull of H contains those of the children, and with them the attractor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Hull {
+    pub(crate) points: SubdivisionOperator,
+    pub(crate) children: Vec<SubdivisionOperator>,
+}
+
 /// States and transitions. Invariant: operators fit their states, and every transition and boundary
 /// names a state of the automaton.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Automaton {
     states: Vec<State>,
-    /// Parameters that models claim for control points; see [`Self::claim_parameters`].
-    claims: BTreeMap<StateId, Vec<[f64; 2]>>,
+    /// What models claim of their curves; see [`Self::claim_smooth`].
+    claims: BTreeMap<StateId, Smooth>,
+    /// The factors of every state that is a product; empty for others. See [`Self::claim_products`].
+    products: Vec<Vec<StateId>>,
 }
 
 /// Why states do not form an automaton.
@@ -176,7 +195,8 @@ impl Automaton {
                 check(format!("boundary {index}"), boundary.state, &boundary.incidence)?;
             }
         }
-        Ok(Self { states, claims: BTreeMap::new() })
+        let products = vec![Vec::new(); states.len()];
+        Ok(Self { states, claims: BTreeMap::new(), products })
     }
 
     /// The states, in order of their ids.
@@ -191,14 +211,88 @@ impl Automaton {
         &self.states[id.index()]
     }
 
-    /// Notes, for some states, parameters of their control points with which their curves or faces have linear precision
-    /// at the ratio 1/2, over unit intervals or squares. Claims are verified before use, and save a search.
-    pub(crate) fn claim_parameters(&mut self, claims: BTreeMap<StateId, Vec<[f64; 2]>>) {
+    /// Notes what some curves are like. Claims are verified before use, and save a search.
+    pub(crate) fn claim_smooth(&mut self, claims: BTreeMap<StateId, Smooth>) {
         self.claims = claims;
     }
 
-    pub(crate) fn claimed_parameters(&self) -> &BTreeMap<StateId, Vec<[f64; 2]>> {
+    pub(crate) fn claimed_smooth(&self) -> &BTreeMap<StateId, Smooth> {
         &self.claims
+    }
+
+    /// Notes which states are products of others: all their children are products of one child of every factor, in
+    /// lexicographic order, through the Kronecker products of the factors' operators. What is proven of the factors then
+    /// holds for the product. Claims that do not hold are dropped.
+    pub(crate) fn claim_products(&mut self, claims: &BTreeMap<StateId, Vec<StateId>>) {
+        let holds: Vec<bool> = (0..self.states.len()).map(|index| self.is_product(StateId::new(index), claims)).collect();
+        let holds = self.hereditary(holds);
+        // Factors are no products themselves, and nothing else leads to one.
+        let stray = self
+            .states
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| !holds[*index])
+            .any(|(_, state)| state.transitions.iter().any(|transition| holds[transition.to.index()]));
+        let nested = claims.iter().filter(|(id, _)| holds[id.index()]).flat_map(|(_, factors)| factors).any(|id| holds[id.index()]);
+        if stray || nested {
+            return;
+        }
+        for (id, factors) in claims.iter().filter(|(id, _)| holds[id.index()]) {
+            self.products[id.index()].clone_from(factors);
+        }
+    }
+
+    /// The factors of a state that is a product, as [`Self::claim_products`] says; none for others.
+    #[must_use]
+    pub fn factors(&self, id: StateId) -> &[StateId] {
+        &self.products[id.index()]
+    }
+
+    /// The automaton of these states alone, which lead to no others, without boundaries.
+    fn restricted_to(&self, kept: &[StateId]) -> Self {
+        let mut place = vec![None; self.states.len()];
+        kept.iter().enumerate().for_each(|(position, id)| place[id.index()] = Some(StateId::new(position)));
+        let states: Vec<State> = kept
+            .iter()
+            .map(|&id| {
+                let state = self.state(id);
+                let follow = |transition: &Transition| Some(Transition { to: place[transition.to.index()]?, ..transition.clone() });
+                State { transitions: state.transitions.iter().filter_map(follow).collect(), boundaries: Vec::new(), ..state.clone() }
+            })
+            .collect();
+        let products = vec![Vec::new(); states.len()];
+        Self { states, claims: BTreeMap::new(), products }
+    }
+
+    fn is_product(&self, id: StateId, claims: &BTreeMap<StateId, Vec<StateId>>) -> bool {
+        let Some(factors) = claims.get(&id).filter(|factors| factors.len() > 1) else { return false };
+        if factors.iter().any(|factor| factor.index() >= self.states.len()) {
+            return false;
+        }
+        let own = self.state(id);
+        let parts: Vec<&State> = factors.iter().map(|&factor| self.state(factor)).collect();
+        let children: usize = parts.iter().map(|part| part.transitions.len()).product();
+        let dimension: usize = parts.iter().map(|part| part.dimension).product();
+        if own.frame
+            || parts.iter().any(|part| part.frame)
+            || own.dimension != dimension
+            || own.transitions.len() != children
+            || children == 0
+        {
+            return false;
+        }
+        own.transitions.iter().enumerate().all(|(index, transition)| {
+            let mut rest = index;
+            let mut chosen: Vec<&Transition> = Vec::with_capacity(parts.len());
+            for part in parts.iter().rev() {
+                chosen.push(&part.transitions[rest % part.transitions.len()]);
+                rest /= part.transitions.len();
+            }
+            chosen.reverse();
+            let targets = claims.get(&transition.to);
+            targets.is_some_and(|targets| chosen.iter().map(|step| step.to).eq(targets.iter().copied()))
+                && transition.operator.factors().iter().eq(chosen.iter().map(|step| &step.operator))
+        })
     }
 
     /// Chooses chords for edges that are proven to be curves, and polygons for faces whose sides close.

@@ -1,15 +1,41 @@
 //! Matrices between barycentric spaces.
 
+use std::sync::OnceLock;
+
 /// A matrix T whose columns are points of the parent's barycentric space: column j holds the
 /// barycentric coordinates of the child's control point j, so `P T` are the child's control points.
 ///
 /// Shape n x m (parent x child), column-major. Invariant: finite entries, every column sums to 1
 /// within [`COLUMN_SUM_CORRECTED`] before construction and exactly (to rounding) after it.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// A Kronecker product is kept as its factors: it is applied direction by direction, and its entries are formed when
+/// somebody asks for them.
+#[derive(Clone, Debug)]
 pub struct SubdivisionOperator {
     rows: usize,
     columns: usize,
-    entries: Vec<f64>,
+    form: Form,
+}
+
+#[derive(Clone, Debug)]
+enum Form {
+    Dense(Vec<f64>),
+    Product {
+        /// Two or more, none a product itself; the first one's index is slowest.
+        factors: Vec<SubdivisionOperator>,
+        /// The entries, once they were asked for.
+        formed: OnceLock<Vec<f64>>,
+    },
+}
+
+impl PartialEq for SubdivisionOperator {
+    fn eq(&self, other: &Self) -> bool {
+        if (self.rows, self.columns) != (other.rows, other.columns) {
+            return false;
+        }
+        let alike = !self.factors().is_empty() && self.factors() == other.factors();
+        alike || self.entries() == other.entries()
+    }
 }
 
 /// Column sums off 1 by no more than this are rounding: corrected without a word.
@@ -49,10 +75,10 @@ impl SubdivisionOperator {
     /// [`OperatorError`] for an entry that is not finite or a sum too far from 1.
     pub fn from_columns(rows: usize, entries: Vec<f64>) -> Result<(Self, f64), OperatorError> {
         let columns = entries.len() / rows;
-        let mut operator = Self { rows, columns, entries };
+        let mut entries = entries;
         let mut corrected = 0.0_f64;
         for column in 0..columns {
-            let values = &mut operator.entries[column * rows..(column + 1) * rows];
+            let values = &mut entries[column * rows..(column + 1) * rows];
             if let Some(row) = values.iter().position(|value| !value.is_finite()) {
                 return Err(OperatorError::NotFinite { row, column, value: values[row] });
             }
@@ -69,13 +95,44 @@ impl SubdivisionOperator {
                 values.iter_mut().for_each(|value| *value -= share);
             }
         }
-        Ok((operator, corrected))
+        Ok((Self { rows, columns, form: Form::Dense(entries) }, corrected))
     }
 
     /// An operator whose columns sum to 1 by construction: from a formula, or a product of operators.
     pub(crate) fn exact(rows: usize, entries: Vec<f64>) -> Self {
         debug_assert_eq!(entries.len() % rows, 0);
-        Self { rows, columns: entries.len() / rows, entries }
+        Self { rows, columns: entries.len() / rows, form: Form::Dense(entries) }
+    }
+
+    /// The Kronecker product of operators, the first one's index slowest. Its columns sum to 1 as theirs do.
+    ///
+    /// # Panics
+    /// Without factors.
+    #[must_use]
+    pub fn product(factors: Vec<Self>) -> Self {
+        let mut list = Vec::with_capacity(factors.len());
+        for factor in factors {
+            match factor.form {
+                Form::Product { factors, .. } => list.extend(factors),
+                Form::Dense(_) => list.push(factor),
+            }
+        }
+        if list.len() == 1 {
+            return list.remove(0);
+        }
+        assert!(!list.is_empty(), "a product has a factor");
+        let rows = list.iter().map(|factor| factor.rows).product();
+        let columns = list.iter().map(|factor| factor.columns).product();
+        Self { rows, columns, form: Form::Product { factors: list, formed: OnceLock::new() } }
+    }
+
+    /// The factors of a Kronecker product; none for other operators.
+    #[must_use]
+    pub fn factors(&self) -> &[Self] {
+        match &self.form {
+            Form::Dense(_) => &[],
+            Form::Product { factors, .. } => factors,
+        }
     }
 
     /// The identity of size n.
@@ -83,7 +140,7 @@ impl SubdivisionOperator {
     pub fn identity(n: usize) -> Self {
         let mut entries = vec![0.0; n * n];
         (0..n).for_each(|i| entries[i * n + i] = 1.0);
-        Self { rows: n, columns: n, entries }
+        Self::exact(n, entries)
     }
 
     /// n, the parent's dimension.
@@ -101,24 +158,34 @@ impl SubdivisionOperator {
     /// Entry (i, j).
     #[must_use]
     pub fn entry(&self, row: usize, column: usize) -> f64 {
-        self.entries[column * self.rows + row]
+        self.entries()[column * self.rows + row]
     }
 
     /// Column j: a point of the parent's barycentric space.
     #[must_use]
     pub fn column(&self, column: usize) -> &[f64] {
-        &self.entries[column * self.rows..(column + 1) * self.rows]
+        &self.entries()[column * self.rows..(column + 1) * self.rows]
     }
 
-    /// All entries, column after column.
+    /// All entries, column after column. Those of a Kronecker product are formed at the first call, at the cost of
+    /// as many multiplications.
     #[must_use]
     pub fn entries(&self) -> &[f64] {
-        &self.entries
+        match &self.form {
+            Form::Dense(entries) => entries,
+            Form::Product { factors, formed } => formed.get_or_init(|| kronecker(factors)),
+        }
     }
 
     /// T x for a point x of the child's space.
+    ///
+    /// Cost: as many multiplications as the operator has entries; for a Kronecker product of n_u x n_u and n_v x n_v,
+    /// n_u n_v (n_u + n_v).
     #[must_use]
     pub fn apply(&self, point: &[f64]) -> Vec<f64> {
+        if let Form::Product { factors, .. } = &self.form {
+            return apply_factors(factors, point);
+        }
         let mut image = vec![0.0; self.rows];
         for (column, &weight) in point.iter().enumerate() {
             for (sum, &entry) in image.iter_mut().zip(self.column(column)) {
@@ -128,16 +195,106 @@ impl SubdivisionOperator {
         image
     }
 
-    /// The product `self * other`, n x the other's columns.
+    /// The product `self * other`, n x the other's columns: factor by factor where both are Kronecker products whose
+    /// factors fit.
     #[must_use]
     pub fn times(&self, other: &Self) -> Self {
+        if let Some(product) = self.times_factors(other) {
+            return product;
+        }
         Self::exact(self.rows, (0..other.columns).flat_map(|column| self.apply(other.column(column))).collect())
+    }
+
+    /// (A x B)(C x D) = AC x BD. A factor of one column, which the end of a curve is, meets no factor of the other.
+    fn times_factors(&self, other: &Self) -> Option<Self> {
+        let Form::Product { factors, .. } = &self.form else { return None };
+        let single = std::slice::from_ref(other);
+        let mut rest = if other.factors().is_empty() { single } else { other.factors() }.iter().peekable();
+        let mut product = Vec::with_capacity(factors.len());
+        for factor in factors {
+            match rest.next_if(|next| next.rows == factor.columns) {
+                Some(next) => product.push(factor.times(next)),
+                None if factor.columns == 1 => product.push(factor.clone()),
+                None => return None,
+            }
+        }
+        rest.next().is_none().then(|| Self::product(product))
     }
 
     /// Whether no entry is negative (beyond rounding): such operators keep cells in the convex
     /// hull of their control points.
     #[must_use]
     pub fn is_nonnegative(&self) -> bool {
-        self.entries.iter().all(|&entry| entry >= -1e-15)
+        match &self.form {
+            Form::Dense(entries) => entries.iter().all(|&entry| entry >= -1e-15),
+            Form::Product { factors, .. } => factors.iter().all(Self::is_nonnegative),
+        }
+    }
+}
+
+/// The entries of a Kronecker product.
+fn kronecker(factors: &[SubdivisionOperator]) -> Vec<f64> {
+    let start = SubdivisionOperator::identity(1);
+    let product = factors.iter().fold(start, |a, b| {
+        let mut entries = Vec::with_capacity(a.entries().len() * b.entries().len());
+        for i in 0..a.columns {
+            for j in 0..b.columns {
+                for x in a.column(i) {
+                    entries.extend(b.column(j).iter().map(|y| x * y));
+                }
+            }
+        }
+        SubdivisionOperator::exact(a.rows * b.rows, entries)
+    });
+    product.entries().to_vec()
+}
+
+/// (T_u x T_v) x, direction after direction.
+fn apply_factors(factors: &[SubdivisionOperator], point: &[f64]) -> Vec<f64> {
+    let mut current = point.to_vec();
+    let (mut outer, mut inner) = (1, point.len());
+    for factor in factors {
+        let (rows, columns) = (factor.rows, factor.columns);
+        inner /= columns;
+        let mut image = vec![0.0; outer * rows * inner];
+        for block in 0..outer {
+            for column in 0..columns {
+                let source = &current[(block * columns + column) * inner..][..inner];
+                for (row, &entry) in factor.column(column).iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
+                    let target = &mut image[(block * rows + row) * inner..][..inner];
+                    target.iter_mut().zip(source).for_each(|(sum, &x)| *sum += entry * x);
+                }
+            }
+        }
+        outer *= rows;
+        current = image;
+    }
+    current
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn operator(rows: usize, columns: usize, seed: f64) -> SubdivisionOperator {
+        let entry = |index: usize| ((index as f64 + 1.0) * seed).sin();
+        SubdivisionOperator::exact(rows, (0..rows * columns).map(entry).collect())
+    }
+
+    #[test]
+    fn products_are_applied_and_multiplied_by_their_factors() {
+        let left = [operator(3, 2, 1.1), operator(4, 4, 0.7), operator(2, 1, 2.3)];
+        let right = [operator(2, 2, 0.3), operator(4, 3, 1.9)];
+        let (a, b) = (SubdivisionOperator::product(left.to_vec()), SubdivisionOperator::product(right.to_vec()));
+        assert_eq!((a.rows(), a.columns(), b.columns()), (24, 8, 6));
+        let dense = |operator: &SubdivisionOperator| SubdivisionOperator::exact(operator.rows(), operator.entries().to_vec());
+        let product = a.times(&b);
+        assert_eq!(product.factors().len(), 3, "the factor of one column stays");
+        let expected = dense(&a).times(&dense(&b));
+        let off = product.entries().iter().zip(expected.entries()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-14, "{off}");
+        let point: Vec<f64> = (0..8).map(|k| f64::from(k).cos()).collect();
+        let off = a.apply(&point).iter().zip(dense(&a).apply(&point)).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-14, "{off}");
     }
 }

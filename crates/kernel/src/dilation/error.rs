@@ -1,6 +1,8 @@
 //! Why there is no solid.
 
+use super::TRIM_SHARE;
 use super::plan::Setting;
+use crate::attractor::RefineError;
 use crate::budget::Stopped;
 use crate::error::{Kind, LimitFacts};
 use crate::solid::SolidError;
@@ -76,6 +78,9 @@ pub enum DilationError {
         "a closed mesh is taken as a solid, and crosses itself or has faces without area, so that its inside is not defined; mend it, or say \"interior\": \"surface\""
     )]
     Inside,
+    /// Trimmed surfaces cannot be drawn as finely as their share of the tolerance asks.
+    #[error("trimmed surfaces: {0}")]
+    Trimmed(RefineError),
     /// The mesh is no closed manifold: our bug.
     #[error("the extracted surface is not a closed manifold: {0}")]
     Defect(SolidError),
@@ -96,6 +101,7 @@ impl DilationError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
+            Self::Trimmed(error) => error.kind(),
             Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } => Kind::Unreachable,
             Self::Inside => Kind::Invalid,
@@ -108,6 +114,7 @@ impl DilationError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Stopped(stopped) => stopped.code(),
+            Self::Trimmed(error) => error.code(),
             Self::Triangles { .. } => "limit-triangles",
             Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
@@ -123,6 +130,11 @@ impl DilationError {
     pub fn limit(&self) -> Option<LimitFacts> {
         let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
         match *self {
+            Self::Trimmed(ref error) => error.limit().map(|facts| LimitFacts {
+                // What was asked of the trimmed surfaces is a share of the tolerance.
+                remedy: facts.remedy.map(|(name, value)| (name, if name == "tolerance_mm" { value / TRIM_SHARE } else { value })),
+                ..facts
+            }),
             Self::Stopped(_) | Self::Defect(_) | Self::Inside => None,
             Self::Cells { allowed } => {
                 Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })

@@ -23,9 +23,9 @@ mod simplify;
 mod stitch;
 mod tree;
 
-use crate::attractor::Attractor;
+use crate::attractor::{Attractor, RefineError};
 use crate::budget::Budget;
-use crate::measure::bounds::AxisBox;
+use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
 pub use error::DilationError;
@@ -61,8 +61,7 @@ pub struct Dilation {
 /// # Errors
 /// [`DilationError`]: a limit, with a value that would pass, or a stop.
 pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
-    let plan = Plan::new(attractor, radius, tolerance, budget)?;
-    plan.run(attractor, budget)
+    run(attractor, radius, tolerance, budget, true)
 }
 
 /// As [`dilate`], with the triangles of the lattice: only those that have no area are removed.
@@ -70,7 +69,54 @@ pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budge
 /// # Errors
 /// As [`dilate`].
 pub fn dilate_unsimplified(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
-    Plan::new(attractor, radius, tolerance, budget)?.unsimplified().run(attractor, budget)
+    run(attractor, radius, tolerance, budget, false)
+}
+
+fn run(
+    attractor: &Attractor,
+    radius: Radius,
+    tolerance: Tolerance,
+    budget: &Budget,
+    simplify: bool,
+) -> Result<Dilation, DilationError> {
+    let Some(Resolved { attractor: resolved, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
+        return Plan::new(attractor, radius, tolerance, simplify, budget)?.run(attractor, budget);
+    };
+    let dilation = Plan::new(&resolved, radius, rest, simplify, budget)?.run(&resolved, budget)?;
+    Ok(Dilation {
+        inner_mm: dilation.inner_mm + deviation_mm,
+        outer_mm: dilation.outer_mm + deviation_mm,
+        bounds: bounding_box(attractor, budget)?,
+        ..dilation
+    })
+}
+
+/// Share of the tolerance that triangles which stand for trimmed surfaces may use.
+const TRIM_SHARE: f64 = 0.1;
+
+/// An attractor whose trimmed surfaces are triangles.
+struct Resolved {
+    attractor: Attractor,
+    /// Its Hausdorff distance from the one asked for, at most.
+    deviation_mm: f64,
+    /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
+    /// in D(r + d), so that d adds to both bounds.
+    rest: Tolerance,
+}
+
+/// Draws trimmed surfaces to their share of the tolerance; `None` when there are none.
+fn resolve(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Option<Resolved>, DilationError> {
+    if attractor.trimmed().is_empty() {
+        return Ok(None);
+    }
+    let aimed = tolerance.mm().min(0.5 * radius.mm());
+    let length = |mm: f64| Tolerance::new(mm).expect("a share of a positive length is positive");
+    let share = length((TRIM_SHARE * aimed).max(f64::MIN_POSITIVE));
+    let (attractor, deviation_mm) = attractor.resolved(share, budget).map_err(|error| match error {
+        RefineError::Stopped(stopped) => DilationError::Stopped(stopped),
+        other => DilationError::Trimmed(other),
+    })?;
+    Ok(Some(Resolved { attractor, deviation_mm, rest: length((aimed - deviation_mm).max(f64::MIN_POSITIVE)) }))
 }
 
 /// What a dilation is predicted to cost.
@@ -84,11 +130,12 @@ pub struct Prediction {
     pub pitch_mm: f64,
 }
 
-
 /// Predicts what [`dilate`] will make, from a coarse lattice.
 ///
 /// # Errors
 /// As [`dilate`], for what shows before the work.
 pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Prediction, DilationError> {
-    Plan::new(attractor, radius, tolerance, budget)?.predict(attractor, budget)
+    let resolved = resolve(attractor, radius, tolerance, budget)?;
+    let (attractor, tolerance) = resolved.as_ref().map_or((attractor, tolerance), |resolved| (&resolved.attractor, resolved.rest));
+    Plan::new(attractor, radius, tolerance, true, budget)?.predict(attractor, budget)
 }

@@ -143,7 +143,13 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    pub(super) fn new(attractor: &'a Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Self, DilationError> {
+    pub(super) fn new(
+        attractor: &'a Attractor,
+        radius: Radius,
+        tolerance: Tolerance,
+        simplify: bool,
+        budget: &Budget,
+    ) -> Result<Self, DilationError> {
         let bounds = bounding_box(attractor, budget)?;
         let radius = radius.mm();
         // A tolerance of the radius' order would allow an empty result.
@@ -159,7 +165,7 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule, clean_only: false })
+        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule, clean_only: !simplify })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -175,11 +181,6 @@ impl<'a> Plan<'a> {
         // What the lattice gives is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
         Setting { outer, clean_only: self.clean_only, ..setting }
-    }
-
-    /// The same without simplification.
-    pub(super) fn unsimplified(self) -> Self {
-        Self { clean_only: true, ..self }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.

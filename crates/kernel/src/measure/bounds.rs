@@ -2,6 +2,7 @@
 //! function of a graph-directed set is the maximum of its children's.
 
 use crate::attractor::cell::{Cell, ControlPoint, Site, child_points};
+use crate::attractor::trim::{TrimmedSurface, Window};
 use crate::attractor::{Attractor, StateBound};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
@@ -51,6 +52,8 @@ struct Branch {
     cell: Cell,
     points: Vec<ControlPoint>,
     depth: u32,
+    /// Where the cell lies in the parameter plane, if its surface is trimmed.
+    window: Option<Window>,
 }
 
 impl PartialEq for Branch {
@@ -94,24 +97,32 @@ pub fn bounding_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, S
 /// sup of `sign * x[axis]` over the attractor.
 fn support(attractor: &Attractor, axis: usize, sign: f64, budget: &Budget) -> Result<Interval, Stopped> {
     let mut heap = BinaryHeap::new();
-    let mut reached = f64::NEG_INFINITY;
+    let ends = attractor.trimmed().iter().flat_map(TrimmedSurface::loop_points);
+    let mut reached = ends.map(|point| sign * point[axis]).fold(f64::NEG_INFINITY, f64::max);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (index, root) in attractor.roots().iter().enumerate() {
         if index % 4096 == 0 {
             budget.cancel.check()?;
         }
+        let window = attractor.root_window(index);
+        if window.as_ref().is_some_and(Window::is_outside) {
+            continue;
+        }
         let cell = attractor.root_cell(index);
         let (floor, bound) = cell_support(attractor, &cell, &root.points, axis, sign);
-        reached = reached.max(floor);
+        if window.as_ref().is_none_or(Window::is_inside) {
+            reached = reached.max(floor);
+        }
         low = low.min(cell.ball.centre[axis] - cell.ball.radius);
         high = high.max(cell.ball.centre[axis] + cell.ball.radius);
         // Cells that cannot win are not stored; later ones may still raise `reached`.
         if bound > reached {
-            heap.push(Branch { bound, cell, points: root.points.clone(), depth: 0 });
+            heap.push(Branch { bound, cell, points: root.points.clone(), depth: 0, window });
         }
     }
     let width = RELATIVE_WIDTH * (high - low).max(f64::MIN_POSITIVE);
-    let rounding = 1e-12 * low.abs().max(high.abs());
+    let moved = attractor.trimmed().iter().map(TrimmedSurface::moved_mm).fold(0.0, f64::max);
+    let rounding = 1e-12 * low.abs().max(high.abs()) + moved;
     let mut expansions = 0;
     let mut bound = reached;
     while let Some(branch) = heap.pop() {
@@ -125,13 +136,22 @@ fn support(attractor: &Attractor, axis: usize, sign: f64, budget: &Budget) -> Re
         }
         let state = attractor.state_of(&branch.cell);
         for (index, transition) in state.transitions.iter().enumerate() {
+            let window = branch.window.as_ref().and_then(|window| attractor.child_window(branch.cell.root as usize, window, index));
+            if window.as_ref().is_some_and(Window::is_outside) {
+                continue;
+            }
             let mut points = vec![[0.0; 4]; transition.operator.columns()];
             child_points(&branch.points, &transition.operator, &mut points);
             let child = attractor.child_cell(&branch.cell, index, &points);
             let (floor, ceiling) = cell_support(attractor, &child, &points, axis, sign);
-            reached = reached.max(floor);
+            match &window {
+                Some(window) if !window.is_inside() => {
+                    reached = attractor.window_points(&child, window).map(|point| sign * point[axis]).fold(reached, f64::max);
+                }
+                _ => reached = reached.max(floor),
+            }
             if ceiling > reached {
-                heap.push(Branch { bound: ceiling.min(branch.bound), cell: child, points, depth: branch.depth + 1 });
+                heap.push(Branch { bound: ceiling.min(branch.bound), cell: child, points, depth: branch.depth + 1, window });
             }
         }
         bound = reached;

@@ -1,5 +1,6 @@
 //! Boundary controlled iterated function systems, stated in full.
 
+use super::join::Borders;
 use super::lower::Draft;
 use super::solve::{GLUE_ALLOWED, SolveError, permutation_of};
 use crate::attractor::{Gluing, Root};
@@ -183,6 +184,7 @@ impl Bcifs {
         let states: Vec<State> = (0..self.states.len()).map(|index| reader.state(index, draft)).collect();
         let first_root = draft.roots.len();
         reader.roots(draft);
+        draft.borders = Borders::Cells { first: first_root, count: draft.roots.len() - first_root };
         if draft.findings.iter().filter(|finding| !finding.warning).count() == errors_before {
             reader.constraints(&states, draft);
             reader.seams(&states, first_root, draft);
@@ -671,7 +673,7 @@ fn permuted(columns: Columns, permutation: Option<Vec<usize>>) -> Columns {
 }
 
 /// The largest extent of the control points, 1 if there is none.
-fn extent(roots: &[Root]) -> f64 {
+pub(super) fn extent(roots: &[Root]) -> f64 {
     let range = |axis: usize| {
         let values = roots.iter().flat_map(|root| root.points.iter().map(move |point| point[axis] / point[3]));
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));

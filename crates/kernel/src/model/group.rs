@@ -1,6 +1,6 @@
 //! Several shapes as one.
 
-use super::{AffineMap, Shape};
+use super::{AffineMap, Join, Shape};
 
 /// A part of a [`Group`].
 #[derive(Clone, Debug, PartialEq)]
@@ -18,4 +18,6 @@ pub struct Part {
 pub struct Group {
     /// The parts.
     pub parts: Vec<Part>,
+    /// Borders of parts that are one, or that a strip joins.
+    pub joins: Vec<Join>,
 }

@@ -1,10 +1,12 @@
 //! From shapes to one automaton: every family adds states and roots to a [`Draft`], which becomes an
 //! [`Attractor`] once.
 
+use super::join::{self, Borders};
 use super::{AffineMap, CellKind, Model, Shape};
+use crate::attractor::trim::TrimmedSurface;
 use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
 use crate::automaton::topology::{Declared, Topology, TopologyError};
-use crate::automaton::{Automaton, Boundary, LeafPrimitive, State, StateId, SubdivisionOperator};
+use crate::automaton::{Automaton, Boundary, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator};
 use std::collections::BTreeMap;
 
 /// Something about a model that its author should know: an error, or a warning.
@@ -37,6 +39,8 @@ pub(super) struct Draft {
     pub(super) states: Vec<State>,
     pub(super) roots: Vec<Root>,
     pub(super) solids: Vec<SolidSurface>,
+    /// Surfaces that loops cut.
+    pub(super) trimmed: Vec<TrimmedSurface>,
     pub(super) findings: Vec<Finding>,
     pub(super) constraint_residual: f64,
     /// What the model says of the states' subdivision, by state; may be shorter than the states.
@@ -45,12 +49,16 @@ pub(super) struct Draft {
     pub(super) gluings: Vec<Gluing>,
     /// Boundaries of roots that are single points in space: (root, boundary).
     pub(super) collapsed: Vec<(usize, usize)>,
+    /// What the shape that was lowered last says of its borders.
+    pub(super) borders: Borders,
     /// Largest distance between control points of glued boundaries.
     pub(super) seam_mm: f64,
     /// States whose names tell their content, by name.
     shared: BTreeMap<String, StateId>,
-    /// Parameters of states' control points; see [`Automaton::claim_parameters`].
-    pub(super) parameters: BTreeMap<StateId, Vec<[f64; 2]>>,
+    /// What is claimed of curves; see [`Automaton::claim_smooth`].
+    pub(super) smooth: BTreeMap<StateId, Smooth>,
+    /// States that are products of others; see [`Automaton::claim_products`].
+    pub(super) products: BTreeMap<StateId, Vec<StateId>>,
     /// Where every state's transitions are listed in the model.
     origins: Vec<String>,
     /// Where the family that is being lowered stands in the model.
@@ -125,7 +133,7 @@ impl Draft {
         StateId::new(self.states.len() - 1)
     }
 
-    fn has_errors(&self) -> bool {
+    pub(super) fn has_errors(&self) -> bool {
         self.findings.iter().any(|finding| !finding.warning)
     }
 
@@ -150,29 +158,35 @@ impl Draft {
             self.error("/parts", "automaton.empty", "the group has no part".into());
         }
         let place = self.place.clone();
+        let mut borders = Vec::with_capacity(group.parts.len());
         for (index, part) in group.parts.iter().enumerate() {
             self.place = format!("{place}/parts/{index}");
             if part.transform.as_ref().is_some_and(|map| !(map.linear.is_finite() && map.translation.is_finite())) {
                 self.error("/transform", "model.not-finite", "the transform has an entry that is not finite".into());
+                borders.push(Borders::None);
                 continue;
             }
             self.place = format!("{place}/parts/{index}/shape");
-            let (first_root, first_solid) = (self.roots.len(), self.solids.len());
+            let (first_root, first_solid, first_trimmed) = (self.roots.len(), self.solids.len(), self.trimmed.len());
+            self.borders = Borders::None;
             self.shape(&part.shape);
+            borders.push(std::mem::take(&mut self.borders));
             if let Some(map) = &part.transform {
                 self.place = format!("{place}/parts/{index}");
+                self.trimmed[first_trimmed..].iter_mut().for_each(|surface| surface.transform(|point| moved(map, point)));
                 self.transform(map, first_root, first_solid);
             }
         }
         self.place = place;
+        if !group.joins.is_empty() && !self.has_errors() {
+            join::lower(&group.joins, &borders, self);
+        }
     }
 
     fn transform(&mut self, map: &AffineMap, first_root: usize, first_solid: usize) {
         for root in &mut self.roots[first_root..] {
             for point in &mut root.points {
-                let weight = point[3];
-                let moved = map.linear * glam::DVec3::new(point[0], point[1], point[2]) + weight * map.translation;
-                *point = [moved.x, moved.y, moved.z, weight];
+                *point = moved(map, point);
             }
         }
         let determinant = map.linear.determinant();
@@ -189,6 +203,13 @@ impl Draft {
             *surface = super::mesh::with_normals(std::mem::take(surface), &self.roots);
         }
     }
+}
+
+/// The image of a homogeneous point.
+fn moved(map: &AffineMap, point: &[f64; 4]) -> [f64; 4] {
+    let weight = point[3];
+    let moved = map.linear * glam::DVec3::new(point[0], point[1], point[2]) + weight * map.translation;
+    [moved.x, moved.y, moved.z, weight]
 }
 
 impl Model {
@@ -218,19 +239,24 @@ impl Model {
             Ok(automaton) => automaton,
             Err(error) => return Err(fail(draft.findings, &error.into())),
         };
+        automaton.claim_products(&std::mem::take(&mut draft.products));
         let topology = match Topology::new(&automaton, &draft.declared) {
             Ok(topology) => topology,
             Err(error) => return Err(incoherent(draft.findings, &error)),
         };
         automaton.connect(&topology);
-        automaton.claim_parameters(std::mem::take(&mut draft.parameters));
+        automaton.claim_smooth(std::mem::take(&mut draft.smooth));
         let warnings = draft.findings.iter().map(|finding| finding.message.clone()).collect();
         let attractor = match Attractor::new(automaton, draft.roots, draft.solids, warnings) {
             Ok(attractor) => attractor,
             Err(error) => return Err(fail(draft.findings, &error)),
         };
         match attractor.with_topology(topology, &draft.gluings, &draft.collapsed, draft.seam_mm) {
-            Ok(attractor) => Ok(Lowered { attractor, findings: draft.findings, constraint_residual: draft.constraint_residual }),
+            Ok(attractor) => Ok(Lowered {
+                attractor: attractor.with_trimmed(draft.trimmed),
+                findings: draft.findings,
+                constraint_residual: draft.constraint_residual,
+            }),
             Err(error) => Err(incoherent(draft.findings, &error)),
         }
     }

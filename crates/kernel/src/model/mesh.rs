@@ -165,7 +165,8 @@ fn closed_fault(triangles: &[[u32; 3]]) -> Option<String> {
     open.map(|&(a, b)| format!("the edge {a} - {b} has one face only"))
 }
 
-fn simplex(draft: &mut Draft, corners: usize) -> StateId {
+/// A new state of points, segments or triangles.
+pub(super) fn simplex(draft: &mut Draft, corners: usize) -> StateId {
     let (name, kind) = match corners {
         1 => ("point", CellKind::Vertex),
         2 => ("segment", CellKind::Edge),

@@ -120,3 +120,57 @@ pub fn patches(attractor: &Attractor, depth: usize) -> Vec<Vec<DVec3>> {
     }
     out
 }
+
+/// The surface of a set of unit cells, as quads seen from outside, with vertices where it meets itself doubled never:
+/// the cells must not touch along edges or at corners alone.
+pub fn polycube(size: [i32; 3], filled: impl Fn(i32, i32, i32) -> bool) -> Subdivision {
+    let inside = |c: [i32; 3]| (0..3).all(|axis| c[axis] >= 0 && c[axis] < size[axis]) && filled(c[0], c[1], c[2]);
+    let mut known = std::collections::BTreeMap::new();
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    let cells = (0..size[0]).flat_map(|x| (0..size[1]).flat_map(move |y| (0..size[2]).map(move |z| [x, y, z])));
+    for cell in cells.filter(|&cell| inside(cell)) {
+        for (axis, step) in (0..3).flat_map(|axis| [(axis, 1), (axis, -1)]) {
+            let mut beside = cell;
+            beside[axis] += step;
+            if inside(beside) {
+                continue;
+            }
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let mut corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[i, k]| {
+                let mut corner = cell;
+                corner[axis] += i32::from(step == 1);
+                corner[u] += i;
+                corner[v] += k;
+                corner
+            });
+            if step == -1 {
+                corners.reverse();
+            }
+            faces.push(
+                corners
+                    .iter()
+                    .map(|&corner| {
+                        *known.entry(corner).or_insert_with(|| {
+                            vertices.push(DVec3::new(f64::from(corner[0]), f64::from(corner[1]), f64::from(corner[2])));
+                            vertices.len() as u32 - 1
+                        })
+                    })
+                    .collect(),
+            );
+        }
+    }
+    cage(Scheme::CatmullClark, vertices, faces)
+}
+
+/// A head of unit cells with ears, muzzle and two tunnels for eyes: 468 quads of genus 2.
+pub fn head() -> Subdivision {
+    polycube([12, 8, 8], |x, y, z| {
+        let (x, y) = (x - 2, y - 2);
+        let within = |a: i32, low: i32, high: i32| a >= low && a < high;
+        let tunnel = within(y, 0, 6) && within(z, 5, 7) && (within(x, 1, 3) || within(x, 5, 7));
+        let skull = within(x, 0, 8) && within(y, 0, 6);
+        let ears = (within(x, -2, 0) || within(x, 8, 10)) && within(y, 2, 4) && within(z, 3, 6);
+        let muzzle = within(x, 2, 6) && within(y, -2, 0) && within(z, 0, 3);
+        !tunnel && (skull || ears || muzzle)
+    })
+}

@@ -1,8 +1,10 @@
 // Limit points and normals of OpenSubdiv 3.5, in double precision.
 // stdin: scheme (catmark, loop), sharp corners (0, 1), level; vertices; faces; creases (a b sharpness); corners (v sharpness);
-// each list after its length. stdout: a line "x y z nx ny nz" for every vertex of the level.
+// each list after its length. stdout: a line "x y z nx ny nz" for every vertex of the level. With the argument `time`: the
+// CPU seconds from the cage to the level's limit points and quads, and its number of vertices.
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <iostream>
 #include <opensubdiv/far/primvarRefiner.h>
 #include <opensubdiv/far/topologyDescriptor.h>
@@ -16,7 +18,7 @@ struct Point {
     for (int axis = 0; axis < 3; axis++) p[axis] += weight * other.p[axis];
   }
 };
-int main() {
+int main(int arguments, char **) {
   std::string scheme;
   int corners, level, count;
   std::cin >> scheme >> corners >> level >> count;
@@ -50,6 +52,7 @@ int main() {
   d.cornerWeights = vertex_sharp.data();
   Sdc::Options options;
   options.SetVtxBoundaryInterpolation(corners ? Sdc::Options::VTX_BOUNDARY_EDGE_AND_CORNER : Sdc::Options::VTX_BOUNDARY_EDGE_ONLY);
+  clock_t start = clock();
   auto type = scheme == "loop" ? Sdc::SCHEME_LOOP : Sdc::SCHEME_CATMARK;
   auto *refiner = Far::TopologyRefinerFactory<Descriptor>::Create(d, Far::TopologyRefinerFactory<Descriptor>::Options(type, options));
   if (!refiner) return 1;
@@ -62,7 +65,18 @@ int main() {
     primvar.Interpolate(l, points, next);
     points = next;
   }
-  std::vector<Point> limit(points.size()), u(points.size()), v(points.size());
+  std::vector<Point> limit(points.size()), u, v;
+  if (arguments > 1) {
+    primvar.Limit(points, limit);
+    auto last = refiner->GetLevel(level);
+    std::vector<int> quads;
+    for (int f = 0; f < last.GetNumFaces(); f++)
+      for (int k = 0; k < 4; k++) quads.push_back(last.GetFaceVertices(f)[k]);
+    printf("%.4f %d %d\n", double(clock() - start) / CLOCKS_PER_SEC, int(limit.size()), int(quads.size()));
+    return 0;
+  }
+  u.resize(points.size());
+  v.resize(points.size());
   primvar.Limit(points, limit, u, v);
   for (size_t k = 0; k < points.size(); k++) {
     double *a = u[k].p, *b = v[k].p;

@@ -69,7 +69,7 @@ pub fn curve(scheme: CurveScheme, points: Vec<DVec3>, weights: Option<Vec<f64>>)
 }
 
 pub fn product(schemes: Vec<CurveScheme>, control_points: ControlNet) -> Shape {
-    Shape::TensorProduct(TensorProduct { schemes, control_points, separate: false })
+    Shape::TensorProduct(TensorProduct { schemes, control_points, separate: false, trim: None })
 }
 
 pub fn lower(shape: Shape) -> Lowered {

@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_kernel::model::{
-    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, BoundaryRule, BoundarySpec, CellKind, Coefficients, Corner, CornerCutting,
-    Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Matrix, Model, Part, PolygonMesh, Primitive, Relation, RootCell, Scheme, Shape,
-    Side, Subdivision, Terrain, TerrainBase, TransitionSpec,
+    Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, BoundarySpec, CellKind, Coefficients, Corner,
+    CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Part, PolygonMesh, Primitive, Relation,
+    RootCell, Scheme, Shape, Side, Subdivision, Terrain, TerrainBase, TransitionSpec,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -196,7 +196,13 @@ fn shape() -> impl Strategy<Value = Shape> {
     let mesh = (mesh_data(), interior).prop_map(|((vertices, faces), interior)| Shape::Mesh(PolygonMesh { vertices, faces, interior }));
     prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, subdivision(), mesh, terrain()].prop_recursive(3, 8, 3, |shape| {
         let part = (option::of(name()), option::of(map()), shape).prop_map(|(name, transform, shape)| Part { name, transform, shape });
-        vec(part, 1..4).prop_map(|parts| Shape::Group(Group { parts }))
+        let side = (0..2_usize, any::<bool>()).prop_map(|(direction, last)| BorderPath::Side { direction, last });
+        let vertices = vec(0..99_u32, 1..4).prop_map(BorderPath::Vertices);
+        let boundaries = vec((0..9_usize, 0..4_usize), 1..4).prop_map(BorderPath::Boundaries);
+        // There is at least one part.
+        let border = prop_oneof![side, vertices, boundaries].prop_map(|path| Border { part: 0, path });
+        let join = ([border.clone(), border], any::<bool>()).prop_map(|(between, strip)| Join { between, strip });
+        (vec(part, 1..4), vec(join, 0..2)).prop_map(|(parts, joins)| Shape::Group(Group { parts, joins }))
     })
 }
 

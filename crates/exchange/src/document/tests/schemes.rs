@@ -35,6 +35,13 @@ fn every_family_reads_back_as_written() {
             r#"{{"family": "nurbs_volume", "degree": 1, "knots": [[0,0,1,1],[0,0,1,1],[0,0,1,2,2]], "control_points": [{NET},{NET}]}}"#
         ),
         format!(r#"{{"family": "bezier_surface", "control_points": {NET}}}"#),
+        format!(r#"{{"family": "bezier_surface", "control_points": {NET}, "trim": {{}}}}"#),
+        format!(
+            r#"{{"family": "bezier_surface", "control_points": {NET}, "trim": {{
+                "outer": [{{"family": "bezier_curve", "control_points": [[0,0],[1,0,0.5],[1,1]]}}, {{"family": "polyline", "points": [[1,1],[0,1],[0,0]]}}],
+                "inner": [[{{"family": "nurbs_curve", "degree": 1, "knots": [0,0,1,2,2], "control_points": [[0.2,0.5],[0.3,0.6],[0.2,0.5]], "weights": [1,2,1]}}]]
+            }}}}"#
+        ),
         format!(r#"{{"family": "catmull_rom", "control_points": {LINE}, "parametrization": "centripetal", "closed": true}}"#),
         format!(r#"{{"family": "beta_spline", "control_points": {LINE}, "beta1": 2, "beta2": 5}}"#),
         format!(r#"{{"family": "four_point", "control_points": {LINE}, "w": 0.05}}"#),
@@ -60,6 +67,36 @@ fn every_family_reads_back_as_written() {
 #[test]
 fn faults_name_their_place() {
     let cases = [
+        (
+            r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,1,0],[1,1,0]]], "trim": {"outer": [{"family": "four_point"}]}}"#,
+            code::UNKNOWN_VALUE,
+            "/shape/trim/outer/0/family",
+        ),
+        (
+            r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,1,0],[1,1,0]]], "trim": {"inner": [[{"family": "polyline", "points": [[0,0],[1]]}]]}}"#,
+            code::WRONG_LENGTH,
+            "/shape/trim/inner/0/0/points/1",
+        ),
+        (
+            r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,1,0],[1,1,0]]], "trim": {"outer": [{"family": "bezier_curve", "control_points": [[0,0],[1,0,-1]]}]}}"#,
+            code::NOT_POSITIVE,
+            "/shape/trim/outer/0/control_points/1/2",
+        ),
+        (
+            r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,1,0],[1,1,0]]], "trim": {"outer": [{"family": "bezier_curve", "control_points": [[0,0],[1,0,1]], "weights": [1,1]}]}}"#,
+            code::CONFLICTING_MEMBERS,
+            "/shape/trim/outer/0/weights",
+        ),
+        (
+            r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,1,0],[1,1,0]]], "trim": {"outer": [{"family": "bezier_curve", "control_points": [[0,0],[1,0]], "weights": [1]}]}}"#,
+            code::WRONG_LENGTH,
+            "/shape/trim/outer/0/weights",
+        ),
+        (
+            r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,1,0],[1,1,0]]], "trim": {"holes": []}}"#,
+            code::UNKNOWN_MEMBER,
+            "/shape/trim/holes",
+        ),
         (r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]],[[0,0,0]]]}"#, code::WRONG_LENGTH, "/shape/control_points/1"),
         (r#"{"family": "bezier_surface", "control_points": [[[0,0,0],[1,0,0]]], "weights": [[1]]}"#, code::WRONG_LENGTH, "/shape/weights"),
         (

@@ -145,7 +145,7 @@ impl Diagram {
         match shape {
             Shape::Bcifs(bcifs) => self.bcifs(bcifs, place, findings, told),
             Shape::Ifs(ifs) => self.ifs(ifs, place, findings, told),
-            Shape::Group(Group { parts }) => {
+            Shape::Group(Group { parts, .. }) => {
                 for (index, part) in parts.iter().enumerate() {
                     self.shape(&part.shape, &format!("{place}/parts/{index}/shape"), findings, told);
                 }

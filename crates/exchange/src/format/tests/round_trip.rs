@@ -2,7 +2,7 @@
 
 use super::*;
 use lacuna_kernel::error::Kind;
-use lacuna_kernel::tessellation::Tessellation;
+use lacuna_kernel::tessellation::{Normals, Tessellation};
 
 const MESH_FORMATS: [Format; 7] = [Format::Stl, Format::ThreeMf, Format::Glb, Format::Obj, Format::Ply, Format::Off, Format::Vrml];
 
@@ -135,6 +135,42 @@ fn verification_finds_any_changed_coordinate_or_index() {
         // What follows a ZIP archive is no part of it.
         assert_eq!(verify_written(format, &mut Cursor::new(&longer), &mesh).is_err(), format != Format::ThreeMf);
     }
+}
+
+/// Two triangles folded along their edge, which has a normal on each side; the other corners have one.
+fn folded() -> Tessellation {
+    Tessellation {
+        vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)],
+        triangles: vec![[0, 1, 2], [0, 3, 1]],
+        normals: Some(Normals { vectors: vec![DVec3::Z, DVec3::Y], triangles: vec![[0; 3], [1; 3]], degenerate: 0 }),
+        ..Tessellation::default()
+    }
+}
+
+#[test]
+fn normals_go_with_vertices_or_beside_them() {
+    let text = |format| String::from_utf8(written(format, &folded(), &Metadata::default())).unwrap();
+    let obj = text(Format::Obj);
+    assert!(obj.contains("\nvn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n"), "{obj}");
+    let vrml = text(Format::Vrml);
+    assert!(vrml.contains("normal Normal { vector [\n0 0 1\n0 1 0\n] }\nnormalIndex [\n0 0 0 -1\n1 1 1 -1\n] } }"), "{vrml}");
+    // Vertices 0 and 1 twice: 4 + 2 vertices of six numbers, two faces of 13 bytes.
+    let ply = written(Format::Ply, &folded(), &Metadata::default());
+    let header = String::from_utf8_lossy(&ply).into_owned();
+    assert!(header.contains("element vertex 6\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"), "{header}");
+    assert_eq!(ply.len() - (header.find("end_header\n").unwrap() + 11), 6 * 24 + 2 * 13);
+    // What is read back are the same places.
+    for format in [Format::Obj, Format::Vrml, Format::Ply] {
+        let bytes = written(format, &folded(), &Metadata::default());
+        let file = read(&bytes, Some(format), &ReadLimits::default()).unwrap();
+        let corners = |vertices: &[DVec3], triangles: &[[u32; 3]]| -> Vec<[DVec3; 3]> {
+            triangles.iter().map(|corners| corners.map(|corner| vertices[corner as usize])).collect()
+        };
+        assert_eq!(corners(&file.mesh.vertices, &file.mesh.triangles), corners(&folded().vertices, &folded().triangles), "{format}");
+    }
+    let glb = written(Format::Glb, &folded(), &Metadata::default());
+    let words = String::from_utf8_lossy(&glb).into_owned();
+    assert!(words.contains("\"NORMAL\":1") && words.contains("\"count\":6"), "{words}");
 }
 
 #[test]

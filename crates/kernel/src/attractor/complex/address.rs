@@ -1,5 +1,8 @@
 //! Where every vertex, edge and face of an evaluation comes from.
 
+use super::merge::Numbers;
+use super::tally::count_complex;
+use crate::attractor::Attractor;
 use crate::automaton::StateId;
 use crate::automaton::topology::Topology;
 use std::fmt;
@@ -46,8 +49,16 @@ pub(super) enum Origin {
     Face { node: u32, piece: u32 },
     /// Inside an edge: which piece of its split.
     Edge { edge: u32, piece: u32 },
-    /// The middle of a face.
+    /// Inside a face, or on the rim that trimming gives it.
     Middle { node: u32 },
+}
+
+/// What one part of the evaluation made: its nodes (the parent, or `NONE`, and the child or root) and where its edges come
+/// from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Part {
+    pub(super) nodes: Vec<(u32, u32)>,
+    pub(super) edges: Vec<Origin>,
 }
 
 /// The cell complex behind a tessellation: counts, and the address of every vertex, edge and face.
@@ -70,9 +81,11 @@ pub struct CellComplex {
     /// The B-rep of the states, and the state of every root.
     pub(super) topology: Arc<Topology>,
     pub(super) root_states: Vec<StateId>,
-    pub(super) nodes: Vec<(u32, u32)>,
     pub(super) vertex_origins: Vec<Origin>,
-    pub(super) edge_origins: Vec<Origin>,
+    /// Nodes and edges, part by part.
+    pub(super) parts: Vec<Part>,
+    pub(super) node_numbers: Numbers,
+    pub(super) edge_numbers: Numbers,
     /// The node of every triangle.
     pub(super) triangle_nodes: Vec<u32>,
     /// The edge of every segment.
@@ -80,6 +93,55 @@ pub struct CellComplex {
 }
 
 impl CellComplex {
+    /// The complex of triangles that fill faces: `nodes` are the faces' (the parent, or `NONE`, and the child or root),
+    /// `vertex_nodes` and `triangle_nodes` say to which the vertices and triangles belong.
+    pub(in crate::attractor) fn of_triangles(
+        attractor: &Attractor,
+        nodes: Vec<(u32, u32)>,
+        vertex_nodes: &[u32],
+        triangles: &[[u32; 3]],
+        triangle_nodes: Vec<u32>,
+    ) -> Self {
+        Self {
+            topology: attractor.brep.as_ref().map(|(topology, _)| Arc::clone(topology)).unwrap_or_default(),
+            root_states: attractor.roots().iter().map(|root| root.state).collect(),
+            vertex_origins: vertex_nodes.iter().map(|&node| Origin::Middle { node }).collect(),
+            node_numbers: Numbers::new([nodes.len()].into_iter()),
+            edge_numbers: Numbers::new([0].into_iter()),
+            parts: vec![Part { nodes, edges: Vec::new() }],
+            triangle_nodes,
+            ..count_complex(vertex_nodes.len(), triangles)
+        }
+    }
+
+    /// Adds the complex of other roots of the same automaton.
+    pub(crate) fn append(&mut self, other: Self) {
+        let (nodes, edges) = (self.node_numbers.count(), self.edge_numbers.count());
+        let node = |node: u32| if node == super::NONE { node } else { node + nodes };
+        let origin = |origin: Origin| match origin {
+            Origin::Root { .. } => origin,
+            Origin::Face { node, piece } => Origin::Face { node: node + nodes, piece },
+            Origin::Edge { edge, piece } => Origin::Edge { edge: edge + edges, piece },
+            Origin::Middle { node } => Origin::Middle { node: node + nodes },
+        };
+        self.faces += other.faces;
+        self.edges += other.edges;
+        self.vertices += other.vertices;
+        self.components += other.components;
+        self.boundary_edges += other.boundary_edges;
+        self.boundary_loops += other.boundary_loops;
+        self.euler += other.euler;
+        self.vertex_origins.extend(other.vertex_origins.into_iter().map(origin));
+        self.parts.extend(other.parts.into_iter().map(|part| Part {
+            nodes: part.nodes.into_iter().map(|(parent, child)| (node(parent), child)).collect(),
+            edges: part.edges.into_iter().map(origin).collect(),
+        }));
+        self.node_numbers = Numbers::new(self.parts.iter().map(|part| part.nodes.len()));
+        self.edge_numbers = Numbers::new(self.parts.iter().map(|part| part.edges.len()));
+        self.triangle_nodes.extend(other.triangle_nodes.into_iter().map(node));
+        self.segment_edges.extend(other.segment_edges.into_iter().map(|edge| edge + edges));
+    }
+
     /// Vertices of the tessellation that belong to the complex.
     #[must_use]
     pub fn drawn_vertices(&self) -> u64 {
@@ -102,7 +164,7 @@ impl CellComplex {
     /// The address of the edge that a segment of the tessellation stands for.
     #[must_use]
     pub fn segment_address(&self, segment: usize) -> Option<CellAddress> {
-        self.origin_address(self.edge_origins[*self.segment_edges.get(segment)? as usize])
+        self.origin_address(self.edge_origin(*self.segment_edges.get(segment)?))
     }
 
     /// The address of the face that a triangle of the tessellation belongs to.
@@ -111,12 +173,22 @@ impl CellComplex {
         Some(self.node_address(*self.triangle_nodes.get(triangle)?))
     }
 
+    fn node(&self, node: u32) -> (u32, u32) {
+        let (part, index) = self.node_numbers.find(node);
+        self.parts[part].nodes[index]
+    }
+
+    fn edge_origin(&self, edge: u32) -> Origin {
+        let (part, index) = self.edge_numbers.find(edge);
+        self.parts[part].edges[index]
+    }
+
     fn node_address(&self, node: u32) -> CellAddress {
         let mut steps = Vec::new();
-        let mut current = self.nodes[node as usize];
+        let mut current = self.node(node);
         while current.0 != super::NONE {
             steps.push(Step::Child(current.1 as usize));
-            current = self.nodes[current.0 as usize];
+            current = self.node(current.0);
         }
         steps.reverse();
         CellAddress { root: current.1 as usize, steps }
@@ -129,7 +201,7 @@ impl CellComplex {
         let mut current = origin;
         while let Origin::Edge { edge, piece } = current {
             pieces.push(piece as usize);
-            current = self.edge_origins[edge as usize];
+            current = self.edge_origin(edge);
         }
         let boundary = |path: &[usize]| path.iter().map(|&index| Step::Boundary(index)).collect::<Vec<_>>();
         let (mut address, mut state) = match current {

@@ -1,257 +1,188 @@
 //! From the cell complex to triangles and segments.
 
-use super::address::Origin;
-use super::{Builder, CellComplex, NONE, Side};
+use super::address::{Origin, Part};
+use super::merge::Merged;
+use super::tally::{Loops, Pieces, Tally};
+use super::{CellComplex, NONE, Side, normals};
 use crate::attractor::cell::Point;
+use crate::attractor::{Attractor, TangentPlanes};
 use crate::tessellation::Tessellation;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::sync::Arc;
 
-impl Builder<'_> {
-    /// The leaf edges of an edge that is no single point: in order from its start to its end when it is a curve.
-    fn leaf_edges(&self, side: Side, out: &mut Vec<Side>) {
-        let own = &self.edges[side.edge()];
-        if own.collapsed {
-            return;
-        }
-        if own.pieces == NONE {
-            out.push(side);
-            return;
-        }
-        let topology = self.topology.state(own.state);
-        let mut child = |(child, turned): (usize, bool)| {
-            self.leaf_edges(Side::new(self.pieces[own.pieces as usize + child], turned != side.backwards()), out);
-        };
-        match &topology.chain {
-            Some(chain) if side.backwards() => chain.iter().rev().for_each(|&link| child(link)),
-            Some(chain) => chain.iter().for_each(|&link| child(link)),
-            None => (0..topology.split.children.len()).for_each(|index| child((index, false))),
-        }
-    }
+/// For every part and vertex its place in the tessellation, or [`NONE`].
+type Places = Vec<Vec<u32>>;
 
-    /// The vertices of an edge, by its state's closure.
-    fn vertices_of(&self, edge: usize) -> &[u32] {
-        let own = &self.edges[edge];
-        let first = own.vertices as usize;
-        &self.edge_vertices[first..first + self.topology.state(own.state).closure.cells.len()]
-    }
+/// What a shard draws. Places of middles of faces count from the first of the shard's.
+struct Drawn {
+    /// At the corners of the triangles, if asked for.
+    normals: Vec<[Point; 3]>,
+    triangles: Vec<[u32; 3]>,
+    nodes: Vec<u32>,
+    middles: Vec<(Point, u32)>,
+}
 
-    /// What is drawn of a leaf edge: a segment, or one to every end but the first of a wire that branches.
-    fn arms(&self, edge: usize) -> impl Iterator<Item = [u32; 2]> {
-        let (first, rest) = self.vertices_of(edge).split_first().map_or((NONE, &[][..]), |(first, rest)| (*first, rest));
-        rest.iter().map(move |&end| [first, end])
-    }
-
-    /// Start and end of a leaf edge.
-    fn ends(&self, side: Side) -> [u32; 2] {
-        let vertices = self.vertices_of(side.edge());
-        let [start, end] = self.topology.ends(self.edges[side.edge()].state).map_or([0, 0], |[a, b]| [vertices[a], vertices[b]]);
-        if side.backwards() { [end, start] } else { [start, end] }
-    }
-
+impl Merged<'_> {
     /// The tessellation of all that was refined.
-    pub(in crate::attractor) fn draw(mut self) -> Tessellation {
-        let loops = self.loops();
-        let mut tally = Tally::new(self.vertices.len(), self.edges.len());
-        let flips = orientations(&loops, self.edges.len());
-        for &side in &loops.sides {
-            tally.count(side.edge(), [self.ends(side)].into_iter(), true);
-        }
-        let mut wires = Vec::new();
-        for index in 0..self.wires.len() {
-            self.leaf_edges(Side::new(self.wires[index], false), &mut wires);
-        }
-        for &side in &wires {
-            tally.count(side.edge(), self.arms(side.edge()), false);
-            self.vertices_of(side.edge()).iter().for_each(|&vertex| tally.used[vertex as usize] = true);
-        }
-        let mut complex = tally.complex(self.faces.len());
-        let mut tessellation = Tessellation { leaf_cells: self.leaves, deviation_mm: self.deviation, ..Tessellation::default() };
-        let mut place = vec![NONE; self.vertices.len()];
-        for (vertex, index) in place.iter_mut().enumerate().filter(|(vertex, _)| tally.used[*vertex]) {
-            *index = tessellation.vertices.len() as u32;
-            tessellation.vertices.push(DVec3::from_array(self.vertices[vertex]));
-            complex.vertex_origins.push(self.vertex_origins[vertex]);
-        }
-        let mut outline = Vec::new();
-        for (index, face) in self.faces.iter().enumerate() {
-            outline.clear();
-            outline.extend(loops.of(index).iter().map(|&side| place[self.ends(side)[0] as usize]));
-            if flips[index] {
-                outline.reverse();
+    pub(super) fn draw(mut self, attractor: &Attractor, tangents: Option<&TangentPlanes>) -> Tessellation {
+        let wires: Vec<Vec<Side>> = (0..self.shards.len()).map(|shard| self.wires(shard)).collect();
+        let (loops, pieces): (Vec<Loops>, Vec<Pieces>) = (0..self.shards.len())
+            .into_par_iter()
+            .map(|shard| {
+                let loops = Loops::of(&self, shard, tangents.is_some());
+                let pieces = Pieces::of(&self, shard, &loops, &wires[shard]);
+                (loops, pieces)
+            })
+            .unzip();
+        let turns = (0..pieces.len()).map(|shard| pieces[shard].faces.clone()).collect::<Vec<_>>();
+        let Tally { mut complex, turned, used } = Tally::new(&self, &loops, pieces);
+        let mut tessellation = Tessellation {
+            leaf_cells: self.shards.iter().map(|shard| shard.leaves).sum(),
+            deviation_mm: self.shards.iter().map(|shard| shard.deviation).fold(0.0, f64::max),
+            ..Tessellation::default()
+        };
+        let places = self.place(&used, &mut tessellation, &mut complex);
+        let draw = |shard: usize| {
+            let flip = |face: usize| {
+                let (piece, own): (u32, bool) = turns[shard][face];
+                own != turned[shard][piece as usize]
+            };
+            let bends = tangents.map_or_else(Vec::new, |tangents| self.bends(attractor, tangents, shard, &loops[shard]));
+            self.fill(shard, &loops[shard], &flip, &places, &tessellation.vertices, &bends)
+        };
+        let drawn: Vec<Drawn> = (0..self.shards.len()).into_par_iter().map(draw).collect();
+        tessellation.triangles.reserve_exact(drawn.iter().map(|drawn| drawn.triangles.len()).sum());
+        complex.triangle_nodes.reserve_exact(tessellation.triangles.capacity());
+        let mut normals = Vec::new();
+        for Drawn { normals: own, triangles, nodes, middles } in drawn {
+            normals.extend(own);
+            let (first, corners) = (tessellation.vertices.len() as u32, complex.vertices as u32);
+            // Middles were numbered from the number of all other vertices on.
+            let place = |vertex: u32| if vertex < corners { vertex } else { vertex - corners + first };
+            tessellation.triangles.extend(triangles.into_iter().map(|triangle| triangle.map(place)));
+            complex.triangle_nodes.extend(nodes);
+            for (point, node) in middles {
+                tessellation.vertices.push(DVec3::from_array(point));
+                complex.vertex_origins.push(Origin::Middle { node });
             }
-            fill(&outline, &face.middle, &mut tessellation);
-            if tessellation.vertices.len() > complex.vertex_origins.len() {
-                complex.vertex_origins.push(Origin::Middle { node: face.node });
-            }
-            complex.triangle_nodes.resize(tessellation.triangles.len(), face.node);
         }
-        for &side in &wires {
-            tessellation.segments.extend(self.arms(side.edge()).map(|ends| ends.map(|vertex| place[vertex as usize])));
+        tessellation.normals = tangents.map(|_| normals::collect(&tessellation, &normals));
+        for &side in wires.iter().flatten() {
+            let ends: Vec<u32> = self.vertices_of(side.edge() as u32).map(|vertex| at(&places, self.vertices.find(vertex))).collect();
+            if let [vertex] = *ends {
+                tessellation.points.push(vertex);
+            }
+            // A segment, or one to every end but the first of a wire that branches.
+            tessellation.segments.extend(ends.iter().skip(1).map(|&end| [ends[0], end]));
             complex.segment_edges.resize(tessellation.segments.len(), side.edge() as u32);
-            if let [vertex] = self.vertices_of(side.edge()) {
-                tessellation.points.push(place[*vertex as usize]);
-            }
         }
         complex.topology = Arc::clone(self.topology);
-        complex.root_states = self.attractor.roots().iter().map(|root| root.state).collect();
-        complex.nodes = std::mem::take(&mut self.nodes);
-        complex.edge_origins = std::mem::take(&mut self.edge_origins);
+        complex.root_states = attractor.roots().iter().map(|root| root.state).collect();
+        (complex.node_numbers, complex.edge_numbers) = (self.nodes.clone(), self.edges.clone());
+        complex.parts =
+            std::mem::take(&mut self.stores).into_iter().map(|store| Part { nodes: store.nodes, edges: store.edge_origins }).collect();
         tessellation.complex = Some(complex);
         tessellation
     }
 
-    /// The leaf edges around every face.
-    fn loops(&self) -> Loops {
-        let mut loops = Loops { starts: Vec::with_capacity(self.faces.len() + 1), sides: Vec::with_capacity(self.outlines.len()) };
-        loops.starts.push(0);
-        for (index, face) in self.faces.iter().enumerate() {
-            let end = self.faces.get(index + 1).map_or(self.outlines.len(), |next| next.outline as usize);
-            for &side in &self.outlines[face.outline as usize..end] {
-                self.leaf_edges(side, &mut loops.sides);
-            }
-            loops.starts.push(loops.sides.len());
+    /// The leaf edges of a shard's wires.
+    fn wires(&self, shard: usize) -> Vec<Side> {
+        let mut wires = Vec::new();
+        for &wire in &self.shards[shard].wires {
+            self.leaf_edges_in(shard + 1, Side::new(wire, false), &mut |side, _| wires.push(side));
         }
-        loops
+        wires
+    }
+
+    /// Puts down the used vertices, part by part.
+    fn place(&self, used: &[Vec<bool>], tessellation: &mut Tessellation, complex: &mut CellComplex) -> Places {
+        let count = complex.vertices as usize;
+        (tessellation.vertices, complex.vertex_origins) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut places = Vec::with_capacity(used.len());
+        for (store, used) in self.stores.iter().zip(used) {
+            let place = |(index, &used): (usize, &bool)| {
+                if !used {
+                    return NONE;
+                }
+                tessellation.vertices.push(DVec3::from_array(store.vertices[index]));
+                complex.vertex_origins.push(store.vertex_origins[index]);
+                tessellation.vertices.len() as u32 - 1
+            };
+            places.push(used.iter().enumerate().map(place).collect());
+        }
+        places
+    }
+
+    fn fill(
+        &self,
+        shard: usize,
+        loops: &Loops,
+        flip: &dyn Fn(usize) -> bool,
+        places: &Places,
+        vertices: &[DVec3],
+        bends: &[Point],
+    ) -> Drawn {
+        let faces = &self.shards[shard].faces;
+        let count = 2 * faces.len();
+        let mut drawn =
+            Drawn { normals: Vec::new(), triangles: Vec::with_capacity(count), nodes: Vec::with_capacity(count), middles: Vec::new() };
+        let mut outline = Vec::new();
+        for (index, face) in faces.iter().enumerate() {
+            outline.clear();
+            outline.extend(loops.corners_of(index).iter().map(|&corner| at(places, self.vertices.find(corner))));
+            if flip(index) {
+                outline.reverse();
+            }
+            let node = self.node(shard + 1, face.node);
+            let centre = (vertices.len() + drawn.middles.len()) as u32;
+            let before = drawn.triangles.len();
+            if fill(&outline, centre, vertices, &mut drawn.triangles) {
+                drawn.middles.push((face.middle, node));
+            }
+            drawn.nodes.resize(drawn.triangles.len(), node);
+            if !bends.is_empty() {
+                // The normals of this face follow those of the faces before, and one middle each.
+                let range = loops.range(index);
+                let own = &bends[range.start + index..=range.end + index];
+                let turned = flip(index);
+                let normal = |vertex: u32| {
+                    let place = outline.iter().position(|&other| other == vertex);
+                    let place = place.map_or(outline.len(), |place| if turned { outline.len() - 1 - place } else { place });
+                    own[place].map(|x| if turned { -x } else { x })
+                };
+                drawn.normals.extend(drawn.triangles[before..].iter().map(|triangle| triangle.map(normal)));
+            }
+        }
+        drawn
     }
 }
 
-/// The leaf edges around every face, one face after the other.
-struct Loops {
-    starts: Vec<usize>,
-    sides: Vec<Side>,
-}
-
-impl Loops {
-    fn of(&self, face: usize) -> &[Side] {
-        &self.sides[self.starts[face]..self.starts[face + 1]]
-    }
+fn at(places: &Places, (part, index): (usize, usize)) -> u32 {
+    places[part][index]
 }
 
 /// Fills the outline of a face: three vertices are a triangle, four two triangles on the shorter diagonal, more a
-/// fan around the middle.
-fn fill(outline: &[u32], middle: &Point, tessellation: &mut Tessellation) {
+/// fan around the middle, which is then the vertex `centre`. Whether it is used.
+pub(in crate::attractor) fn fill(outline: &[u32], centre: u32, vertices: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> bool {
     match *outline {
-        [a, b, c] => tessellation.triangles.push([a, b, c]),
+        [a, b, c] => triangles.push([a, b, c]),
         [a, b, c, d] => {
-            let square = |p: u32, q: u32| tessellation.vertices[p as usize].distance_squared(tessellation.vertices[q as usize]);
+            let square = |p: u32, q: u32| vertices[p as usize].distance_squared(vertices[q as usize]);
             // Lengths that differ by rounding alone do not decide.
             if square(a, c) <= square(b, d) * (1.0 + 1e-9) {
-                tessellation.triangles.extend([[a, b, c], [a, c, d]]);
+                triangles.extend([[a, b, c], [a, c, d]]);
             } else {
-                tessellation.triangles.extend([[a, b, d], [b, c, d]]);
+                triangles.extend([[a, b, d], [b, c, d]]);
             }
         }
         _ if outline.len() > 4 => {
-            let centre = tessellation.vertices.len() as u32;
-            tessellation.vertices.push(DVec3::from_array(*middle));
             for (position, &vertex) in outline.iter().enumerate() {
-                tessellation.triangles.push([vertex, outline[(position + 1) % outline.len()], centre]);
+                triangles.push([vertex, outline[(position + 1) % outline.len()], centre]);
             }
+            return true;
         }
         _ => {}
     }
-}
-
-/// Which faces to turn round so that neighbours run along their common edge in opposite directions, as far as the
-/// surface is orientable. The first face of every piece stays.
-fn orientations(loops: &Loops, edges: usize) -> Vec<bool> {
-    let faces = loops.starts.len() - 1;
-    // The two faces of every edge, with their directions; edges with more are no hinge.
-    let mut sides: Vec<[(u32, bool); 2]> = vec![[(NONE, false); 2]; edges];
-    let mut count = vec![0_u8; edges];
-    for face in 0..faces {
-        for side in loops.of(face) {
-            let used = &mut count[side.edge()];
-            if *used < 2 {
-                sides[side.edge()][*used as usize] = (face as u32, side.backwards());
-            }
-            *used = used.saturating_add(1);
-        }
-    }
-    let mut flips: Vec<Option<bool>> = vec![None; faces];
-    let mut stack = Vec::new();
-    for seed in 0..faces {
-        if flips[seed].is_some() {
-            continue;
-        }
-        flips[seed] = Some(false);
-        stack.push(seed);
-        while let Some(face) = stack.pop() {
-            let own = flips[face] == Some(true);
-            for side in loops.of(face).iter().filter(|side| count[side.edge()] == 2) {
-                let [first, second] = sides[side.edge()];
-                let (other, direction) = if first.0 as usize == face { second } else { first };
-                if flips[other as usize].is_none() {
-                    flips[other as usize] = Some(own != (direction == side.backwards()));
-                    stack.push(other as usize);
-                }
-            }
-        }
-    }
-    flips.into_iter().map(|flip| flip == Some(true)).collect()
-}
-
-/// Counts of a complex.
-struct Tally {
-    used: Vec<bool>,
-    /// Faces of every leaf edge; wires count none.
-    faces: Vec<u8>,
-    edge_used: Vec<bool>,
-    ends: Vec<(u32, [u32; 2])>,
-}
-
-impl Tally {
-    fn new(vertices: usize, edges: usize) -> Self {
-        Self { used: vec![false; vertices], faces: vec![0; edges], edge_used: vec![false; edges], ends: Vec::new() }
-    }
-
-    fn count(&mut self, edge: usize, arms: impl Iterator<Item = [u32; 2]>, of_face: bool) {
-        if of_face {
-            self.faces[edge] = self.faces[edge].saturating_add(1);
-        }
-        if std::mem::replace(&mut self.edge_used[edge], true) {
-            return;
-        }
-        for ends in arms {
-            ends.iter().for_each(|&end| self.used[end as usize] = true);
-            self.ends.push((edge as u32, ends));
-        }
-    }
-
-    fn complex(&self, faces: usize) -> CellComplex {
-        let vertices = self.used.iter().filter(|&&used| used).count();
-        let boundary: Vec<[u32; 2]> = self.ends.iter().filter(|(edge, _)| self.faces[*edge as usize] == 1).map(|&(_, ends)| ends).collect();
-        let all: Vec<[u32; 2]> = self.ends.iter().map(|&(_, ends)| ends).collect();
-        CellComplex {
-            faces: faces as u64,
-            edges: all.len() as u64,
-            vertices: vertices as u64,
-            components: pieces(self.used.len(), &all),
-            boundary_edges: boundary.len() as u64,
-            boundary_loops: pieces(self.used.len(), &boundary),
-            euler: vertices as i64 - all.len() as i64 + faces as i64,
-            ..CellComplex::default()
-        }
-    }
-}
-
-/// Connected pieces of a graph, vertices without edges left out.
-fn pieces(vertices: usize, edges: &[[u32; 2]]) -> u64 {
-    let mut up: Vec<u32> = (0..vertices as u32).collect();
-    let find = |up: &mut Vec<u32>, mut vertex: u32| {
-        while up[vertex as usize] != vertex {
-            up[vertex as usize] = up[up[vertex as usize] as usize];
-            vertex = up[vertex as usize];
-        }
-        vertex
-    };
-    let mut touched = vec![false; vertices];
-    for &[a, b] in edges {
-        let (p, q) = (find(&mut up, a), find(&mut up, b));
-        up[p.max(q) as usize] = p.min(q);
-        touched[a as usize] = true;
-        touched[b as usize] = true;
-    }
-    (0..vertices as u32).filter(|&vertex| touched[vertex as usize] && find(&mut up, vertex) == vertex).count() as u64
+    false
 }

@@ -130,7 +130,7 @@ pub(crate) struct StateTopology {
 /// their constraints to 1e-6, and distinct cells one subdivision apart differ by far more.
 const SAME: f64 = 1e-4;
 
-pub(super) fn same(left: &[f64], right: &[f64]) -> bool {
+pub(crate) fn same(left: &[f64], right: &[f64]) -> bool {
     left.len() == right.len() && left.iter().zip(right).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()))
 }
 

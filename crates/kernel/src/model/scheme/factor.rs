@@ -1,14 +1,15 @@
 //! Products of curve automata.
 //!
 //! A *factor* is a curve without control points: kinds of pieces, and the spans that a list of control points is made
-//! into. A cell of a product is one piece per direction; its operators are the Kronecker products of theirs, formed for
-//! the combinations that are reached. The end of a piece is a point of its barycentric space, so a side of a product
+//! into. A cell of a product is one piece per direction; its operators are the Kronecker products of theirs, for the
+//! combinations that are reached, and kept as their factors: what is proven of the pieces holds for the products. The end of a piece is a point of its barycentric space, so a side of a product
 //! cell is the product of the other directions' pieces: patches, curves and iso-parametric edges share states, and
 //! neighbours share sides exactly.
 
 use crate::attractor::{Gluing, Root};
-use crate::automaton::{Boundary, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
+use crate::automaton::{Boundary, Hull, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator, Transition};
 use crate::model::CellKind;
+use crate::model::join::Borders;
 use crate::model::lower::Draft;
 use std::collections::BTreeMap;
 
@@ -25,6 +26,8 @@ pub(in crate::model) struct Piece {
     pub(super) ends: [Vec<f64>; 2],
     /// Parameters of its control points, 0 and 1 at the ends, with which it has linear precision; empty if it has none.
     pub(super) parameters: Vec<f64>,
+    /// Points in whose hull it lies, if that is smaller than its control points'.
+    pub(super) hull: Option<Hull>,
 }
 
 /// A piece with its control points: combinations of the curve's, by index and weight.
@@ -74,9 +77,19 @@ pub(in crate::model) struct Grid {
 /// to rounding.
 const CLOSED: f64 = 1e-12;
 
+/// Where a product's cells went.
+pub(super) struct Placed {
+    /// The root of every cell, the last direction fastest; `None` for cells that are single points.
+    pub(super) roots: Vec<Option<usize>>,
+    /// For every direction and span, whether it is joined to the next, or the last one to the first.
+    pub(super) joined: Vec<Vec<bool>>,
+    /// For every cell of a surface, whether its sides at both ends of the first and the second direction are points.
+    pub(super) collapsed: Vec<[bool; 4]>,
+}
+
 /// Adds the product's states and roots, glues its spans, closes it where its ends meet and collapses sides that are
 /// single points.
-pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Grid) {
+pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Grid) -> Placed {
     let scale = grid.points.iter().flat_map(project).fold(0.0_f64, |a, x| a.max(x.abs()));
     let mut product = Product { draft, factors, states: BTreeMap::new(), waiting: Vec::new(), limit: CLOSED * scale };
     let counts: Vec<usize> = factors.iter().map(|factor| factor.spans.len()).collect();
@@ -87,21 +100,22 @@ pub(in crate::model) fn product(draft: &mut Draft, factors: &[Factor], grid: &Gr
         let state = product.draft.point_state();
         let points = cells.first().map_or_else(Vec::new, |cell| vec![cell.points[0]]);
         product.draft.roots.push(Root { state, points, rational: grid.rational, solid: None });
-        return;
+        let joined = counts.iter().map(|&count| vec![true; count]).collect();
+        return Placed { roots: vec![None; cells.len()], joined, collapsed: vec![[true; 4]; cells.len()] };
     }
     let first = product.draft.roots.len();
     let mut place = vec![None; cells.len()];
     solid.iter().enumerate().for_each(|(position, &cell)| place[cell] = Some(first + position));
-    for direction in 0..factors.len() {
-        product.join(direction, &cells, &counts, &place);
-    }
-    if factors.len() == 2 {
-        product.collapse(&cells, &place);
+    let joined = (0..factors.len()).map(|direction| product.join(direction, &cells, &counts, &place)).collect();
+    let collapsed = if factors.len() == 2 { product.collapse(&cells, &place) } else { Vec::new() };
+    if let &[u, v] = counts.as_slice() {
+        product.draft.borders = Borders::Grid { counts: [u, v], roots: place.clone() };
     }
     for cell in solid {
         let Cell { state, points, .. } = &cells[cell];
         product.draft.roots.push(Root { state: *state, points: points.clone(), rational: grid.rational, solid: None });
     }
+    Placed { roots: place, joined, collapsed }
 }
 
 /// All index lists below the given counts, the last index fastest.
@@ -203,20 +217,16 @@ impl Product<'_> {
             let state = self.state(&pieces);
             let name = std::mem::take(&mut self.draft.states[id.index()].name);
             self.draft.states[id.index()] = State { name, ..state };
-            let parameters = self.parameters(&pieces);
-            if !parameters.is_empty() {
-                self.draft.parameters.insert(id, parameters);
+            if let [piece] = pieces.as_slice() {
+                let Piece { parameters, hull, .. } = self.piece(*piece);
+                if !parameters.is_empty() {
+                    let smooth = Smooth { parameters: parameters.clone(), hull: hull.clone() };
+                    self.draft.smooth.insert(id, smooth);
+                }
+            } else {
+                let factors = pieces.iter().map(|&piece| self.intern(vec![piece])).collect();
+                self.draft.products.insert(id, factors);
             }
-        }
-    }
-
-    /// Parameters of the control points of an edge or a face, where all its pieces have them.
-    fn parameters(&self, pieces: &Pieces) -> Vec<[f64; 2]> {
-        let own: Vec<&[f64]> = pieces.iter().map(|&piece| self.piece(piece).parameters.as_slice()).collect();
-        match own.as_slice() {
-            [u] => u.iter().map(|&u| [u, 0.0]).collect(),
-            [u, v] => u.iter().flat_map(|&u| v.iter().map(move |&v| [u, v])).collect(),
-            _ => Vec::new(),
         }
     }
 
@@ -227,7 +237,7 @@ impl Product<'_> {
         for (label, choice) in combinations(&counts).enumerate() {
             let chosen: Vec<&(usize, SubdivisionOperator)> = choice.iter().zip(&own).map(|(&k, piece)| &piece.children[k]).collect();
             let to = self.intern(chosen.iter().zip(pieces).map(|(child, &(direction, _))| (direction, child.0)).collect());
-            let operator = kronecker(&chosen.iter().map(|child| child.1.clone()).collect::<Vec<_>>());
+            let operator = SubdivisionOperator::product(chosen.iter().map(|child| child.1.clone()).collect());
             transitions.push(Transition { to, operator, label });
         }
         let mut boundaries = Vec::new();
@@ -242,7 +252,7 @@ impl Product<'_> {
                         SubdivisionOperator::identity(piece.dimension)
                     }
                 };
-                let incidence = kronecker(&own.iter().enumerate().map(factor).collect::<Vec<_>>());
+                let incidence = SubdivisionOperator::product(own.iter().enumerate().map(factor).collect());
                 boundaries.push(Boundary { state: self.intern(others), incidence });
             }
         }
@@ -269,12 +279,14 @@ impl Product<'_> {
         points.iter().all(|point| distance(point, &points[0]) <= self.limit)
     }
 
-    /// Glues the spans of one direction: those that meet whatever the control points, and ends that happen to meet.
-    fn join(&mut self, direction: usize, cells: &[Cell], counts: &[usize], place: &[Option<usize>]) {
+    /// Glues the spans of one direction: those that meet whatever the control points, and ends that happen to meet. For
+    /// every span, whether it is glued to the next one.
+    fn join(&mut self, direction: usize, cells: &[Cell], counts: &[usize], place: &[Option<usize>]) -> Vec<bool> {
         let count = counts[direction];
         let stride: usize = counts[direction + 1..].iter().product();
         let rows: Vec<usize> = (0..cells.len()).filter(|&cell| cells[cell].spans[direction] == 0).collect();
         let boundary = |end: usize| 2 * (counts.len() - 1 - direction) + end;
+        let mut joined = vec![false; count];
         for first in 0..count {
             let second = (first + 1) % count;
             let gaps: Vec<f64> = rows
@@ -289,6 +301,7 @@ impl Product<'_> {
             if !(self.factors[direction].joints.contains(&[first, second]) || widest <= self.limit) {
                 continue;
             }
+            joined[first] = true;
             self.draft.seam_mm = self.draft.seam_mm.max(widest);
             for &row in &rows {
                 if let (Some(left), Some(right)) = (place[row + first * stride], place[row + second * stride]) {
@@ -296,35 +309,22 @@ impl Product<'_> {
                 }
             }
         }
+        joined
     }
 
     /// Notes the sides of patches that are single points.
-    fn collapse(&mut self, cells: &[Cell], place: &[Option<usize>]) {
-        for (cell, root) in cells.iter().zip(place).filter_map(|(cell, root)| Some((cell, (*root)?))) {
+    fn collapse(&mut self, cells: &[Cell], place: &[Option<usize>]) -> Vec<[bool; 4]> {
+        let mut all = vec![[true; 4]; cells.len()];
+        for (index, (cell, root)) in cells.iter().zip(place).enumerate().filter_map(|(index, (cell, root))| Some((index, (cell, (*root)?))))
+        {
             for (direction, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                if self.is_point(&self.side(cell, direction, end)) {
+                let point = self.is_point(&self.side(cell, direction, end));
+                all[index][2 * direction + end] = point;
+                if point {
                     self.draft.collapsed.push((root, 2 * (1 - direction) + end));
                 }
             }
         }
+        all
     }
-}
-
-/// The Kronecker product, the first factor's index slowest.
-fn kronecker(factors: &[SubdivisionOperator]) -> SubdivisionOperator {
-    factors
-        .iter()
-        .cloned()
-        .reduce(|a, b| {
-            let mut entries = Vec::with_capacity(a.entries().len() * b.entries().len());
-            for i in 0..a.columns() {
-                for j in 0..b.columns() {
-                    for x in a.column(i) {
-                        entries.extend(b.column(j).iter().map(|y| x * y));
-                    }
-                }
-            }
-            SubdivisionOperator::exact(a.rows() * b.rows(), entries)
-        })
-        .expect("a product has a factor")
 }

@@ -60,7 +60,9 @@ pub(super) fn interpolation(scaling: &[f64], count: usize, places: Option<&[f64]
         dimension: count,
         children: (0..last).map(child).collect(),
         ends: [unit(0), unit(last)],
-        parameters: Vec::new(),
+        // The abscissae are linear along the curve.
+        parameters: (0..count).map(place).collect(),
+        hull: None,
     };
     let controls = (0..count).map(|point| vec![(point, 1.0)]).collect();
     Some(Factor { pieces: vec![piece], spans: vec![Span { piece: 0, controls }], joints: Vec::new() })
@@ -150,6 +152,7 @@ fn framed(points: &[DVec3], maps: &[AffineMap]) -> (Factor, Grid) {
         children: maps.iter().map(child).collect(),
         ends: [barycentric(first).to_vec(), barycentric(last).to_vec()],
         parameters: Vec::new(),
+        hull: None,
     };
     let controls = (0..4).map(|point| vec![(point, 1.0)]).collect();
     let factor = Factor { pieces: vec![piece], spans: vec![Span { piece: 0, controls }], joints: Vec::new() };

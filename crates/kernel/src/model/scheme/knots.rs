@@ -8,7 +8,7 @@
 
 use super::Faults;
 use super::factor::{Factor, Piece, Span};
-use crate::automaton::SubdivisionOperator;
+use crate::automaton::{Hull, SubdivisionOperator};
 use std::collections::BTreeMap;
 
 /// Degrees that are possible.
@@ -26,7 +26,7 @@ const ROUNDING: f64 = 2e-13;
 pub(super) enum Form {
     /// With the control points as they are: a state per inter-knot vector.
     Intervals,
-    /// With Bezier points: one state.
+    /// With Bezier points, halved by de Casteljau's algorithm: one state.
     Bezier,
 }
 
@@ -48,9 +48,10 @@ pub(super) fn factor(degree: usize, knots: &[f64], count: usize, form: Form, fau
             _ => {
                 let mut own = vec![0.0; 2 * degree - 1];
                 own[degree - 1] = 1.0;
+                let piece = if form == Form::Bezier { 0 } else { pieces.intern(own) };
                 let weights = |column: Vec<f64>| column.into_iter().enumerate().map(|(k, x)| (first + k, x)).filter(|pair| pair.1 != 0.0);
                 let controls = bezier_points(local, degree).into_iter().map(|column| weights(column).collect()).collect();
-                Span { piece: pieces.intern(own), controls }
+                Span { piece, controls }
             }
         };
         // A knot of multiplicity degree + 1 parts the curve: the spans before and after have no control point in common.
@@ -60,7 +61,8 @@ pub(super) fn factor(degree: usize, knots: &[f64], count: usize, form: Form, fau
         end = Some(last);
         spans.push(span);
     }
-    Some(Factor { pieces: pieces.complete(), spans, joints })
+    let pieces = if form == Form::Bezier { vec![super::polynomial::piece(degree + 1)] } else { pieces.complete() };
+    Some(Factor { pieces, spans, joints })
 }
 
 fn check(degree: usize, knots: &[f64], count: usize, faults: &mut Faults<'_>) -> bool {
@@ -265,6 +267,11 @@ impl Pieces {
                 ends: ends(&knots, degree),
                 // Greville's abscissae.
                 parameters: knots.windows(degree).map(|window| window.iter().sum::<f64>() / degree as f64).collect(),
+                // A span lies in the hull of its Bezier points, which are halved by de Casteljau's algorithm.
+                hull: Some(Hull {
+                    points: SubdivisionOperator::exact(degree + 1, bezier_points(&knots, degree).concat()),
+                    children: super::super::bezier::halves(degree + 1).to_vec(),
+                }),
             });
         }
         pieces

@@ -4,14 +4,17 @@ mod factor;
 mod fractal;
 mod knots;
 mod net;
+mod own;
 mod polynomial;
 mod subdivision;
+mod trim;
 
 pub use net::ControlNet;
+pub use trim::{Trim, TrimCurve};
 
-use super::AffineMap;
 use super::lower::Draft;
-use factor::{Factor, Grid, product};
+use super::{AffineMap, BcifsState};
+use factor::{Factor, Grid, Placed, product};
 use glam::DVec3;
 use knots::Form;
 
@@ -80,6 +83,18 @@ pub enum CurveScheme {
         /// d_i, one per interval, in absolute value below 1.
         vertical_scaling: Vec<f64>,
     },
+    /// The edge of a user's automaton. For products only.
+    Bcifs {
+        /// The states; all that the first one reaches by transitions are edges between two vertices.
+        states: Vec<BcifsState>,
+        /// The name of the state of the curve.
+        start: String,
+    },
+    /// The curve of affine maps, in the affine frame that four control points are. For products only.
+    Ifs {
+        /// Maps whose images follow each other along the curve.
+        maps: Vec<AffineMap>,
+    },
     /// The curve through the points whose part over interval i is its image under map i. Not for products.
     AffineInterpolation {
         /// One map per interval: it takes the first and the last point to the interval's.
@@ -106,6 +121,8 @@ pub struct TensorProduct {
     /// Whether the model writes every scheme as a shape of its own (the family `tensor`), or all as one (NURBS and
     /// Bezier): where faults point to.
     pub separate: bool,
+    /// What is kept of a Bezier or spline surface; all when absent.
+    pub trim: Option<Trim>,
 }
 
 /// The surface u(s) + v(t): all translations of one curve along another. Its quadrilateral cells are parallelograms.
@@ -117,12 +134,12 @@ pub struct Sum {
     pub v: Curve,
 }
 
-/// More control points of one cell than this are refused: operators grow with the square.
-const MOST_CELL_POINTS: usize = 128;
+/// More control points of one cell than this are refused: three factors of degree 9 have 1000.
+const MOST_CELL_POINTS: usize = 1024;
 /// More root cells than this are refused.
 const MOST_CELLS: usize = 1 << 20;
-/// Entries of operators beyond which splines are written with Bezier points: one state instead of one per stencil.
-const MOST_ENTRIES: usize = 1 << 19;
+/// Combinations of pieces beyond which splines are written with Bezier points: one piece instead of one per stencil.
+const MOST_STATES: usize = 512;
 
 /// Where the scheme of a direction stands in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,6 +219,8 @@ impl CurveScheme {
             Self::BetaSpline { beta1, beta2, closed } => polynomial::beta_spline([*beta1, *beta2], *closed, count, faults),
             Self::FourPoint { tension, closed } => subdivision::four_point(*tension, *closed, count, faults),
             Self::Interpolation { vertical_scaling } => fractal::interpolation(vertical_scaling, count, None, faults),
+            Self::Bcifs { states, start } => own::bcifs(states, start, count, faults),
+            Self::Ifs { maps } => own::ifs(maps, count, faults),
             Self::AffineInterpolation { .. } => {
                 faults.add("/maps", "tensor.scheme", "affine maps belong to points in space; use vertical scaling in a product".into());
                 None
@@ -252,10 +271,13 @@ impl TensorProduct {
             };
             let factors: Vec<Option<Factor>> = self.schemes.iter().enumerate().map(factor).collect();
             let Some(factors) = factors.into_iter().collect::<Option<Vec<Factor>>>() else { return };
-            let points: usize = factors.iter().map(Factor::dimension).product();
             let states: usize = factors.iter().map(|factor| factor.pieces.len()).product();
-            if form == Form::Bezier || states.saturating_mul((points * points) << factors.len()) <= MOST_ENTRIES {
-                return lower_product(draft, &factors, &grid);
+            if form == Form::Bezier || states <= MOST_STATES {
+                let placed = lower_product(draft, &factors, &grid);
+                if let (Some(trim), Some(placed)) = (&self.trim, placed) {
+                    trim.lower(draft, &self.schemes, &grid, &placed);
+                }
+                return;
             }
         }
     }
@@ -283,18 +305,20 @@ impl Sum {
 }
 
 /// Refuses what is too large, and adds the rest to the draft.
-fn lower_product(draft: &mut Draft, factors: &[Factor], grid: &Grid) {
+fn lower_product(draft: &mut Draft, factors: &[Factor], grid: &Grid) -> Option<Placed> {
     let points: usize = factors.iter().map(Factor::dimension).product();
     if points > MOST_CELL_POINTS {
         let message = format!("each cell has {points} control points, and {MOST_CELL_POINTS} are possible; lower the degrees");
-        return draft.error("", "tensor.dimension", message);
+        draft.error("", "tensor.dimension", message);
+        return None;
     }
     let cells =
         factors.iter().try_fold(1_usize, |total, factor| total.checked_mul(factor.spans.len())).filter(|&cells| cells <= MOST_CELLS);
     if cells.is_none() {
-        return draft.error("", "tensor.cells", format!("more than {MOST_CELLS} cells; split the model"));
+        draft.error("", "tensor.cells", format!("more than {MOST_CELLS} cells; split the model"));
+        return None;
     }
-    product(draft, factors, grid);
+    Some(product(draft, factors, grid))
 }
 
 /// Indices of the control points of successive spans of `width` points each.

@@ -9,7 +9,7 @@ use glam::DVec3;
 const MOST_POINTS: usize = 64;
 
 /// The piece of a Bezier curve of `count` points.
-fn piece(count: usize) -> Piece {
+pub(super) fn piece(count: usize) -> Piece {
     let unit = |at: usize| (0..count).map(|k| f64::from(k == at)).collect();
     Piece {
         name: format!("bezier curve of degree {}", count - 1),
@@ -17,6 +17,7 @@ fn piece(count: usize) -> Piece {
         children: halves(count).into_iter().map(|operator| (0, operator)).collect(),
         ends: [unit(0), unit(count - 1)],
         parameters: (0..count).map(|k| k as f64 / (count - 1) as f64).collect(),
+        hull: None,
     }
 }
 

@@ -28,6 +28,7 @@ pub(super) fn corner_cutting([a, b]: [f64; 2], closed: bool, count: usize, fault
         children: operators.into_iter().map(|columns| (0, SubdivisionOperator::exact(3, columns))).collect(),
         ends: [vec![b / sum, a / sum, 0.0], vec![0.0, b / sum, a / sum]],
         parameters: if a == b && a == 0.25 { vec![-0.5, 0.5, 1.5] } else { Vec::new() },
+        hull: None,
     };
     Some(successive(piece, closed, count))
 }
@@ -56,6 +57,7 @@ pub(super) fn four_point(tension: f64, closed: bool, count: usize, faults: &mut 
         children: vec![(0, half(2)), (0, half(3))],
         ends: [unit(2), unit(3)],
         parameters: (0..6).map(|k| f64::from(k) - 2.0).collect(),
+        hull: None,
     };
     Some(successive(piece, closed, count))
 }

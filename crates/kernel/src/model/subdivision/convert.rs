@@ -8,9 +8,10 @@ use super::stencil::{Cell, Seen, Stencil, Walker};
 use crate::attractor::{Gluing, Root};
 use crate::automaton::{Boundary, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
 use crate::model::CellKind;
+use crate::model::join::Borders;
 use crate::model::lower::Draft;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// A cage whose patches have more different stencils than this is subdivided before: that isolates extraordinary
 /// vertices, and the states of what is left are few.
@@ -48,7 +49,11 @@ pub(super) fn convert(rules: &Rules, mut cage: Cage, draft: &mut Draft) {
         let cells = patches(scheme, &cage);
         if let Some(seen) = roots(scheme, &cage.host, &cells, step < MOST_STEPS) {
             let mut converter = Converter { rules, draft, known: HashMap::new(), queue: Vec::new() };
-            return converter.run(&cage, &cells, seen);
+            converter.run(&cage, &cells, seen);
+            if step > 0 {
+                draft.borders = Borders::Subdivided;
+            }
+            return;
         }
         cage = cage.refined(refine(rules, &cage.host), *scheme);
     }
@@ -116,6 +121,7 @@ impl Converter<'_> {
                 place[side as usize] = (root as u32, ((k + count - start as usize) % count) as u32);
             }
         }
+        self.draft.borders = borders(self.rules.scheme, cage, first_root, &place);
         for h in 0..place.len() {
             let twin = cage.host.twin[h];
             if twin == NONE || (twin as usize) < h {
@@ -203,6 +209,28 @@ impl Converter<'_> {
         let name = format!("{} {what} of {dimension}", scheme.name());
         State { name, kind: Some(kind), dimension, transitions, boundaries, leaf: LeafPrimitive::Centre, frame: false }
     }
+}
+
+/// The border's spans: edges without a second face, or with Doo and Sabin's scheme what lies between a vertex and its
+/// double. `place`: the root, from `first_root` on, and boundary that every half-edge is.
+fn borders(scheme: Scheme, cage: &Cage, first_root: usize, place: &[(u32, u32)]) -> Borders {
+    let host = &cage.host;
+    let known = |h: u32| {
+        let (root, boundary) = place[h as usize];
+        (root != NONE).then(|| (first_root + root as usize, boundary as usize))
+    };
+    let half_edges = 0..host.origin.len() as u32;
+    if scheme != Scheme::DooSabin {
+        let border = half_edges.filter(|&h| host.twin[h as usize] == NONE);
+        return Borders::Edges(border.filter_map(|h| Some(([host.origin[h as usize], host.destination(h)], known(h)?))).collect());
+    }
+    let mut spans = BTreeMap::<u32, Vec<(usize, usize)>>::new();
+    for h in half_edges.filter(|&h| host.destination(h) as usize >= cage.own_vertices) {
+        if let Some(span) = known(h) {
+            spans.entry(host.origin[h as usize]).or_default().push(span);
+        }
+    }
+    Borders::Vertices(spans)
 }
 
 /// Columns: the masks of the child's control points.
