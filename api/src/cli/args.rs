@@ -150,6 +150,9 @@ pub(super) struct SolidifyArgs {
     /// Radius of the ball, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: f64,
+    /// Leave all triangles of the lattice: quicker, and many times more triangles.
+    #[arg(long)]
+    pub(super) no_simplify: bool,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]

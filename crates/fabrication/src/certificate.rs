@@ -169,8 +169,11 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         nonmanifold_vertices: Some(topology.nonmanifold_vertices),
         flipped_pairs: Some(topology.flipped_pairs),
         degenerate_triangles: Some(topology.degenerate_triangles),
-        // By construction, after rounding too: see the kernel's dilation.
-        self_intersections: Checked::Found(SelfIntersections::None),
+        // Counted exactly on the mesh as it is written.
+        self_intersections: Checked::Found(match dilation.crossings {
+            0 => SelfIntersections::None,
+            count => SelfIntersections::Count(count),
+        }),
         topology_stable: Checked::NotChecked,
         bbox_mm: corners(&dilation.bounds.grown(radius.mm())),
         volume_mm3: Some([exact.low, exact.high]),
@@ -182,6 +185,10 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
     };
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
+    }
+    if dilation.uncertain > 0 {
+        let remark = "places where the radius is so close to a critical one that the topology there is not certain; another radius would do";
+        certificate.warnings.push(format!("{} {remark}", dilation.uncertain));
     }
     if topology.components > 1 {
         certificate.warnings.push(format!("{} separate pieces: they will not hold together", topology.components));

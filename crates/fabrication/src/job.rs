@@ -26,6 +26,8 @@ pub struct Params {
     pub radius_mm: Option<f64>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
     pub normals: bool,
+    /// Whether a solid has no more triangles than its bound needs: else it has all of the lattice.
+    pub simplify: bool,
 }
 
 /// A model with the name that the job gives it.

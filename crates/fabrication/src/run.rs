@@ -2,7 +2,7 @@
 
 use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refine_with_normals, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
-use lacuna_kernel::dilation::{DilationError, dilate, predict};
+use lacuna_kernel::dilation::{DilationError, dilate, dilate_unsimplified, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::{Finding, Lowered, Model};
@@ -171,7 +171,8 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     match (job.kind, radius) {
         (JobKind::Evaluate, _) => evaluate(attractor, tolerance, job.params.normals, budget),
         (JobKind::Solidify, Some(radius)) => {
-            let dilation = dilate(attractor, radius, tolerance, budget)?;
+            let make = if job.params.simplify { dilate } else { dilate_unsimplified };
+            let dilation = make(attractor, radius, tolerance, budget)?;
             let certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
             Ok(Outcome { geometry: Geometry::Solid(dilation.solid), certificate })
         }
@@ -179,7 +180,7 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
             Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()))
         }
         (JobKind::Measure, Some(radius)) => {
-            let dilation = dilate(attractor, radius, tolerance, budget)?;
+            let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
             Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_dilation(attractor, &dilation, radius, tolerance) })
         }
         (JobKind::Measure, None) => {

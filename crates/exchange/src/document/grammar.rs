@@ -948,6 +948,11 @@ pub(super) const JOB_PARAMS: Object = Object {
             "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",
             flag,
         ),
+        optional(
+            "simplify",
+            "Whether a solid has no more triangles than its bound needs, else all of the lattice: for solidify alone; true when absent.",
+            flag,
+        ),
     ],
 };
 

@@ -278,7 +278,17 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(place) => walker.flag(place)?,
         None => false,
     };
-    Some(Params { tolerance_mm: tolerance?, radius_mm, normals })
+    if let (Some(JobKind::Evaluate | JobKind::Measure), Some(simplify)) = (kind, members.get("simplify")) {
+        walker.fault(&simplify, code::CONFLICTING_MEMBERS, || {
+            "only solidify takes \"simplify\"; remove it, or ask for the kind \"solidify\"".into()
+        });
+        return None;
+    }
+    let simplify = match members.get("simplify") {
+        Some(place) => walker.flag(place)?,
+        None => true,
+    };
+    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, simplify })
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {
