@@ -13,9 +13,15 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
-/// The compiled peer, or why there is none.
+/// The compiled peer, or why there is none: compiled once, whichever test asks first.
 fn peer() -> Result<PathBuf, String> {
+    static PEER: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    PEER.get_or_init(compiled).clone()
+}
+
+fn compiled() -> Result<PathBuf, String> {
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/opensubdiv/limits.cpp");
     let binary = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("opensubdiv-limits");
     let made = Command::new("g++").args(["-O2", "-o"]).arg(&binary).arg(source).arg("-losdCPU").output();

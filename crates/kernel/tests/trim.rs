@@ -390,8 +390,7 @@ fn a_trimmed_part_moves_with_its_group_and_stands_beside_others() {
     let trim = Trim { outer: None, inner: vec![circle([0.5, 0.5], [0.2, 0.2])] };
     let moved = lacuna_kernel::model::AffineMap { linear: glam::DMat3::from_rotation_x(1.0), translation: DVec3::new(0.0, 0.0, 50.0) };
     let part = |shape: Shape, transform| Part { name: None, transform, shape };
-    let group =
-        Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved))], joins: Vec::new() });
+    let group = Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved))], joins: Vec::new() });
     let mesh = drawn(group, 0.01);
     let complex = mesh.complex.as_ref().unwrap();
     assert_eq!((complex.euler, complex.boundary_loops, complex.components), (2, 2, 2));
