@@ -125,17 +125,24 @@ fn every_expectation_has_a_source() {
     for case in cases::all() {
         let expected = &case.expected;
         assert!(expected.about.len() > 10, "{}", case.name);
+        let sound = |point: &cases::Point| point.relative >= 0.0 && point.relative < 1e-6 && point.value.iter().all(|x| x.is_finite());
+        assert!(expected.point.values().all(sound), "{}", case.name);
         let sources = expected.scalar.values().flat_map(|s| [&s.source, &s.reason]);
         let sources = sources.chain(expected.exact_box.iter().flat_map(|b| [&b.source, &b.reason]));
-        for words in sources.chain(expected.entry.values().map(|entry| &entry.source)) {
+        let sources =
+            sources.chain(expected.entry.values().map(|entry| &entry.source)).chain(expected.point.values().map(|point| &point.source));
+        for words in sources {
             assert!(words.len() >= 5, "{}: {words:?} is no source", case.name);
         }
         if !expected.exact.is_empty() {
             let source = expected.exact.get("source").and_then(toml::Value::as_str).unwrap_or("");
             assert!(source.len() >= 5, "{}: [exact] has no source", case.name);
         }
-        let stated =
-            !expected.exact.is_empty() || !expected.scalar.is_empty() || expected.exact_box.is_some() || !expected.entry.is_empty();
+        let stated = !expected.exact.is_empty()
+            || !expected.scalar.is_empty()
+            || expected.exact_box.is_some()
+            || !expected.entry.is_empty()
+            || !expected.point.is_empty();
         assert_ne!(stated, expected.refused.is_some(), "{} states a result or a refusal", case.name);
     }
 }

@@ -47,6 +47,18 @@ pub struct ExactBox {
     pub reason: String,
 }
 
+/// The point at an address.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Where it is.
+    pub value: [f64; 3],
+    /// Allowed distance as a share of the point's distance from the origin.
+    pub relative: f64,
+    /// Where it comes from.
+    pub source: String,
+}
+
 /// A refusal.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,6 +107,9 @@ pub struct Expected {
     /// The box.
     #[serde(rename = "box")]
     pub exact_box: Option<ExactBox>,
+    /// Points by their address.
+    #[serde(default)]
+    pub point: BTreeMap<String, Point>,
     /// The refusal instead.
     pub refused: Option<Refused>,
     /// Values chosen for free parameters.

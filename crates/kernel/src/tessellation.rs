@@ -15,7 +15,7 @@ pub struct Tessellation {
     /// Triangles between vertices.
     pub triangles: Vec<[u32; 3]>,
     /// Normals of the limit surface at the triangles' corners, if they were asked for.
-    pub normals: Option<Normals>,
+    pub normals: Option<Box<Normals>>,
     /// Hausdorff bound reached, in mm.
     pub deviation_mm: f64,
     /// Leaf cells evaluated.

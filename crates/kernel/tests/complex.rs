@@ -1,13 +1,15 @@
 //! Evaluations of shapes with a B-rep: conforming, counted, addressed. Expected counts come from combinatorics:
 //! Euler numbers of discs, tori and Sierpinski triangles.
 
+mod agreement;
+
+use agreement::agreed;
 use glam::{DVec3, DVec4};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{
     Adjacency, Bcifs, BcifsState, BoundarySpec, CellKind, CornerCutting, Entry, Glue, Matrix, Model, RootCell, Shape, TransitionSpec,
 };
-use lacuna_kernel::solid::{Topology, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::Tolerance;
 
@@ -92,19 +94,6 @@ fn attractor(bcifs: Bcifs) -> Attractor {
 
 fn evaluated(attractor: &Attractor, tolerance: f64) -> Tessellation {
     refine(attractor, Tolerance::new(tolerance).expect("positive"), &Budget::default()).expect("refines")
-}
-
-/// The mesh's own count agrees with the complex's; returns (euler, boundary loops, components).
-fn agreed(tessellation: &Tessellation) -> (i64, u64, u64) {
-    let mesh = TriMesh { vertices: tessellation.vertices.clone(), triangles: tessellation.triangles.clone() };
-    let counted = Topology::of(&mesh, &Budget::default()).expect("indices are valid");
-    let complex = tessellation.complex.as_ref().expect("a B-rep");
-    assert_eq!(counted.euler, complex.euler);
-    assert_eq!(counted.shells, complex.components);
-    assert_eq!(counted.boundary_edges, complex.boundary_edges, "a crack or a T-junction");
-    assert_eq!((counted.nonmanifold_edges, counted.nonmanifold_vertices, counted.flipped_pairs), (0, 0, 0));
-    assert_eq!(counted.degenerate_triangles, 0);
-    (complex.euler, complex.boundary_loops, complex.components)
 }
 
 fn patch(height: impl Fn(f64, f64) -> f64) -> Vec<DVec3> {

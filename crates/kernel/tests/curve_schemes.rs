@@ -1,7 +1,9 @@
 //! Schemes of curves against their defining properties, and what they refuse. Expected values are closed forms.
 
+mod agreement;
 mod schemes;
 
+use agreement::agreed;
 use glam::{DMat3, DVec3};
 use lacuna_kernel::model::{AffineMap, ControlNet, Curve, CurveScheme, Model, Parametrization, Shape, Sum};
 use schemes::*;

@@ -1,7 +1,9 @@
 //! Parts joined along borders. Expected values: Euler numbers of unions, B-splines in closed form, polynomials.
 
+mod agreement;
 mod schemes;
 
+use agreement::agreed;
 use glam::DVec3;
 use lacuna_kernel::model::{
     Border, BorderPath, BoundaryRule, ControlNet, CurveScheme, Finding, Group, Join, Part, Scheme, Shape, Subdivision,

@@ -1,8 +1,10 @@
 //! Evaluated products of schemes: conforming, closed where they close, within their bounds. Expected values are closed
 //! forms and combinatorics.
 
+mod agreement;
 mod schemes;
 
+use agreement::agreed;
 use glam::DVec3;
 use lacuna_kernel::model::{ControlNet, CurveScheme, Shape};
 use schemes::*;

@@ -1,14 +1,14 @@
 //! Subdivision surfaces: dimensions of states, limit points, volumes, boundaries, creases, and evaluation without
 //! cracks. Expected values: closed forms and CASES E (Stam 1998, Hakenberg and Reif 2014, OpenSubdiv's shapes).
 
+mod agreement;
 mod cages;
 
+use agreement::agreed;
 use cages::{attractor, cube, evaluated, grid, model, patches, tetrahedron, torus};
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
-use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, CellKind, Coefficients, Corner, Crease, Scheme, Subdivision};
-use lacuna_kernel::solid::{Topology, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 
 /// Volume by the divergence theorem on the bilinear patches, extrapolated from three depths: the error of smooth
@@ -32,16 +32,6 @@ fn volume(attractor: &Attractor, depth: usize) -> f64 {
 
 fn has_point(tessellation: &Tessellation, point: DVec3) -> bool {
     tessellation.vertices.iter().any(|vertex| vertex.distance(point) < 1e-9)
-}
-
-/// The mesh's own count agrees with the complex's; returns (euler, boundary loops, components).
-fn agreed(tessellation: &Tessellation) -> (i64, u64, u64) {
-    let mesh = TriMesh { vertices: tessellation.vertices.clone(), triangles: tessellation.triangles.clone() };
-    let counted = Topology::of(&mesh, &Budget::default()).expect("indices are valid");
-    let complex = tessellation.complex.as_ref().expect("a B-rep");
-    assert_eq!((counted.euler, counted.shells, counted.boundary_edges), (complex.euler, complex.components, complex.boundary_edges));
-    assert_eq!((counted.nonmanifold_edges, counted.nonmanifold_vertices, counted.flipped_pairs), (0, 0, 0));
-    (complex.euler, complex.boundary_loops, complex.components)
 }
 
 /// Dimensions of all states of a kind, each once.

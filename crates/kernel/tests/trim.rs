@@ -1,4 +1,5 @@
 //! Trimmed surfaces against closed forms: areas, topology, Hausdorff bounds, and loops that are refused.
+#![allow(clippy::unwrap_used)]
 
 use glam::{DVec2, DVec3};
 use lacuna_kernel::attractor::refine;
@@ -371,7 +372,7 @@ fn a_hundred_thousand_trim_curves_are_drawn_in_time() {
     let count = 100_000;
     let tooth = |k: usize| {
         let angle = 2.0 * PI * k as f64 / f64::from(count);
-        let radius = if k % 2 == 0 { 0.45 } else { 0.449 };
+        let radius = if k.is_multiple_of(2) { 0.45 } else { 0.449 };
         DVec2::new(0.5 + radius * angle.cos(), 0.5 + radius * angle.sin())
     };
     let curves = (0..count as usize).map(|k| TrimCurve::Polyline(vec![tooth(k), tooth((k + 1) % count as usize)])).collect();
@@ -389,8 +390,7 @@ fn a_trimmed_part_moves_with_its_group_and_stands_beside_others() {
     let trim = Trim { outer: None, inner: vec![circle([0.5, 0.5], [0.2, 0.2])] };
     let moved = lacuna_kernel::model::AffineMap { linear: glam::DMat3::from_rotation_x(1.0), translation: DVec3::new(0.0, 0.0, 50.0) };
     let part = |shape: Shape, transform| Part { name: None, transform, shape };
-    let group =
-        Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved.clone()))], joins: Vec::new() });
+    let group = Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved))], joins: Vec::new() });
     let mesh = drawn(group, 0.01);
     let complex = mesh.complex.as_ref().unwrap();
     assert_eq!((complex.euler, complex.boundary_loops, complex.components), (2, 2, 2));

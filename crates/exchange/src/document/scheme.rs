@@ -208,7 +208,7 @@ fn net(walker: &mut Walker<'_>, members: &Members<'_>, directions: usize) -> Opt
             if let (Some((expected, points)), Some((found, _))) = (&points, &weights) {
                 if expected != found {
                     walker.fault(&place, code::WRONG_LENGTH, || {
-                        format!("are {found:?} weights for {expected:?} control points; expected one for each")
+                        format!("are {} weights for {} control points; expected one for each", by(found), by(expected))
                     });
                     return None;
                 }
@@ -229,6 +229,11 @@ fn net(walker: &mut Walker<'_>, members: &Members<'_>, directions: usize) -> Opt
     Some(ControlNet { size, points, weights: weights?.or(own) })
 }
 
+/// A size in every direction, as people write it: 4 x 3.
+fn by(size: &[usize]) -> String {
+    size.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")
+}
+
 /// Reads one element of a nested list.
 type Read<'r, T> = &'r mut dyn FnMut(&mut Walker<'_>, Place<'_>) -> Option<T>;
 
@@ -245,7 +250,7 @@ fn nested<T>(walker: &mut Walker<'_>, place: Place<'_>, depth: usize, expected: 
         if *wanted != found {
             let wanted = wanted.clone();
             walker.fault(&row, code::WRONG_LENGTH, || {
-                format!("has {found:?} elements, and the first row has {wanted:?}; rows must be alike")
+                format!("has {} elements, and the first row has {}; rows must be alike", by(&found), by(&wanted))
             });
             return None;
         }

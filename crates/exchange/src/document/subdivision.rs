@@ -75,7 +75,9 @@ fn corner(walker: &mut Walker<'_>, place: Place<'_>, vertices: usize) -> Option<
 /// A number, whose sign the kernel judges, or "infinite".
 fn sharpness(walker: &mut Walker<'_>, place: Place<'_>) -> Option<f64> {
     match place.node.text() {
-        Some(text) if !reads_as_number(Some(text)) => walker.word(place, "a sharpness: a number, or", &[("infinite", f64::INFINITY)]),
+        Some(text) if !reads_as_number(Some(text)) => {
+            walker.word(place, "a sharpness, which is a number from 0 on or a word", &[("infinite", f64::INFINITY)])
+        }
         _ => walker.number(place),
     }
 }

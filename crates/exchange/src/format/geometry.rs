@@ -145,7 +145,7 @@ impl<'a> Geometry<'a> {
                 fans: &[],
                 segments: &sample.segments,
                 points: &sample.points,
-                normals: sample.normals.as_ref(),
+                normals: sample.normals.as_deref(),
                 exact: false,
             }],
             Self::Polygons { file, .. } => {

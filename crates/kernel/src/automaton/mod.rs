@@ -242,7 +242,7 @@ impl Automaton {
         }
     }
 
-    /// The factors of a state that is a product, as [`Self::claim_products`] says; none for others.
+    /// The factors of a state that is a product, as `claim_products` says; none for others.
     #[must_use]
     pub fn factors(&self, id: StateId) -> &[StateId] {
         &self.products[id.index()]

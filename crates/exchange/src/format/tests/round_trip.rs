@@ -142,7 +142,7 @@ fn folded() -> Tessellation {
     Tessellation {
         vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)],
         triangles: vec![[0, 1, 2], [0, 3, 1]],
-        normals: Some(Normals { vectors: vec![DVec3::Z, DVec3::Y], triangles: vec![[0; 3], [1; 3]], degenerate: 0 }),
+        normals: Some(Box::new(Normals { vectors: vec![DVec3::Z, DVec3::Y], triangles: vec![[0; 3], [1; 3]], degenerate: 0 })),
         ..Tessellation::default()
     }
 }

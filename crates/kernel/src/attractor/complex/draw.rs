@@ -67,7 +67,7 @@ impl Merged<'_> {
                 complex.vertex_origins.push(Origin::Middle { node });
             }
         }
-        tessellation.normals = tangents.map(|_| normals::collect(&tessellation, &normals));
+        tessellation.normals = tangents.map(|_| Box::new(normals::collect(&tessellation, &normals)));
         for &side in wires.iter().flatten() {
             let ends: Vec<u32> = self.vertices_of(side.edge() as u32).map(|vertex| at(&places, self.vertices.find(vertex))).collect();
             if let [vertex] = *ends {
