@@ -1,6 +1,6 @@
 //! Adapter for the comparison with other programs: IN.obj RADIUS TOLERANCE OUT.bin REPEATS.
 use lacuna_kernel::budget::Budget;
-use lacuna_kernel::dilation::dilate;
+use lacuna_kernel::dilation::{dilate, dilate_unsimplified};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use std::io::Write;
@@ -30,7 +30,8 @@ fn main() {
     let mut out = None;
     for _ in 0..a[5].parse::<usize>().unwrap() {
         let (c, w) = (cpu(), std::time::Instant::now());
-        let d = dilate(&attractor, r, t, &Budget { limits: lacuna_kernel::budget::Limits { triangles: u64::MAX, memory_bytes: 12 << 30, ..Default::default() }, ..Default::default() }); if let Err(e) = &d { eprintln!("{e} {} s wall {} cpu", w.elapsed().as_secs_f64(), cpu() - c); }
+        let f = if std::env::var_os("RAW").is_some() { dilate_unsimplified } else { dilate };
+        let d = f(&attractor, r, t, &Budget { limits: lacuna_kernel::budget::Limits { triangles: u64::MAX, memory_bytes: 12 << 30, ..Default::default() }, ..Default::default() }); if let Err(e) = &d { eprintln!("{e} {} s wall {} cpu", w.elapsed().as_secs_f64(), cpu() - c); }
         let d = d.unwrap();
         walls.push(w.elapsed().as_secs_f64());
         cpus.push(cpu() - c);
