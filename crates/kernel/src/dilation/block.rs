@@ -12,8 +12,10 @@
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
 use super::plan::Setting;
-use super::lattice::{Cube, Grading, LEVELS, Number, UNITS, is_mirrored};
+use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
+use super::critical::Critical;
 use super::outside::{Cut, FACES, HalfSpace, Outside};
+use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::tree::{Candidates, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
@@ -87,24 +89,30 @@ fn mix(mut x: u64) -> u64 {
 }
 
 /// The four vertices of a tetrahedron in the order of their numbers.
-struct Frame {
-    numbers: [Number; 4],
-    positions: [Point; 4],
-    /// The nearest site of every vertex that is near one.
-    nearest: [Option<SiteId>; 4],
-    /// Whether a site covers a vertex.
-    covered: bool,
+pub(super) struct Frame {
+    pub(super) numbers: [Number; 4],
+    pub(super) positions: [Point; 4],
+    pub(super) values: [Value; 4],
+    /// Which vertices are covered: their least squared distance is below theta.
+    pub(super) covered: u8,
     /// The finer level of the two cubes.
-    level: u32,
+    pub(super) level: u32,
     /// Whether the order turned the tetrahedron inside out.
     mirrored: bool,
 }
 
+impl Frame {
+    /// The values of V of a simplex.
+    pub(super) fn values_of(&self, simplex: u8) -> [i64; 4] {
+        std::array::from_fn(|k| if simplex >> k & 1 == 1 { self.values[k].least } else { self.values[k].far })
+    }
+}
+
 /// A site that matters in a tetrahedron.
 #[derive(Clone, Copy)]
-struct Nearby {
-    site: SiteId,
-    half_space: HalfSpace,
+pub(super) struct Nearby {
+    pub(super) site: SiteId,
+    pub(super) half_space: HalfSpace,
 }
 
 /// Working memory of a thread, reused from block to block.
@@ -124,20 +132,28 @@ pub(super) struct Workshop<'a> {
     nearby: Vec<Nearby>,
     polygon: Vec<u16>,
     corners: Vec<u32>,
-    closest: Vec<Point>,
-    rest: Vec<Point>,
+    critical: Critical,
+    /// Middle of the sub-block, and how far around it all sites are known.
+    known: (Point, f64),
     leaves: Vec<Cube>,
     names: HashMap<VertexName, u32, BuildHasherDefault<NameHasher>>,
 }
 
 /// What is known of a vertex.
 #[derive(Clone, Copy)]
-struct Value {
-    square: f64,
-    site: SiteId,
+pub(super) struct Value {
+    /// f, or [`DEEP`] or [`FAR`].
+    pub(super) square: f64,
+    /// The nearest site, and its closest point.
+    pub(super) site: SiteId,
+    pub(super) closest: Point,
+    /// f less theta as V has it, never 0: see `smooth`.
+    pub(super) least: i64,
+    /// W less theta.
+    pub(super) far: i64,
 }
 
-const NOTHING: Value = Value { square: UNKNOWN, site: SiteId::Listed(0) };
+const NOTHING: Value = Value { square: UNKNOWN, site: SiteId::Listed(0), closest: [0.0; 3], least: 1, far: 1 };
 
 impl<'a> Workshop<'a> {
     pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
@@ -154,8 +170,8 @@ impl<'a> Workshop<'a> {
             nearby: Vec::new(),
             polygon: Vec::new(),
             corners: Vec::new(),
-            closest: Vec::new(),
-            rest: Vec::new(),
+            critical: Critical::default(),
+            known: ([0.0; 3], 0.0),
             leaves: Vec::new(),
             names: HashMap::default(),
         }
@@ -213,8 +229,8 @@ impl<'a> Workshop<'a> {
         let first: [i64; 3] = std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64);
         let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
         let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
-        let horizon = setting.near + half;
-        let hit = self.tree.nearest(&middle, starts, self.seed, horizon, setting.reach - half);
+        // Farther away no vertex is covered, and no critical point has a value below r.
+        let hit = self.tree.nearest(&middle, starts, self.seed, setting.reach + half, setting.reach - half);
         let Some(hit) = hit else { return };
         if hit.distance_squared.sqrt() + half < setting.reach {
             // One site covers all.
@@ -222,8 +238,9 @@ impl<'a> Workshop<'a> {
         }
         self.seed = Some(hit.node);
         let mut near = std::mem::take(&mut self.near);
-        self.tree.gather(&middle, starts, horizon, &mut near);
+        self.tree.gather(&middle, starts, setting.sight + half, &mut near);
         self.near = near;
+        self.known = (middle, setting.sight + half);
         self.gather_solids(starts, open, &middle, half);
         let mut leaves = std::mem::take(&mut self.leaves);
         for k in 0..SUB as i64 {
@@ -285,12 +302,15 @@ impl<'a> Workshop<'a> {
 
     fn measured(&mut self, setting: &Setting, number: Number) -> Value {
         let x = setting.lattice.position(number);
-        let Some(hit) = self.tree.nearest(&x, &self.near, self.seed, setting.near, setting.deep) else {
-            return Value { square: FAR, ..NOTHING };
+        let noise = (number.iter().fold(7, |code: u64, &x| mix(code.rotate_left(9) ^ x as u64)) % MOST_NOISE as u64) as i64;
+        let far = setting.far + noise;
+        let Some(hit) = self.tree.nearest(&x, &self.near, self.seed, setting.horizon, setting.deep) else {
+            return Value { square: FAR, least: far, far, ..NOTHING };
         };
         self.seed = Some(hit.node);
         let square = if hit.distance_squared < setting.deep * setting.deep { DEEP } else { hit.distance_squared };
-        Value { square, site: hit.site }
+        let least = setting.integer(hit.distance_squared) - 1 - noise;
+        Value { square, site: hit.site, closest: hit.closest, least: if least == 0 { -1 } else { least }, far }
     }
 
     /// Whether a point lies in a solid: the sign of its offset from the nearest point of the surface along
@@ -305,56 +325,66 @@ impl<'a> Workshop<'a> {
         inside
     }
 
-    /// The vertices of a tetrahedron, if sites are near and none covers all of it for sure.
-    fn frame(
-        &mut self,
-        setting: &Setting,
-        mut numbers: [Number; 4],
-        level: u32,
-        surface: &BlockSurface,
-    ) -> Option<Frame> {
+    /// The vertices of a tetrahedron, if it may have a piece of the surface or a critical point of the distance.
+    fn frame(&mut self, setting: &Setting, mut numbers: [Number; 4], level: u32, surface: &BlockSurface) -> Option<Frame> {
         numbers.sort_unstable();
         let mut values = [NOTHING; 4];
-        let mut near = false;
-        for (value, &number) in values.iter_mut().zip(&numbers) {
-            *value = self.value(setting, surface, number);
+        let (mut nearest, mut farthest, mut covered) = (FAR, 0.0_f64, 0);
+        for (k, &number) in numbers.iter().enumerate() {
+            let value = self.value(setting, surface, number);
             if value.square == DEEP {
                 return None;
             }
-            near |= value.square != FAR;
+            nearest = nearest.min(value.square);
+            farthest = farthest.max(value.square);
+            covered |= u8::from(value.least < 0) << k;
+            values[k] = value;
         }
-        if !near {
+        // Only a critical point below r matters where no vertex is covered: there f - theta is below R^2 somewhere, and below a^2 everywhere.
+        if covered == 0 && (nearest > setting.near * setting.near || farthest > setting.horizon * setting.horizon) {
             return None;
         }
-        let covered = values.iter().any(|value| setting.integer(value.square) < 0);
         Some(Frame {
-            numbers,
             positions: numbers.map(|number| setting.lattice.position(number)),
-            nearest: values.map(|value| (value.square != FAR).then_some(value.site)),
+            mirrored: is_mirrored(&numbers),
+            numbers,
+            values,
             covered,
             level,
-            mirrored: is_mirrored(&numbers),
         })
     }
 
-    /// Cuts what all sites cover out of a tetrahedron and emits the surface of the rest; notes the cubes to subdivide if a critical
-    /// point of the distance may be left out.
-    fn tetrahedron(
-        &mut self,
-        setting: &Setting,
-        numbers: [Number; 4],
-        level: u32,
-        surface: &mut BlockSurface,
-    ) {
+    /// Emits the surface in a tetrahedron; notes the cubes to subdivide if a critical point of the distance may be on the wrong side.
+    fn tetrahedron(&mut self, setting: &Setting, numbers: [Number; 4], level: u32, surface: &mut BlockSurface) {
         let Some(frame) = self.frame(setting, numbers, level, surface) else { return };
+        let squares = smooth::squares(&self.tree, &frame);
+        let theta = setting.reach * setting.reach;
+        if frame.covered == WHOLE && squares.iter().any(|squares| squares.iter().all(|&square| square < theta)) {
+            return;
+        }
+        let smooth = smooth::smooth(setting, &frame, &squares);
+        let whole = smooth >> WHOLE & 1 == 1;
+        if whole && frame.covered != 0 && self.is_regular(setting, &frame, &squares) {
+            self.march(&frame, surface);
+            return;
+        }
         if self.cut_sites(setting, &frame) == Cut::Empty {
+            // The solid's other parts lie in what sites cover.
             return;
         }
-        if self.may_be_critical(setting, &frame) {
-            self.search_critical(setting, &frame, surface);
-        }
-        if !frame.covered {
+        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
+        if frame.covered == 0 {
             return;
+        }
+        if whole {
+            self.march(&frame, surface);
+            return;
+        }
+        for simplex in smooth::largest(smooth, frame.covered) {
+            let name = mix(u64::from(simplex)) | VIRTUAL;
+            if self.outside.cut(HalfSpace { values: frame.values_of(simplex), name, simplex }) == Cut::Empty {
+                return;
+            }
         }
         // What is left is far from all surfaces, so it is on one side of them.
         if !self.solid_nodes.is_empty() {
@@ -366,13 +396,119 @@ impl<'a> Workshop<'a> {
         self.emit(&frame, surface);
     }
 
+    /// Whether the distance has no critical point of a value up to `outer` in what the nearest site of the lowest vertex leaves of a tetrahedron.
+    ///
+    /// If x is critical, some closest point lies in every closed half-space through x: so d(y)^2 <= d(x)^2 + |y - x|^2 for all y. One y tells that there is none.
+    fn is_regular(&mut self, setting: &Setting, frame: &Frame, squares: &[[f64; 4]; 4]) -> bool {
+        let lowest = |k: &usize| frame.values[*k].square;
+        let Some(site) = (0..4).min_by(|a, b| lowest(a).total_cmp(&lowest(b))) else { return false };
+        let theta = setting.reach * setting.reach;
+        let squares = &squares[site];
+        let (mut rest, mut count) = ([[0.0; 3]; 8], 0);
+        let mut add = |x: Point| {
+            rest[count] = x;
+            count += 1;
+        };
+        for p in 0..4 {
+            if squares[p] >= theta {
+                add(frame.positions[p]);
+            }
+            for q in p + 1..4 {
+                if (squares[p] < theta) != (squares[q] < theta) {
+                    let t = (theta - squares[p]) / (squares[q] - squares[p]);
+                    add(std::array::from_fn(|axis| frame.positions[p][axis] + t * (frame.positions[q][axis] - frame.positions[p][axis])));
+                }
+            }
+        }
+        let rest = &rest[..count];
+        let outer = setting.outer * setting.outer;
+        let needed = |y: &Point| outer + rest.iter().map(|x| distance_squared(x, y)).fold(0.0, f64::max) * (1.0 + 1e-9);
+        if (0..4).any(|k| frame.values[k].square > needed(&frame.positions[k])) {
+            return true;
+        }
+        let middle: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).sum::<f64>() / count.max(1) as f64);
+        let foot: Point = std::array::from_fn(|axis| frame.values.iter().map(|value| 0.25 * value.closest[axis]).sum());
+        let offset = subtract(&middle, &foot);
+        let length = dot(&offset, &offset).sqrt();
+        let y: Point = std::array::from_fn(|axis| middle[axis] + WITNESS * setting.reach * offset[axis] / length);
+        let distance = needed(&y).sqrt();
+        distance + distance_squared(&y, &self.known.0).sqrt() <= self.known.1
+            && self.tree.nearest(&y, &self.near, self.seed, distance, distance).is_none()
+    }
+
+    /// Emits the surface of marching tetrahedra.
+    fn march(&mut self, frame: &Frame, surface: &mut BlockSurface) {
+        if frame.covered == WHOLE {
+            return;
+        }
+        if !self.solid_nodes.is_empty() {
+            let outside = (0..4).find(|k| frame.covered >> k & 1 == 0).unwrap_or(0);
+            if self.inside_solid(&frame.positions[outside]) {
+                return;
+            }
+        }
+        // p, q, r, s even: p, or p and q, or p, q and r covered.
+        let even = |p: usize| [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]][p];
+        let mut at = |p: usize, q: usize| self.edge(frame, p, q, surface);
+        let polygon: ([u32; 4], usize) = match frame.covered.count_ones() {
+            1 => {
+                let [p, q, r, s] = even(frame.covered.trailing_zeros() as usize);
+                ([at(p, q), at(p, r), at(p, s), 0], 3)
+            }
+            3 => {
+                let [p, q, r, s] = even((!frame.covered & WHOLE).trailing_zeros() as usize);
+                ([at(q, p), at(s, p), at(r, p), 0], 3)
+            }
+            _ => {
+                let [p, q, r, s] = match frame.covered {
+                    0b0011 => [0, 1, 2, 3],
+                    0b0101 => [0, 2, 3, 1],
+                    0b1001 => [0, 3, 1, 2],
+                    0b0110 => [1, 2, 0, 3],
+                    0b1010 => [1, 3, 2, 0],
+                    _ => [2, 3, 0, 1],
+                };
+                ([at(p, r), at(p, s), at(q, s), at(q, r)], 4)
+            }
+        };
+        let (mut polygon, count) = polygon;
+        if frame.mirrored {
+            polygon[..count].reverse();
+        }
+        surface.triangles.push([polygon[0], polygon[1], polygon[2]]);
+        if count == 4 {
+            surface.triangles.push([polygon[0], polygon[2], polygon[3]]);
+        }
+    }
+
+    /// The vertex where V of an edge from a covered vertex p to q is zero.
+    fn edge(&mut self, frame: &Frame, p: usize, q: usize, surface: &mut BlockSurface) -> u32 {
+        let (first, second) = (p.min(q), p.max(q));
+        let name = named(frame.numbers[first].iter().chain(&frame.numbers[second]).copied(), u64::from(p < q), 0);
+        if let Some(&known) = self.names.get(&name) {
+            return known;
+        }
+        let (from, to) = (frame.values[p].least as f64, frame.values[q].least as f64);
+        let t = from / (from - to);
+        let mut weights = [0.0; 4];
+        (weights[p], weights[q]) = (1.0 - t, t);
+        surface.vertices.push(place(&frame.positions, &weights));
+        let number = surface.vertices.len() as u32 - 1;
+        self.names.insert(name, number);
+        let faces = WHOLE & !(1 << p | 1 << q);
+        if Self::is_shared(frame, faces, surface) {
+            surface.shared.push((name, number));
+        }
+        number
+    }
+
     /// Lists the sites near what no site covers of a tetrahedron, which is left in `outside`.
     fn cut_sites(&mut self, setting: &Setting, frame: &Frame) -> Cut {
         self.outside.reset();
         self.nearby.clear();
         for k in 0..4 {
-            let Some(site) = frame.nearest[k] else { continue };
-            if self.nearby.iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
+            let Value { square, site, .. } = frame.values[k];
+            if square.is_finite() && self.nearby.iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
                 return Cut::Empty;
             }
         }
@@ -380,7 +516,7 @@ impl<'a> Workshop<'a> {
         let first = self.nearby.len();
         let mut found = std::mem::take(&mut self.found);
         found.clear();
-        self.tree.collect(&centre, &self.near, setting.reach + radius, &mut found);
+        self.tree.collect(&centre, &self.near, setting.outer + radius, &mut found);
         let mut cut = Cut::Changed;
         for &site in &found {
             if self.nearby[..first].iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
@@ -399,105 +535,9 @@ impl<'a> Workshop<'a> {
         if values.iter().any(|&value| value > setting.most) {
             return Cut::Missed;
         }
-        let half_space = HalfSpace { values, name: name_of(&site) };
+        let half_space = HalfSpace { values, name: name_of(&site) & !VIRTUAL, simplex: 0 };
         self.nearby.push(Nearby { site: id, half_space });
         if values.iter().all(|&value| value > 0) { Cut::Missed } else { self.outside.cut(half_space) }
-    }
-
-    /// Whether the distance to the sites may have a critical point below r in the part of the tetrahedron that the solid leaves out.
-    ///
-    /// A point x is critical when it lies in the convex hull of its closest points. By Morse theory D(r) is, up to homotopy, D(s) with the hulls of the critical points
-    /// of values in (s, r] attached (Chazal, Cohen-Steiner and Lieutier, 2009); the solid contains D(s), s the lattice's inner bound, and where no critical point is left out, those hulls. The closest point of
-    /// a convex site to a point of the tetrahedron lies in the hull of those of its vertices for points and segments (on a
-    /// segment, the parameter is a clamped affine function), and near it for triangles. So if a plane parts the two hulls, there is none.
-    fn may_be_critical(&mut self, setting: &Setting, frame: &Frame) -> bool {
-        if self.nearby.len() < 2 {
-            return false;
-        }
-        let slope = setting.bands[frame.level as usize] as f64;
-        let corners = self.outside.corners();
-        let least = |values: &[i64; 4]| -> f64 {
-            corners.iter().map(|corner| (0..4).map(|k| corner.weights[k] * values[k] as f64).sum()).fold(f64::INFINITY, f64::min)
-        };
-        self.closest.clear();
-        let mut active = 0;
-        for nearby in &self.nearby {
-            if least(&nearby.half_space.values) <= slope {
-                active += 1;
-                let site = self.tree.site(nearby.site);
-                if let Site::Point(point) = site {
-                    self.closest.push(point);
-                } else {
-                    self.closest.extend(frame.positions.iter().map(|x| site.closest(x)));
-                }
-            }
-        }
-        if active < 2 {
-            return false;
-        }
-        self.rest.clear();
-        self.rest.extend(corners.iter().map(|corner| place(&frame.positions, &corner.weights)));
-        !are_parted(&self.rest, &self.closest)
-    }
-
-    /// Looks closer at what is left of a tetrahedron, and notes the cubes that must be subdivided so that critical points below r
-    /// are in the solid.
-    fn search_critical(&mut self, setting: &Setting, frame: &Frame, surface: &mut BlockSurface) {
-        let low: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
-        let high: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
-        let half = (0..3).map(|axis| 0.5 * (high[axis] - low[axis])).fold(0.0, f64::max);
-        let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + 5));
-        let mut open = vec![(std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis])), half)];
-        let mut work = 0;
-        let mut closest = std::mem::take(&mut self.closest);
-        while let Some((middle, half)) = open.pop() {
-            let around = half * 3.0_f64.sqrt();
-            work += 1;
-            let distance = self.closest_around(&middle, around, &mut closest);
-            if distance - around > setting.reach || self.is_covered(frame, &middle, around) {
-                continue;
-            }
-            // Closest points of other points of the cube are within `around` of these.
-            if is_farther(&middle, &closest, 2.0 * around) {
-                continue;
-            }
-            if half > smallest && work < MOST_WORK {
-                let offset = |octant: u32, axis: usize| if octant >> axis & 1 == 1 { 0.5 * half } else { -0.5 * half };
-                open.extend((0..8).map(|octant| (std::array::from_fn(|axis| middle[axis] + offset(octant, axis)), 0.5 * half)));
-                continue;
-            }
-            let within = std::array::from_fn(|axis| (middle[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
-            if frame.level < LEVELS {
-                surface.critical.push(Cube::containing(frame.level, within));
-            } else {
-                surface.uncertain.push(Cube::containing(0, within));
-            }
-        }
-        self.closest = closest;
-    }
-
-    /// The distance of a point from the sites of the tetrahedron, and the closest points of those that may be nearest to a point within
-    /// `around` of it.
-    fn closest_around(&self, x: &Point, around: f64, closest: &mut Vec<Point>) -> f64 {
-        closest.clear();
-        closest.extend(self.nearby.iter().map(|nearby| self.tree.site(nearby.site).closest(x)));
-        let least = closest.iter().map(|point| distance_squared(x, point)).fold(f64::INFINITY, f64::min).sqrt();
-        let most = (least + 2.0 * around).powi(2);
-        closest.retain(|point| distance_squared(x, point) <= most);
-        least
-    }
-
-    /// Whether one site covers the ball of radius `around` a point, as the lattice sees it.
-    fn is_covered(&self, frame: &Frame, x: &Point, around: f64) -> bool {
-        let (base, columns) = (&frame.positions[0], [1, 2, 3].map(|k| subtract(&frame.positions[k], &frame.positions[0])));
-        let dual = [cross(&columns[1], &columns[2]), cross(&columns[2], &columns[0]), cross(&columns[0], &columns[1])];
-        let determinant = dot(&columns[0], &dual[0]);
-        let offset = subtract(x, base);
-        self.nearby.iter().any(|nearby| {
-            let values = nearby.half_space.values.map(|value| value as f64);
-            let slope: Point = std::array::from_fn(|axis| (0..3).map(|k| (values[k + 1] - values[0]) * dual[k][axis]).sum::<f64>() / determinant);
-            values[0] + dot(&slope, &offset) + around * dot(&slope, &slope).sqrt() < 0.0
-        })
     }
 
     /// A ball around what is left.
@@ -549,18 +589,24 @@ impl<'a> Workshop<'a> {
         if faces == 0 {
             return make(surface);
         }
-        let mut names = corner.facets.iter().filter(|&&facet| facet >= FACES).map(|&facet| outside.name(facet));
+        let on = |k: &usize| faces >> k & 1 == 0;
+        let mut names = corner.facets.iter().filter(|&&facet| facet >= FACES).map(|&facet| match outside.simplex(facet) {
+            0 => outside.name(facet),
+            simplex => {
+                let common = (0..4).filter(|k| on(k) && simplex >> k & 1 == 1).flat_map(|k| frame.numbers[k]);
+                common.fold(VIRTUAL, |code, x| mix(code.rotate_left(9) ^ x as u64)) | VIRTUAL
+            }
+        });
         let name = if faces.count_ones() == 2 {
             // An edge: named by its vertices and which of them is covered from here.
-            let mut ends = (0..4).filter(|k| faces >> k & 1 == 0);
+            let mut ends = (0..4).filter(on);
             let (first, second) = (ends.next().unwrap_or(0), ends.next().unwrap_or(0));
             let values = outside.values(corner.facets.iter().copied().find(|&facet| facet >= FACES).unwrap_or(0));
             let from_first = values[first] < values[second];
             named(frame.numbers[first].iter().chain(&frame.numbers[second]).copied(), u64::from(from_first), 0)
         } else {
             let (p, q) = (names.next().unwrap_or(0), names.next().unwrap_or(0));
-            let on = (0..4).filter(|k| faces >> k & 1 == 0).flat_map(|k| frame.numbers[k]);
-            named(on, p.min(q), p.max(q))
+            named((0..4).filter(on).flat_map(|k| frame.numbers[k]), p.min(q), p.max(q))
         };
         if let Some(&known) = self.names.get(&name) {
             return known;
@@ -588,6 +634,11 @@ impl<'a> Workshop<'a> {
     }
 }
 
+/// How far beyond the surface a witness of [`Workshop::is_regular`] is looked for, in units of r.
+const WITNESS: f64 = 0.5;
+/// The bit that tells names of V from those of sites.
+const VIRTUAL: u64 = 1 << 63;
+
 /// The name of a vertex on an edge or face: lattice vertices and what tells it from others there, mixed to 128 bits.
 fn named(coordinates: impl Iterator<Item = i32>, first: u64, second: u64) -> VertexName {
     let (mut low, mut high) = (mix(first ^ 1), mix(second ^ 0x9E37_79B9_7F4A_7C15));
@@ -598,67 +649,7 @@ fn named(coordinates: impl Iterator<Item = i32>, first: u64, second: u64) -> Ver
     u128::from(high) << 64 | u128::from(low)
 }
 
-/// Cubes that the search for critical points in a tetrahedron may look at.
-const MOST_WORK: usize = 4000;
-
-/// Whether a point is surely farther than `distance` from the convex hull of others.
-fn is_farther(x: &Point, others: &[Point], distance: f64) -> bool {
-    let Some(first) = others.first() else { return true };
-    // The shortest vector found so far from the hull to x.
-    let mut shortest = subtract(x, first);
-    for _ in 0..STEPS {
-        let square = dot(&shortest, &shortest);
-        if square <= distance * distance {
-            return false;
-        }
-        let along = |point: &&Point| dot(&shortest, point);
-        let Some(farthest) = others.iter().max_by(|a, b| along(a).total_cmp(&along(b))) else { return true };
-        let support = subtract(x, farthest);
-        let product = dot(&shortest, &support);
-        if product > 0.0 && product * product > distance * distance * square {
-            return true;
-        }
-        let step = subtract(&support, &shortest);
-        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
-    }
-    false
-}
-
-/// Steps of the search for a plane.
-const STEPS: usize = 32;
-
-/// Whether a plane was found that parts two sets of points: Gilbert's search for the shortest difference (1966). When it gives up, there may be one yet.
-fn are_parted(points: &[Point], others: &[Point]) -> bool {
-    let mean = |points: &[Point]| -> Point {
-        std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / points.len().max(1) as f64)
-    };
-    let mut shortest = subtract(&mean(points), &mean(others));
-    for _ in 0..STEPS {
-        let along = |point: &&Point| dot(&shortest, point);
-        let first = points.iter().min_by(|a, b| along(a).total_cmp(&along(b)));
-        let second = others.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
-        let (Some(first), Some(second)) = (first, second) else { return true };
-        let support = subtract(first, second);
-        let square = dot(&shortest, &shortest);
-        if dot(&shortest, &support) > 1e-9 * square {
-            return true;
-        }
-        let step = subtract(&support, &shortest);
-        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
-        if dot(&shortest, &shortest) <= 1e-18 * dot(&support, &support) {
-            return false;
-        }
-    }
-    false
-}
-
-fn cross(a: &Point, b: &Point) -> Point {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn place(positions: &[Point; 4], weights: &[f64; 4]) -> Point {
+pub(super) fn place(positions: &[Point; 4], weights: &[f64; 4]) -> Point {
     std::array::from_fn(|axis| (0..4).map(|k| weights[k] * positions[k][axis]).sum())
 }
 

@@ -13,6 +13,7 @@
 mod assemble;
 mod block;
 mod certificate;
+mod critical;
 mod error;
 mod half_edges;
 mod lattice;
@@ -20,6 +21,7 @@ mod octree;
 mod outside;
 mod plan;
 mod simplify;
+mod smooth;
 mod stitch;
 mod tree;
 

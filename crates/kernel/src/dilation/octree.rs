@@ -117,7 +117,7 @@ impl<'a> Pass<'a> {
         let mut expanded = Candidates::default();
         let mut upper = f64::INFINITY;
         // Sites farther than this cover nothing of the cube, but may tell the inside of a solid.
-        let horizon = self.setting.near + half;
+        let horizon = self.setting.sight + half;
         for candidate in &candidates.cells {
             self.expand(&middle, size, candidate, candidates, horizon, &mut upper, &mut brackets, &mut expanded)?;
         }
@@ -139,7 +139,7 @@ impl<'a> Pass<'a> {
             }
         }
         let still_open = open.iter().copied().filter(|&solid| reaches[solid as usize] > f64::NEG_INFINITY).collect();
-        Ok((lowest <= threshold).then_some((kept, still_open)))
+        Ok((lowest <= self.setting.reach + half + slack).then_some((kept, still_open)))
     }
 
     /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances.

@@ -19,6 +19,8 @@ pub(super) const MOST: i64 = 1 << 26;
 pub(super) struct HalfSpace {
     pub(super) values: [i64; 4],
     pub(super) name: u64,
+    /// The simplex of the tetrahedron that a function V belongs to, see `smooth`; 0 for sites.
+    pub(super) simplex: u8,
 }
 
 /// What a cut did.
@@ -62,7 +64,7 @@ impl Outside {
         for m in 0..4 {
             let mut values = [0; 4];
             values[m] = 1;
-            self.rows.push(HalfSpace { values, name: 0 });
+            self.rows.push(HalfSpace { values, name: 0, simplex: 0 });
         }
         // (k, a, b, c) even for a positive tetrahedron: seen from outside, a, c, b turn counter-clockwise around k.
         for (k, around) in [[1, 3, 2], [0, 2, 3], [3, 1, 0], [2, 0, 1]].into_iter().enumerate() {
@@ -80,6 +82,11 @@ impl Outside {
     /// The name of the half-space that bounds a facet from `FACES` on.
     pub(super) fn name(&self, facet: u16) -> u64 {
         self.rows[usize::from(facet)].name
+    }
+
+    /// The simplex of the half-space that bounds a facet from `FACES` on.
+    pub(super) fn simplex(&self, facet: u16) -> u8 {
+        self.rows[usize::from(facet)].simplex
     }
 
     /// The values of the half-space of a facet.

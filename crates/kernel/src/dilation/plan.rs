@@ -5,6 +5,7 @@ use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::assemble::{Assembly, Blocks};
 use super::octree::{Node, Pass};
 use super::outside::MOST;
+use super::smooth::MOST_NOISE;
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
 use crate::attractor::Attractor;
@@ -24,13 +25,19 @@ pub(crate) struct Setting {
     pub(super) lattice: Lattice,
     /// sqrt(theta) = r: sites nearer than this cover a vertex.
     pub(super) reach: f64,
-    /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(theta + R^2).
+    /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(outer^2 + R^2).
     pub(super) near: f64,
+    /// Vertices farther than this from all sites have no covered neighbour: r + a.
+    pub(super) horizon: f64,
+    /// Sites are known this far around places whose distance from the sites is asked.
+    pub(super) sight: f64,
+    /// (r + a)^2 less theta as an integer, rounded up.
+    pub(super) far: i64,
     /// The surface is nowhere nearer to a site than this: sqrt(theta - R^2).
     pub(super) least: f64,
     /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
     pub(super) outer: f64,
-    /// R^2 by level, as an integer.
+    /// outer^2 + R^2 less theta by level, as an integer.
     pub(super) bands: [i64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
     pub(super) deep: f64,
@@ -64,26 +71,31 @@ const BYTES_PER_TRIANGLE: f64 = 120.0;
 const PREDICTION_WORK: f64 = 300_000.0;
 
 impl Setting {
-    fn new(radius: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
+    fn new(radius: f64, outer: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
         let extent = extent(bounds, radius + 2.0 * pitch);
         let margin = radius + 2.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
         let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let enclosing = (ENCLOSING * pitch).powi(2);
-        let near = (radius * radius + enclosing).sqrt();
+        let (theta, enclosing) = (radius * radius, (ENCLOSING * pitch).powi(2));
+        let near = (outer * outer + enclosing).sqrt();
+        let horizon = near.max(radius + 1.001 * pitch);
         // Values of sites that matter are within -theta and (near + a)^2 - theta.
-        let largest = ((near + 1.000_1 * pitch).powi(2) - radius * radius).max(radius * radius);
-        let inverse_unit = (MOST - 2) as f64 / largest;
+        let largest = ((near + 1.001 * pitch).powi(2) - theta).max(theta);
+        let inverse_unit = (MOST - 2 * MOST_NOISE) as f64 / largest;
+        let integer = |square: f64| (square * inverse_unit).ceil() as i64;
         Self {
             lattice: Lattice { origin, pitch },
             reach: radius,
             near,
-            least: (radius * radius - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
-            outer: radius,
-            bands: std::array::from_fn(|level| (enclosing * 0.25_f64.powi(level as i32) * inverse_unit).ceil() as i64),
+            horizon,
+            sight: horizon + radius,
+            far: integer((radius + 1.001 * pitch).powi(2) - theta),
+            least: (theta - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
+            outer,
+            bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing * 0.25_f64.powi(level as i32))),
             deep: (radius - pitch * 1.000_1).max(0.0),
             inverse_unit,
-            most: (largest * inverse_unit) as i64,
+            most: integer(largest),
             slack: 1e-13 * extent,
             rounding: rounding(self::extent(bounds, 3.0 * radius)),
             clean_only: false,
@@ -156,8 +168,8 @@ impl<'a> Plan<'a> {
         let aimed = tolerance.mm().min(0.5 * radius);
         let rounding = rounding(extent(&bounds, 3.0 * radius));
         check_depth(attractor, aimed, tolerance, budget)?;
-        // The unit of values is below 4 r^2 / MOST, and moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^22.
-        let extra = rounding + radius * (0.5_f64).powi(22) + 1e-12 * extent(&bounds, radius);
+        // The unit of values is below 8 r^2 / MOST, and noise of 32 units moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^16.
+        let extra = rounding + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         let pitch = Self::pitch(&rule, radius, aimed - extra).min(COARSEST * radius);
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
@@ -177,10 +189,9 @@ impl<'a> Plan<'a> {
         // The roots are there anyway; what grows beyond them may take a fair share of the memory.
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
-        let setting = Setting::new(self.radius, self.tolerance, pitch, cells, &self.bounds);
-        // What the lattice gives is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
+        // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
-        Setting { outer, clean_only: self.clean_only, ..setting }
+        Setting { clean_only: self.clean_only, ..Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds) }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.

@@ -273,13 +273,13 @@ impl<'a> Tree<'a> {
             Content::Points(first, count) => {
                 for index in first..first + count {
                     let point = &self.point_sites[index as usize];
-                    best.offer(distance_squared(x, point), point, SiteId::Point(index), id);
+                    best.offer(self, distance_squared(x, point), point, SiteId::Point(index), id);
                 }
             }
             Content::Sites(first, count) => {
                 for index in first..first + count {
                     let closest = self.sites[index as usize].closest(x);
-                    best.offer(distance_squared(x, &closest), &closest, SiteId::Listed(index), id);
+                    best.offer(self, distance_squared(x, &closest), &closest, SiteId::Listed(index), id);
                 }
             }
             Content::Open(..) | Content::Closed(_) => {}
@@ -370,13 +370,12 @@ struct Best {
 
 impl Best {
     #[inline]
-    fn offer(&mut self, square: f64, closest: &Point, site: SiteId, node: NodeId) {
+    fn offer(&mut self, tree: &Tree<'_>, square: f64, closest: &Point, site: SiteId, node: NodeId) {
         if square > self.limit {
             return;
         }
         if let Some(hit) = &self.hit {
-            let first = |a: &Point, b: &Point| a.iter().zip(b).find(|(p, q)| p != q).is_some_and(|(p, q)| p < q);
-            if square == hit.distance_squared && !first(closest, &hit.closest) {
+            if square == hit.distance_squared && !is_first(tree, (closest, site), hit) {
                 return;
             }
         }
@@ -384,4 +383,17 @@ impl Best {
         self.distance = square.sqrt();
         self.hit = Some(Hit { distance_squared: square, closest: *closest, site, node });
     }
+}
+
+/// Whether the site of an equal distance goes before: by its closest point, then by its own coordinates.
+fn is_first(tree: &Tree<'_>, (closest, site): (&Point, SiteId), hit: &Hit) -> bool {
+    let before = |a: &Point, b: &Point| a.iter().zip(b).map(|(p, q)| p.total_cmp(q)).find(|order| order.is_ne());
+    let corners = |id: SiteId| match tree.site(id) {
+        Site::Point(a) => [a; 3],
+        Site::Segment([a, b]) => [a, b, b],
+        Site::Triangle(corners) => corners,
+    };
+    before(closest, &hit.closest)
+        .or_else(|| corners(site).iter().zip(&corners(hit.site)).find_map(|(a, b)| before(a, b)))
+        .is_some_and(|order| order.is_lt())
 }
