@@ -14,7 +14,7 @@
 use super::plan::Setting;
 use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
 use super::critical::Critical;
-use super::outside::{Cut, FACES, HalfSpace, Outside};
+use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::tree::{Candidates, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
@@ -132,6 +132,7 @@ pub(super) struct Workshop<'a> {
     nearby: Vec<Nearby>,
     polygon: Vec<u16>,
     corners: Vec<u32>,
+    numbers: Vec<u32>,
     critical: Critical,
     /// Middle of the sub-block, and how far around it all sites are known.
     known: (Point, f64),
@@ -170,6 +171,7 @@ impl<'a> Workshop<'a> {
             nearby: Vec::new(),
             polygon: Vec::new(),
             corners: Vec::new(),
+            numbers: Vec::new(),
             critical: Critical::default(),
             known: ([0.0; 3], 0.0),
             leaves: Vec::new(),
@@ -362,14 +364,17 @@ impl<'a> Workshop<'a> {
         if frame.covered == WHOLE && squares.iter().any(|squares| squares.iter().all(|&square| square < theta)) {
             return;
         }
-        let smooth = smooth::smooth(setting, &frame, &squares);
+        let mut smooth = smooth::smooth(setting, &frame, &squares, smooth::VERTICES);
+        if frame.covered != 0 && smooth >> WHOLE & 1 == 0 {
+            smooth = self.collect(setting, &frame, smooth);
+        }
         let whole = smooth >> WHOLE & 1 == 1;
         if whole && frame.covered != 0 && self.is_regular(setting, &frame, &squares) {
             self.march(&frame, surface);
             return;
         }
         if self.cut_sites(setting, &frame) == Cut::Empty {
-            // The solid's other parts lie in what sites cover.
+                // The solid's other parts lie in what sites cover.
             return;
         }
         self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
@@ -449,7 +454,7 @@ impl<'a> Workshop<'a> {
         }
         // p, q, r, s even: p, or p and q, or p, q and r covered.
         let even = |p: usize| [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]][p];
-        let mut at = |p: usize, q: usize| self.edge(frame, p, q, surface);
+        let mut at = |p: usize, q: usize| self.edge(frame, (p, frame.values[p].least), (q, frame.values[q].least), surface);
         let polygon: ([u32; 4], usize) = match frame.covered.count_ones() {
             1 => {
                 let [p, q, r, s] = even(frame.covered.trailing_zeros() as usize);
@@ -481,15 +486,14 @@ impl<'a> Workshop<'a> {
         }
     }
 
-    /// The vertex where V of an edge from a covered vertex p to q is zero.
-    fn edge(&mut self, frame: &Frame, p: usize, q: usize, surface: &mut BlockSurface) -> u32 {
+    /// The vertex where an affine function with given values at a covered vertex p and another is zero.
+    fn edge(&mut self, frame: &Frame, (p, from): (usize, i64), (q, to): (usize, i64), surface: &mut BlockSurface) -> u32 {
         let (first, second) = (p.min(q), p.max(q));
         let name = named(frame.numbers[first].iter().chain(&frame.numbers[second]).copied(), u64::from(p < q), 0);
         if let Some(&known) = self.names.get(&name) {
             return known;
         }
-        let (from, to) = (frame.values[p].least as f64, frame.values[q].least as f64);
-        let t = from / (from - to);
+        let t = from as f64 / (from - to) as f64;
         let mut weights = [0.0; 4];
         (weights[p], weights[q]) = (1.0 - t, t);
         surface.vertices.push(place(&frame.positions, &weights));
@@ -500,6 +504,25 @@ impl<'a> Workshop<'a> {
             surface.shared.push((name, number));
         }
         number
+    }
+
+    /// Lists the sites that may serve a simplex, and those simplices that one serves.
+    fn collect(&mut self, setting: &Setting, frame: &Frame, mut smooth: u16) -> u16 {
+        let centre: Point = std::array::from_fn(|axis| frame.positions.iter().map(|x| 0.25 * x[axis]).sum());
+        let radius = frame.positions.iter().map(|x| distance_squared(x, &centre)).fold(0.0, f64::max).sqrt();
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        self.tree.collect(&centre, &self.near, setting.outer + radius, &mut found);
+        for &id in &found {
+            if smooth >> WHOLE & 1 == 1 {
+                break;
+            }
+            let site = self.tree.site(id);
+            let squares = frame.positions.map(|x| site.distance_squared(&x));
+            smooth = smooth::smooth(setting, frame, &[squares], smooth);
+        }
+        self.found = found;
+        smooth
     }
 
     /// Lists the sites near what no site covers of a tetrahedron, which is left in `outside`.
@@ -568,11 +591,16 @@ impl<'a> Workshop<'a> {
                     self.corners[corner] = self.vertex(&outside, frame, corner, surface);
                 }
             }
-            let polygon = &self.polygon;
-            let at = |k: usize| self.corners[usize::from(polygon[k])];
-            for k in 1..polygon.len() - 1 {
+            self.numbers.clear();
+            self.numbers.extend(self.polygon.iter().map(|&corner| self.corners[usize::from(corner)]));
+            self.numbers.dedup();
+            let at = |k: usize| self.numbers[k];
+            for k in 1..self.numbers.len().saturating_sub(1) {
                 // Counter-clockwise seen from the polytope's outside is clockwise seen from the solid's.
-                surface.triangles.push(if frame.mirrored { [at(0), at(k), at(k + 1)] } else { [at(0), at(k + 1), at(k)] });
+                let triangle = if frame.mirrored { [at(0), at(k), at(k + 1)] } else { [at(0), at(k + 1), at(k)] };
+                if triangle[0] != triangle[1] && triangle[0] != triangle[2] {
+                    surface.triangles.push(triangle);
+                }
             }
         }
         self.outside = outside;
@@ -590,6 +618,9 @@ impl<'a> Workshop<'a> {
             return make(surface);
         }
         let on = |k: &usize| faces >> k & 1 == 0;
+        if let Some((from, to)) = coincidence(outside, corner, faces) {
+            return self.edge(frame, from, to, surface);
+        }
         let mut names = corner.facets.iter().filter(|&&facet| facet >= FACES).map(|&facet| match outside.simplex(facet) {
             0 => outside.name(facet),
             simplex => {
@@ -632,6 +663,22 @@ impl<'a> Workshop<'a> {
             })
         })
     }
+}
+
+/// Where two functions V on a face belong to simplices that differ by one vertex there, they are the same on the edge opposite to it, and cut it in one point: the
+/// edge's covered end and the other one, with their values.
+fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize, i64), (usize, i64))> {
+    let own = |facet: u16| if facet >= FACES { outside.simplex(facet) & !faces } else { 0 };
+    let mut simplices = corner.facets.iter().map(|&facet| own(facet)).filter(|&simplex| simplex != 0);
+    let (first, second) = (simplices.next()?, simplices.next()?);
+    if faces.count_ones() != 1 || (first ^ second).count_ones() != 1 {
+        return None;
+    }
+    let facet = corner.facets.iter().copied().find(|&facet| own(facet) != 0)?;
+    let values = outside.values(facet);
+    let mut ends = (0..4).filter(|k| (faces | first ^ second) >> k & 1 == 0);
+    let [p, q] = [ends.next()?, ends.next()?].map(|k| (k, values[k]));
+    Some(if p.1 < q.1 { (p, q) } else { (q, p) })
 }
 
 /// How far beyond the surface a witness of [`Workshop::is_regular`] is looked for, in units of r.

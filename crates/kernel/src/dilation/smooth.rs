@@ -26,7 +26,7 @@ const SIMPLICES: [u8; 11] = [0b0011, 0b0101, 0b1001, 0b0110, 0b1010, 0b1100, 0b0
 pub(super) const WHOLE: u8 = 0b1111;
 
 /// The smooth simplices of a tetrahedron: bit s of the result for the simplex with mask s. Simplices that cover nothing are smooth.
-pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]; 4]) -> u16 {
+pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], known: u16) -> u16 {
     let covered = |v: usize| frame.covered >> v & 1 == 1;
     let shares: [f64; 4] = std::array::from_fn(|v| share(frame.values[v].least, frame.values[v].far));
     let outer = setting.outer * (1.0 - 1e-9) - setting.slack;
@@ -43,14 +43,14 @@ pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]; 4]) 
                 })
         })
     };
-    let mut result: u16 = 1 << 1 | 1 << 2 | 1 << 4 | 1 << 8;
-    for s in SIMPLICES {
+    let mut result = known;
+    for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
         let own = SIMPLICES.iter().filter(|&&part| part != s && part & s == part).all(|&part| result >> part & 1 == 1);
         let is_smooth = nothing
             || (own
                 && is_long(&frame.numbers, s)
-                && (0..4).any(|site| s >> site & 1 == 1 && squares[site][site].is_finite() && serves(s, site)));
+                && (0..squares.len()).any(|site| serves(s, site)));
         result |= u16::from(is_smooth) << s;
     }
     result
@@ -61,6 +61,9 @@ pub(super) fn largest(smooth: u16, covered: u8) -> impl Iterator<Item = u8> {
     let is_smooth = move |s: u8| smooth >> s & 1 == 1;
     (1..=WHOLE).filter(move |&s| s & covered != 0 && is_smooth(s) && (0..4).all(|v| s >> v & 1 == 1 || !is_smooth(s | 1 << v)))
 }
+
+/// The vertices, which are smooth.
+pub(super) const VERTICES: u16 = 1 << 0b0001 | 1 << 0b0010 | 1 << 0b0100 | 1 << 0b1000;
 
 /// Where an affine function with these values at two vertices is zero, as a share of the way.
 fn share(from: i64, to: i64) -> f64 {
