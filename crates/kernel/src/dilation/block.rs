@@ -192,7 +192,7 @@ impl<'a> Workshop<'a> {
         self.fine.clear();
         self.names.clear();
         self.seed = None;
-        let starts: Vec<NodeId> = self.tree.reset(candidates).collect();
+        let starts = self.tree.reset(candidates);
         let mut surface = BlockSurface { first_cube, ..BlockSurface::default() };
         for k in (0..SIDE).step_by(SUB) {
             for j in (0..SIDE).step_by(SUB) {
@@ -334,7 +334,8 @@ impl<'a> Workshop<'a> {
         let (mut nearest, mut farthest, mut covered) = (FAR, 0.0_f64, 0);
         for (k, &number) in numbers.iter().enumerate() {
             let value = self.value(setting, surface, number);
-            if value.square == DEEP {
+            // Around a deep vertex all is covered, around a far one no vertex is, and the distance is too large for critical points that matter.
+            if value.square == DEEP || value.square == FAR {
                 return None;
             }
             nearest = nearest.min(value.square);
@@ -359,8 +360,8 @@ impl<'a> Workshop<'a> {
     /// Emits the surface in a tetrahedron; notes the cubes to subdivide if a critical point of the distance may be on the wrong side.
     fn tetrahedron(&mut self, setting: &Setting, numbers: [Number; 4], level: u32, surface: &mut BlockSurface) {
         let Some(frame) = self.frame(setting, numbers, level, surface) else { return };
-        let squares = smooth::squares(&self.tree, &frame);
         let theta = setting.reach * setting.reach;
+        let squares = smooth::squares(&self.tree, &frame);
         if frame.covered == WHOLE && squares.iter().any(|squares| squares.iter().all(|&square| square < theta)) {
             return;
         }
@@ -377,7 +378,10 @@ impl<'a> Workshop<'a> {
                 // The solid's other parts lie in what sites cover.
             return;
         }
-        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
+        let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
+        if !self.has_witness(setting, &frame, &rest) {
+            self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
+        }
         if frame.covered == 0 {
             return;
         }
@@ -402,8 +406,6 @@ impl<'a> Workshop<'a> {
     }
 
     /// Whether the distance has no critical point of a value up to `outer` in what the nearest site of the lowest vertex leaves of a tetrahedron.
-    ///
-    /// If x is critical, some closest point lies in every closed half-space through x: so d(y)^2 <= d(x)^2 + |y - x|^2 for all y. One y tells that there is none.
     fn is_regular(&mut self, setting: &Setting, frame: &Frame, squares: &[[f64; 4]; 4]) -> bool {
         let lowest = |k: &usize| frame.values[*k].square;
         let Some(site) = (0..4).min_by(|a, b| lowest(a).total_cmp(&lowest(b))) else { return false };
@@ -425,20 +427,28 @@ impl<'a> Workshop<'a> {
                 }
             }
         }
-        let rest = &rest[..count];
+        self.has_witness(setting, frame, &rest[..count])
+    }
+
+    /// Whether a point tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron.
+    ///
+    /// If x is critical, some closest point lies in every closed half-space through x: so d(y)^2 <= d(x)^2 + |y - x|^2 for all y.
+    fn has_witness(&mut self, setting: &Setting, frame: &Frame, rest: &[Point]) -> bool {
         let outer = setting.outer * setting.outer;
         let needed = |y: &Point| outer + rest.iter().map(|x| distance_squared(x, y)).fold(0.0, f64::max) * (1.0 + 1e-9);
         if (0..4).any(|k| frame.values[k].square > needed(&frame.positions[k])) {
             return true;
         }
-        let middle: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).sum::<f64>() / count.max(1) as f64);
+        let middle: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).sum::<f64>() / rest.len().max(1) as f64);
         let foot: Point = std::array::from_fn(|axis| frame.values.iter().map(|value| 0.25 * value.closest[axis]).sum());
         let offset = subtract(&middle, &foot);
         let length = dot(&offset, &offset).sqrt();
-        let y: Point = std::array::from_fn(|axis| middle[axis] + WITNESS * setting.reach * offset[axis] / length);
-        let distance = needed(&y).sqrt();
-        distance + distance_squared(&y, &self.known.0).sqrt() <= self.known.1
-            && self.tree.nearest(&y, &self.near, self.seed, distance, distance).is_none()
+        WITNESSES.iter().any(|share| {
+            let y: Point = std::array::from_fn(|axis| middle[axis] + share * setting.reach * offset[axis] / length);
+            let distance = needed(&y).sqrt();
+            distance + distance_squared(&y, &self.known.0).sqrt() <= self.known.1
+                && self.tree.nearest(&y, &self.near, self.seed, distance, distance).is_none()
+        })
     }
 
     /// Emits the surface of marching tetrahedra.
@@ -681,8 +691,8 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
 }
 
-/// How far beyond the surface a witness of [`Workshop::is_regular`] is looked for, in units of r.
-const WITNESS: f64 = 0.5;
+/// How far beyond the surface witnesses are looked for, in units of r.
+const WITNESSES: [f64; 2] = [0.5, 0.3];
 /// The bit that tells names of V from those of sites.
 const VIRTUAL: u64 = 1 << 63;
 

@@ -55,11 +55,10 @@ pub(super) struct Places {
 
 impl Places {
     /// Forgets all; places of level `top` are so large that the starts serve for all of them.
-    pub(super) fn reset(&mut self, origin: Point, edge: f64, top: u32, starts: impl Iterator<Item = NodeId>) {
+    pub(super) fn reset(&mut self, origin: Point, edge: f64, top: u32, starts: Vec<NodeId>) {
         self.lists.clear();
         (self.origin, self.edge, self.top) = (origin, edge, top);
-        self.starts.clear();
-        self.starts.extend(starts);
+        self.starts = starts;
     }
 
     /// All sites within `reach` + `radius` of x, and perhaps some more.

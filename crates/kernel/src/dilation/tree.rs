@@ -118,8 +118,9 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Empties the tree and adds the candidates as its roots; returns their ids.
-    pub(super) fn reset(&mut self, candidates: &Candidates) -> std::ops::Range<NodeId> {
+    /// Empties the tree and adds the candidates under groups of neighbours; returns the ids of the groups that have none above them. A group has
+    /// candidates of one solid, or of none.
+    pub(super) fn reset(&mut self, candidates: &Candidates) -> Vec<NodeId> {
         self.nodes.clear();
         self.cells.clear();
         self.points.clear();
@@ -128,10 +129,39 @@ impl<'a> Tree<'a> {
         self.exhausted = false;
         self.largest_error = SiteError::default();
         self.point_sites.clear();
-        for candidate in &candidates.cells {
-            self.add(candidate.cell, candidates.points_of(self.rule.attractor(), candidate));
+        let attractor = self.rule.attractor();
+        let solid_of = |cell: &Cell| attractor.roots()[cell.root as usize].solid;
+        let order = spatial_order(candidates, |cell| solid_of(cell).map_or(0, |solid| solid + 1));
+        for &index in &order {
+            let candidate = &candidates.cells[index as usize];
+            self.add(candidate.cell, candidates.points_of(attractor, candidate));
         }
-        0..self.nodes.len() as NodeId
+        let mut level: Vec<NodeId> = (0..self.nodes.len() as NodeId).collect();
+        while level.len() > GROUP {
+            let same = |a: &NodeId, b: &NodeId| solid_of(&self.cells[*a as usize]) == solid_of(&self.cells[*b as usize]);
+            let groups: Vec<&[NodeId]> = level.chunk_by(same).flat_map(|own| own.chunks(GROUP)).collect();
+            let above: Vec<NodeId> = groups.into_iter().map(|children| self.group(children)).collect();
+            if above.len() == level.len() {
+                break;
+            }
+            level = above;
+        }
+        level
+    }
+
+    /// Adds a node above nodes that follow one another.
+    fn group(&mut self, children: &[NodeId]) -> NodeId {
+        let nodes = children.iter().map(|&id| &self.nodes[id as usize]);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for node in nodes.clone() {
+            low = std::array::from_fn(|axis| low[axis].min(node.centre[axis] - node.radius));
+            high = std::array::from_fn(|axis| high[axis].max(node.centre[axis] + node.radius));
+        }
+        let centre: Point = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        let radius = nodes.map(|node| distance_squared(&node.centre, &centre).sqrt() + node.radius).fold(0.0, f64::max);
+        self.nodes.push(Node { centre, radius: radius * (1.0 + 1e-12), content: Content::Open(children[0], children.len() as u32) });
+        self.cells.push(self.cells[children[0] as usize]);
+        self.nodes.len() as NodeId - 1
     }
 
     fn add(&mut self, cell: Cell, points: &[ControlPoint]) {
@@ -357,6 +387,29 @@ impl<'a> Tree<'a> {
 const ENOUGH_NODES: usize = 24;
 /// and not if it would become longer than this: queries look at every start.
 const MOST_NODES: usize = 96;
+
+/// Children of a group.
+const GROUP: usize = 8;
+
+/// The candidates along a space-filling curve, by `class` first, so that those which follow one another are close.
+fn spatial_order(candidates: &Candidates, class: impl Fn(&Cell) -> u32) -> Vec<u32> {
+    let centres = candidates.cells.iter().map(|candidate| candidate.cell.ball.centre);
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for centre in centres.clone() {
+        low = std::array::from_fn(|axis| low[axis].min(centre[axis]));
+        high = std::array::from_fn(|axis| high[axis].max(centre[axis]));
+    }
+    let size = (0..3).map(|axis| high[axis] - low[axis]).fold(f64::MIN_POSITIVE, f64::max);
+    let spread = |x: u64| (0..BITS).fold(0, |code, bit| code | (x >> bit & 1) << (3 * bit));
+    let code = |centre: Point| (0..3).fold(0, |code, axis| code | spread(((centre[axis] - low[axis]) / size * f64::from((1 << BITS) - 1)) as u64) << axis);
+    let mut order: Vec<(u32, u64, u32)> =
+        candidates.cells.iter().zip(centres).enumerate().map(|(index, (candidate, centre))| (class(&candidate.cell), code(centre), index as u32)).collect();
+    order.sort_unstable();
+    order.into_iter().map(|(.., index)| index).collect()
+}
+
+/// Bits of a coordinate on the curve.
+const BITS: u32 = 10;
 
 struct Best {
     /// Distance of the hit, or the reach.
