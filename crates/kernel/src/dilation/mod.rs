@@ -14,6 +14,7 @@ mod assemble;
 mod block;
 mod certificate;
 mod critical;
+mod dust;
 mod error;
 mod half_edges;
 mod lattice;

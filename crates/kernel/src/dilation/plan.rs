@@ -3,6 +3,7 @@
 use super::block::{self, BlockSurface};
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::assemble::{Assembly, Blocks};
+use super::dust;
 use super::octree::{Node, Pass};
 use super::outside::MOST;
 use super::smooth::MOST_NOISE;
@@ -240,7 +241,8 @@ impl<'a> Plan<'a> {
             let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;
             blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
         }
-        let surface = self.assemble(attractor, &setting, &grading, blocks, budget)?;
+        let mut surface = self.assemble(attractor, &setting, &grading, blocks, budget)?;
+        dust::remove(&setting, &self.rule, &self.space(attractor, &setting).1, &mut surface);
         budget.report("dilate", 1.0, surface.triangles.len() as u64);
         self.certify(&setting, surface, uncertain, budget)
     }

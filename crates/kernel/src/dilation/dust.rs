@@ -1,0 +1,116 @@
+//! Pieces and holes of the surface that are certainly not the dilation's.
+//!
+//! Where two creases come close the lattice may cut off a piece of the solid, or close a void, of which the dilation knows nothing. Let s be the solid's inner bound: D(s) is in the
+//! solid. A piece of the solid that holds a point of D(s) holds a whole ball of radius s, and its box is no narrower than 2 s. So a narrower piece lies outside D(s), and
+//! without it the solid still contains D(s). A void that lies in D(r) is not one of the dilation's: it is filled.
+
+use super::block::BlockSurface;
+use super::plan::Setting;
+use super::tree::{Candidates, Tree};
+use crate::attractor::cell::{Point, distance_squared, dot};
+use crate::attractor::sites::SiteRule;
+
+/// A shell of the surface.
+#[derive(Clone, Copy)]
+struct Shell {
+    low: Point,
+    high: Point,
+    /// Six times the volume inside, negative for a void.
+    volume: f64,
+}
+
+const EMPTY: Shell = Shell { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3], volume: 0.0 };
+
+/// Removes such shells; how many there were.
+pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, surface: &mut BlockSurface) -> usize {
+    let (numbers, mut shells) = shells(surface);
+    for (triangle, &number) in surface.triangles.iter().zip(&numbers) {
+        let shell = &mut shells[number as usize];
+        let corners = triangle.map(|corner| surface.vertices[corner as usize]);
+        for corner in &corners {
+            shell.low = std::array::from_fn(|axis| shell.low[axis].min(corner[axis]));
+            shell.high = std::array::from_fn(|axis| shell.high[axis].max(corner[axis]));
+        }
+    }
+    // Volumes about a point of the shell: far from the origin small ones would drown.
+    for (triangle, &number) in surface.triangles.iter().zip(&numbers) {
+        let shell = &mut shells[number as usize];
+        let [a, b, c] = triangle.map(|corner| std::array::from_fn(|axis| surface.vertices[corner as usize][axis] - shell.low[axis]));
+        shell.volume += dot(&a, &[b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]]);
+    }
+    let mut tree = None;
+    let gone: Vec<bool> = shells.iter().map(|shell| is_dust(setting, rule, candidates, shell, &mut tree)).collect();
+    let count = gone.iter().filter(|&&gone| gone).count();
+    if count > 0 {
+        let mut kept = numbers.iter().map(|&number| !gone[number as usize]);
+        surface.triangles.retain(|_| kept.next().unwrap_or(true));
+        drop_unused(surface);
+    }
+    count
+}
+
+fn is_dust<'a>(setting: &Setting, rule: &'a SiteRule<'a>, candidates: &Candidates, shell: &Shell, tree: &mut Option<(Tree<'a>, Vec<u32>)>) -> bool {
+    let width = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(f64::INFINITY, f64::min);
+    if width >= 2.0 * (setting.least - 2.0 * setting.rounding) {
+        return false;
+    }
+    if shell.volume > 0.0 {
+        return true;
+    }
+    let (tree, starts) = tree.get_or_insert_with(|| {
+        let mut tree = Tree::new(rule, setting.slack, 4 * setting.cells);
+        let starts = tree.reset(candidates);
+        (tree, starts)
+    });
+    let middle: Point = std::array::from_fn(|axis| 0.5 * (shell.low[axis] + shell.high[axis]));
+    let around = distance_squared(&middle, &shell.high).sqrt() + 2.0 * setting.rounding;
+    let hit = tree.nearest(&middle, starts, None, setting.reach, 0.0);
+    !tree.exhausted && hit.is_some_and(|hit| hit.distance_squared.sqrt() + around <= setting.reach)
+}
+
+/// The number of every triangle's shell, and room for the shells.
+fn shells(surface: &BlockSurface) -> (Vec<u32>, Vec<Shell>) {
+    let mut parents: Vec<u32> = (0..surface.vertices.len() as u32).collect();
+    for triangle in &surface.triangles {
+        let roots = triangle.map(|corner| root(&mut parents, corner));
+        let least = roots.into_iter().min().unwrap_or(roots[0]);
+        for root in roots {
+            parents[root as usize] = least;
+        }
+    }
+    let mut names = vec![u32::MAX; surface.vertices.len()];
+    let mut count = 0;
+    let mut numbers = Vec::with_capacity(surface.triangles.len());
+    for triangle in &surface.triangles {
+        let name = &mut names[root(&mut parents, triangle[0]) as usize];
+        if *name == u32::MAX {
+            *name = count;
+            count += 1;
+        }
+        numbers.push(*name);
+    }
+    (numbers, vec![EMPTY; count as usize])
+}
+
+fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
+    while parents[vertex as usize] != vertex {
+        let above = parents[parents[vertex as usize] as usize];
+        parents[vertex as usize] = above;
+        vertex = above;
+    }
+    vertex
+}
+
+fn drop_unused(surface: &mut BlockSurface) {
+    let mut numbers = vec![u32::MAX; surface.vertices.len()];
+    let mut vertices = Vec::with_capacity(surface.vertices.len());
+    for corner in surface.triangles.iter_mut().flatten() {
+        let number = &mut numbers[*corner as usize];
+        if *number == u32::MAX {
+            *number = vertices.len() as u32;
+            vertices.push(surface.vertices[*corner as usize]);
+        }
+        *corner = *number;
+    }
+    surface.vertices = vertices;
+}
