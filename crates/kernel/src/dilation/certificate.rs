@@ -29,12 +29,7 @@ pub(super) fn is_clear(triangle: &[Point; 3], site: &Site, least: f64) -> bool {
             return false;
         }
         let lowest = triangle.iter().map(|corner| dot(corner, &offset)).fold(f64::INFINITY, f64::min);
-        let highest = match site {
-            Site::Point(a) => dot(a, &offset),
-            Site::Segment(ends) => ends.iter().map(|end| dot(end, &offset)).fold(f64::NEG_INFINITY, f64::max),
-            Site::Triangle(corners) => corners.iter().map(|corner| dot(corner, &offset)).fold(f64::NEG_INFINITY, f64::max),
-        };
-        if lowest - highest > least * length {
+        if lowest - highest(site, &offset) > least * length {
             return true;
         }
         q = closest_on_triangle(&p, &triangle[0], &triangle[1], &triangle[2]);
@@ -61,16 +56,16 @@ impl Places {
         self.starts = starts;
     }
 
-    /// All sites within `reach` + `radius` of x, and perhaps some more.
-    pub(super) fn collect(&mut self, tree: &mut Tree<'_>, x: &Point, radius: f64, reach: f64, found: &mut Vec<SiteId>) {
-        found.clear();
+    /// Visits all sites within `reach` + `radius` of x, with their closest points and squared distances.
+    #[inline]
+    fn visit(&mut self, tree: &mut Tree<'_>, x: &Point, radius: f64, reach: f64, visit: impl FnMut(SiteId, &Point, f64)) {
         let mut level = 0;
         while level < self.top && radius > self.edge * f64::from(1_u32 << level) {
             level += 1;
         }
         self.refine(tree, level, x, reach);
         let list = self.lists.get(&self.key(level, x)).unwrap_or(&self.starts);
-        tree.collect(x, list, reach + radius, found);
+        tree.visit_near(x, list, reach + radius, visit);
     }
 
     fn place(&self, level: u32, x: &Point) -> [i32; 3] {
@@ -106,82 +101,162 @@ struct Marked {
     mask: u64,
 }
 
-/// The sites around a star, and which of its vertices each of them covers.
-#[derive(Debug, Default)]
-pub(super) struct Nearby {
-    sites: Vec<Site>,
-    ids: Vec<SiteId>,
-    /// Squared distances of the star's vertices, site by site.
-    squares: Vec<f64>,
-    /// Vertices with the sites within reach.
-    marked: Vec<Marked>,
-    pieces: Vec<[Marked; 4]>,
+/// A site seen from a vertex.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    site: SiteId,
+    /// Squared distance.
+    square: f64,
+    /// The unit vector from the site's closest point to the vertex, and the largest value along it on the site: what has larger values is
+    /// as far from the site as they differ, at least.
+    normal: Point,
+    highest: f64,
+}
+
+/// The views from a vertex, the nearest first.
+#[derive(Clone, Copy, Debug, Default)]
+struct Range {
+    first: u32,
+    count: u32,
+    /// All sites within this squared distance are there; 0 before they were looked for.
     square: f64,
 }
 
+/// The sites around vertices, looked for once, and what is known of those around a star.
+#[derive(Debug, Default)]
+pub(super) struct Nearby {
+    ranges: Vec<Range>,
+    views: Vec<View>,
+    /// Squares of how near sites cover, and how far they are looked for at once.
+    square: f64,
+    first_square: f64,
+    reach: f64,
+    /// Sites with a bit, and what bit a site has in the star of that number.
+    sites: Vec<SiteId>,
+    bits: Vec<(u32, u32)>,
+    star: u32,
+    /// Corners of the star with the sites within reach.
+    marked: Vec<Marked>,
+    pieces: Vec<[Marked; 4]>,
+    /// Sites that a triangle is clear of.
+    cleared: Vec<SiteId>,
+}
+
 impl Nearby {
-    /// Finds the sites near `points`, the last of which is the middle.
-    pub(super) fn find(&mut self, tree: &mut Tree<'_>, places: &mut Places, points: &[Point], reach: f64) {
-        let Some(middle) = points.last() else { return };
-        let radius = points.iter().map(|point| distance_squared(point, middle)).fold(0.0, f64::max).sqrt();
-        places.collect(tree, middle, radius, reach, &mut self.ids);
-        self.square = reach * reach;
-        self.sites.clear();
-        self.squares.clear();
-        self.marked.clear();
-        self.marked.extend(points.iter().map(|&at| Marked { at, mask: 0 }));
-        let horizon = (reach + radius).powi(2);
-        for &id in &self.ids {
-            let site = tree.site(id);
-            let from_middle = site.distance_squared(middle);
-            if from_middle > horizon {
-                continue;
-            }
-            let number = self.sites.len();
-            self.sites.push(site);
-            for marked in &mut self.marked {
-                let square = site.distance_squared(&marked.at);
-                self.squares.push(square);
-                if number < MOST_COVERING && square <= self.square {
-                    marked.mask |= 1 << number;
-                }
-            }
+    /// Forgets all; sites cover within `reach` and are looked for up to the root of `first_square` at first.
+    pub(super) fn reset(&mut self, vertices: usize, reach: f64, first_square: f64) {
+        self.ranges.clear();
+        // One more for a place that is tried.
+        self.ranges.resize(vertices + 1, Range::default());
+        self.views.clear();
+        (self.reach, self.square, self.first_square) = (reach, reach * reach, first_square.max(reach * reach));
+        self.bits.clear();
+        self.star = 0;
+    }
+
+    /// The number of the place that is tried.
+    pub(super) fn trial(&self) -> u32 {
+        self.ranges.len() as u32 - 1
+    }
+
+    /// Forgets what is seen from a vertex, which moves.
+    pub(super) fn forget(&mut self, vertex: u32) {
+        self.ranges[vertex as usize] = Range::default();
+    }
+
+    /// Gives a vertex the views of the place that is tried.
+    pub(super) fn accept(&mut self, vertex: u32) {
+        self.ranges[vertex as usize] = self.ranges[self.trial() as usize];
+    }
+
+    /// Sees to it that all sites within a squared distance of a vertex at x are known.
+    #[inline]
+    fn see(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point, square: f64) {
+        if self.ranges[vertex as usize].square < square {
+            self.look(tree, places, vertex, x, square);
         }
     }
 
-    /// The point of the sites that is closest to the last point, if all sites within reach have the same: there the distance is smooth.
-    pub(super) fn foot(&self) -> Option<Point> {
-        let middle = self.marked.last()?;
-        let mut foot: Option<Point> = None;
-        for site in &self.sites {
-            let closest = site.closest(&middle.at);
-            if distance_squared(&closest, &middle.at) <= self.square {
-                if foot.is_some_and(|known| distance_squared(&known, &closest) > 1e-12 * self.square) {
-                    return None;
-                }
-                foot = Some(closest);
+    fn look(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point, square: f64) {
+        // Twice as far beyond the first, so that a vertex is asked for seldom.
+        let square = if square <= self.first_square { self.first_square } else { self.first_square + 2.0 * (square - self.first_square) };
+        let first = self.views.len();
+        let views = &mut self.views;
+        places.visit(tree, x, square.sqrt() - self.reach, self.reach, |site, closest, square| {
+            let length = square.sqrt();
+            let normal = if length > 0.0 { subtract(x, closest).map(|part| part / length) } else { [0.0; 3] };
+            views.push(View { site, square, normal, highest: f64::INFINITY });
+        });
+        for view in &mut views[first..] {
+            view.highest = highest(&tree.site(view.site), &view.normal);
+        }
+        views[first..].sort_unstable_by(|a, b| a.square.total_cmp(&b.square));
+        self.ranges[vertex as usize] = Range { first: first as u32, count: (views.len() - first) as u32, square };
+    }
+
+    #[inline]
+    fn views(&self, vertex: u32) -> &[View] {
+        let range = self.ranges[vertex as usize];
+        &self.views[range.first as usize..(range.first + range.count) as usize]
+    }
+
+    /// Begins with a star: its corners, the middle first, are `corners` afterwards.
+    pub(super) fn begin(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: impl Iterator<Item = (u32, Point)>) {
+        self.star += 1;
+        self.sites.clear();
+        self.marked.clear();
+        for (vertex, at) in corners {
+            self.mark(tree, places, vertex, at);
+        }
+    }
+
+    /// Adds a corner to the star.
+    pub(super) fn mark(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, at: Point) {
+        self.see(tree, places, vertex, &at, self.square);
+        let range = self.ranges[vertex as usize];
+        let mut mask = 0;
+        for view in &self.views[range.first as usize..(range.first + range.count) as usize] {
+            if view.square > self.square {
+                break;
             }
+            let key = match view.site {
+                SiteId::Point(index) => 2 * index as usize,
+                SiteId::Listed(index) => 2 * index as usize + 1,
+            };
+            if key >= self.bits.len() {
+                self.bits.resize(key + 1, (0, 0));
+            }
+            let (star, bit) = &mut self.bits[key];
+            if *star != self.star {
+                if self.sites.len() == MOST_COVERING {
+                    continue;
+                }
+                (*star, *bit) = (self.star, self.sites.len() as u32);
+                self.sites.push(view.site);
+            }
+            mask |= 1 << *bit;
+        }
+        self.marked.push(Marked { at, mask });
+    }
+
+    /// The point of the sites that is closest to a vertex at x, if all sites within reach have the same: there the distance is smooth.
+    pub(super) fn foot(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point) -> Option<Point> {
+        self.see(tree, places, vertex, x, self.square);
+        let mut foot: Option<Point> = None;
+        for view in self.views(vertex).iter().take_while(|view| view.square <= self.square) {
+            let length = view.square.sqrt();
+            let closest = std::array::from_fn(|axis| x[axis] - length * view.normal[axis]);
+            if foot.is_some_and(|known| distance_squared(&known, &closest) > 1e-12 * self.square) {
+                return None;
+            }
+            foot = Some(closest);
         }
         foot
     }
 
-    /// Moves one of the points.
-    pub(super) fn place(&mut self, index: usize, at: Point) {
-        let count = self.marked.len();
-        let mut mask = 0;
-        for (number, site) in self.sites.iter().enumerate() {
-            let square = site.distance_squared(&at);
-            self.squares[number * count + index] = square;
-            if number < MOST_COVERING && square <= self.square {
-                mask |= 1 << number;
-            }
-        }
-        self.marked[index] = Marked { at, mask };
-    }
-
     /// Whether sites cover the tetrahedron of four of the points. One convex site that reaches all four corners does; else it is cut where two sites
     /// are equally far, until one does.
-    pub(super) fn cover(&mut self, corners: [usize; 4]) -> bool {
+    pub(super) fn cover(&mut self, tree: &Tree<'_>, corners: [usize; 4]) -> bool {
         let whole = corners.map(|corner| self.marked[corner]);
         if whole[0].mask & whole[1].mask & whole[2].mask & whole[3].mask != 0 {
             return true;
@@ -199,7 +274,7 @@ impl Nearby {
             if made >= MOST_PIECES {
                 return false;
             }
-            let Some((p, q, middle)) = self.split(&piece) else { return false };
+            let Some((p, q, middle)) = self.split(tree, &piece) else { return false };
             let (mut first, mut second) = (piece, piece);
             (first[p], second[q]) = (middle, middle);
             self.pieces.extend([first, second]);
@@ -209,7 +284,7 @@ impl Nearby {
     }
 
     /// Where to cut a piece: two corners and a covered point between them.
-    fn split(&self, piece: &[Marked; 4]) -> Option<(usize, usize, Marked)> {
+    fn split(&self, tree: &Tree<'_>, piece: &[Marked; 4]) -> Option<(usize, usize, Marked)> {
         let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
         // The longest edge of those whose ends no site covers together, if there are such.
         let rank = |&(p, q): &(usize, usize)| (piece[p].mask & piece[q].mask == 0, distance_squared(&piece[p].at, &piece[q].at));
@@ -220,7 +295,7 @@ impl Nearby {
         let (a, b) = (&piece[p], &piece[q]);
         let mut share = 0.5;
         if a.mask & b.mask == 0 {
-            let (first, second) = (self.nearest(a)?, self.nearest(b)?);
+            let (first, second) = (self.nearest(tree, a)?, self.nearest(tree, b)?);
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..HALVINGS {
                 share = 0.5 * (low + high);
@@ -234,8 +309,8 @@ impl Nearby {
         }
         let at = between(&a.at, &b.at, share);
         let mut mask = 0;
-        for (number, site) in self.sites.iter().take(MOST_COVERING).enumerate() {
-            if site.distance_squared(&at) <= self.square {
+        for (number, &site) in self.sites.iter().enumerate() {
+            if tree.site(site).distance_squared(&at) <= self.square {
                 mask |= 1 << number;
             }
         }
@@ -243,24 +318,50 @@ impl Nearby {
     }
 
     /// The nearest site of those that cover a point.
-    fn nearest(&self, marked: &Marked) -> Option<&Site> {
-        let covering = self.sites.iter().take(MOST_COVERING).enumerate().filter(|(number, _)| marked.mask >> number & 1 == 1);
-        covering.map(|(_, site)| site).min_by(|a, b| a.distance_squared(&marked.at).total_cmp(&b.distance_squared(&marked.at)))
+    fn nearest(&self, tree: &Tree<'_>, marked: &Marked) -> Option<Site> {
+        let covering = self.sites.iter().enumerate().filter(|(number, _)| marked.mask >> number & 1 == 1);
+        let with_square = |site: Site| (site.distance_squared(&marked.at), site);
+        covering.map(|(_, &id)| with_square(tree.site(id))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
     }
 
-    /// Whether the triangle of three of the points is at least `least` from all sites.
+    /// Whether a triangle of vertices is at least `least` from all sites.
     ///
-    /// First from its corners: d^2 - |x|^2 is concave, so d^2 is at least the least value at a corner less R^2, R the circumradius of the
-    /// smallest ball around the triangle, and R^2 is at most a third of its longest edge squared.
-    pub(super) fn is_clear(&self, corners: [usize; 3], least: f64) -> bool {
-        let triangle = corners.map(|corner| self.marked[corner].at);
+    /// d^2 - |x|^2 is concave, so d^2 is at least the least value at a corner less R^2, R the radius of the
+    /// smallest ball around the triangle, and R^2 is at most a third of its longest edge squared. For sites that are nearer, a plane tells: first those
+    /// of the corners.
+    pub(super) fn is_clear(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: [u32; 3], triangle: &[Point; 3], least: f64) -> bool {
         let longest = (0..3).map(|k| distance_squared(&triangle[k], &triangle[(k + 1) % 3])).fold(0.0, f64::max);
         let enough = least * least * 1.000_000_001 + longest / 3.0;
-        let count = self.marked.len();
-        self.sites.iter().enumerate().all(|(number, site)| {
-            let squares = &self.squares[number * count..(number + 1) * count];
-            corners.iter().all(|&corner| squares[corner] >= enough) || is_clear(&triangle, site, least)
-        })
+        for (&corner, point) in corners.iter().zip(triangle) {
+            self.see(tree, places, corner, point, enough);
+        }
+        self.cleared.clear();
+        for corner in corners {
+            let range = self.ranges[corner as usize];
+            for view in &self.views[range.first as usize..(range.first + range.count) as usize] {
+                if view.square >= enough {
+                    break;
+                }
+                if triangle.iter().all(|point| dot(&view.normal, point) - view.highest > least) || self.cleared.contains(&view.site) {
+                    continue;
+                }
+                if !is_clear(triangle, &tree.site(view.site), least) {
+                    return false;
+                }
+                self.cleared.push(view.site);
+            }
+        }
+        true
+    }
+}
+
+/// The largest value of a site's points along a direction.
+#[inline]
+fn highest(site: &Site, direction: &Point) -> f64 {
+    match site {
+        Site::Point(a) => dot(a, direction),
+        Site::Segment(ends) => ends.iter().map(|end| dot(end, direction)).fold(f64::NEG_INFINITY, f64::max),
+        Site::Triangle(corners) => corners.iter().map(|corner| dot(corner, direction)).fold(f64::NEG_INFINITY, f64::max),
     }
 }
 

@@ -55,6 +55,8 @@ const TINY: f64 = 4.0;
 /// Vertices are lifted by this share of the band at least, and no normal turns by more than this cosine.
 const LEAST_LIFT: f64 = 0.05;
 const LEAST_TURN: f64 = 0.7;
+/// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
+const FIRST_LOOK: f64 = 0.9;
 /// Sweeps that turn edges, at most.
 const FLIP_ROUNDS: usize = 8;
 
@@ -106,7 +108,6 @@ pub(super) struct Simplifier<'a> {
     choices: Vec<(f64, usize)>,
     normals: Vec<Point>,
     lengths: Vec<f64>,
-    points: Vec<Point>,
     close: Vec<u32>,
     stamps: Vec<u32>,
     stamp: u32,
@@ -129,7 +130,6 @@ impl<'a> Simplifier<'a> {
             choices: Vec::new(),
             normals: Vec::new(),
             lengths: Vec::new(),
-            points: Vec::new(),
             close: Vec::new(),
             stamps: Vec::new(),
             stamp: 0,
@@ -147,6 +147,8 @@ impl<'a> Simplifier<'a> {
         let top = (size / edge).log2().ceil().max(0.0) as u32 + 1;
         self.places.reset(core.low, edge, top, starts);
         let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
+        let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
+        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
         self.stamps.clear();
         self.stamps.resize(mesh.points.len(), 0);
         self.stamp = 0;
@@ -218,10 +220,7 @@ impl<'a> Simplifier<'a> {
         }
         let count = self.star.ring.len();
         let from = mesh.points[vertex as usize];
-        self.points.clear();
-        self.points.extend(self.star.ring.iter().chain([&vertex, &vertex]).map(|&other| mesh.points[other as usize]));
-        self.nearby.find(&mut self.tree, &mut self.places, &self.points, setting.outer + setting.rounding);
-        let Some(foot) = self.nearby.foot() else { return false };
+        let Some(foot) = self.nearby.foot(&mut self.tree, &mut self.places, vertex, &from) else { return false };
         let length = distance_squared(&from, &foot).sqrt();
         let to: Point = std::array::from_fn(|axis| f64::from((foot[axis] + (from[axis] - foot[axis]) * (setting.outer / length)) as f32));
         let moved = distance_squared(&from, &to).sqrt();
@@ -242,18 +241,27 @@ impl<'a> Simplifier<'a> {
         if !keeps_shape {
             return false;
         }
-        self.nearby.place(count, to);
+        let trial = self.nearby.trial();
+        self.nearby.forget(trial);
+        let corners = self.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
+        self.nearby.begin(&mut self.tree, &mut self.places, corners);
+        self.nearby.mark(&mut self.tree, &mut self.places, trial, to);
         let certified = (0..count).all(|k| {
             let next = (k + 1) % count;
-            self.nearby.cover([count, k, next, count + 1]) && self.nearby.is_clear([count, k, next], setting.least - setting.rounding)
+            let corners = [trial, self.star.ring[k], self.star.ring[next]];
+            let triangle = [to, mesh.points[corners[1] as usize], mesh.points[corners[2] as usize]];
+            let least = setting.least - setting.rounding;
+            self.nearby.cover(&self.tree, [count, k, next, count + 1])
+                && self.nearby.is_clear(&mut self.tree, &mut self.places, corners, &triangle, least)
         });
-        if !certified || self.meetings(mesh, vertex, None, Some(to), 0) > 0 {
+        if !certified || self.tree.exhausted || self.meetings(mesh, vertex, None, Some(to), 0) > 0 {
             return false;
         }
         mesh.points[vertex as usize] = to;
+        self.nearby.accept(vertex);
         for &half in &self.star.halves {
             if let Some(corners) = mesh.triangle(half / 3) {
-                self.boxes.grow(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
+                self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
             }
         }
         true
@@ -344,19 +352,15 @@ impl<'a> Simplifier<'a> {
                 continue;
             }
             if !known {
-                self.points.clear();
-                self.points.extend(self.star.ring.iter().chain([&vertex]).map(|&other| mesh.points[other as usize]));
-                self.nearby.find(&mut self.tree, &mut self.places, &self.points, setting.outer + setting.rounding);
-                if self.tree.exhausted {
-                    return false;
-                }
+                let corners = self.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
+                self.nearby.begin(&mut self.tree, &mut self.places, corners);
                 known = true;
             }
-            if self.is_certified(setting, m) && self.is_free(setting, mesh, vertex, m) {
+            if self.is_certified(setting, mesh, m) && !self.tree.exhausted && self.is_free(setting, mesh, vertex, m) {
                 mesh.collapse(vertex, &self.star, m);
                 for &half in &self.star.halves {
                     if let Some(corners) = mesh.triangle(half / 3) {
-                        self.boxes.grow(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
+                        self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
                     }
                 }
                 return true;
@@ -445,10 +449,15 @@ impl<'a> Simplifier<'a> {
     }
 
     /// Whether the sites cover what is swept, and the new triangles keep from them.
-    fn is_certified(&mut self, setting: &Setting, m: usize) -> bool {
-        let count = self.star.ring.len();
-        kept(m, count).all(|k| self.nearby.cover([m, k, (k + 1) % count, count]))
-            && kept(m, count).all(|k| self.nearby.is_clear([m, k, (k + 1) % count], setting.least - setting.rounding))
+    fn is_certified(&mut self, setting: &Setting, mesh: &HalfEdges, m: usize) -> bool {
+        let Self { tree, places, nearby, star, .. } = self;
+        let count = star.ring.len();
+        kept(m, count).all(|k| nearby.cover(tree, [m, k, (k + 1) % count, count]))
+            && kept(m, count).all(|k| {
+                let corners = [star.ring[m], star.ring[k], star.ring[(k + 1) % count]];
+                let triangle = corners.map(|corner| mesh.points[corner as usize]);
+                nearby.is_clear(tree, places, corners, &triangle, setting.least - setting.rounding)
+            })
     }
 
     /// Whether the new triangles meet no others. Where old ones did, it is enough that there are fewer such pairs, or no more when
@@ -490,7 +499,8 @@ impl<'a> Simplifier<'a> {
         for (index, facet) in own.iter().enumerate() {
             found += usize::from(contact::is_flat(&facet.points));
             for other in &own[..index] {
-                found += usize::from(contact::meet([&facet.corners, &other.corners], [&facet.points, &other.points]));
+                let parted = facet.parts(&other.corners, &other.points);
+                found += usize::from(!parted && contact::meet([&facet.corners, &other.corners], [&facet.points, &other.points]));
             }
         }
         if found > most {
@@ -498,7 +508,8 @@ impl<'a> Simplifier<'a> {
         }
         close.clear();
         boxes.query(&whole, 0, |leaf| {
-            close.extend_from_slice(boxes.items(leaf));
+            let met = boxes.items(leaf).iter().zip(boxes.boxes(leaf)).filter(|(_, own)| own.meets(&whole));
+            close.extend(met.map(|(&triangle, _)| triangle));
             true
         });
         for &triangle in close.iter() {
@@ -508,9 +519,6 @@ impl<'a> Simplifier<'a> {
             }
             let points = corners.map(point);
             let own_box = Box32::of(&points);
-            if !own_box.meets(&whole) {
-                continue;
-            }
             for facet in own.iter() {
                 if own_box.meets(&facet.bounds)
                     && !facet.parts(&corners, &points)

@@ -318,9 +318,16 @@ impl<'a> Tree<'a> {
 
     /// All sites below `starts` that are within `reach` of x.
     pub(super) fn collect(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<SiteId>) {
+        self.visit_near(x, starts, reach, |id, _, _| found.push(id));
+    }
+
+    /// Calls `visit` with all sites below `starts` that are within `reach` of x, their closest points and squared distances.
+    #[inline]
+    pub(super) fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, mut visit: impl FnMut(SiteId, &Point, f64)) {
         let mut stack = std::mem::take(&mut self.stack);
         stack.clear();
         stack.extend_from_slice(starts);
+        let limit = (reach + self.slack).powi(2);
         while let Some(id) = stack.pop() {
             let node = &self.nodes[id as usize];
             let threshold = reach + node.radius + self.slack;
@@ -329,14 +336,22 @@ impl<'a> Tree<'a> {
             }
             match node.content {
                 Content::Points(first, count) => {
-                    let square = (reach + self.slack).powi(2);
-                    let near = |&index: &u32| distance_squared(x, &self.point_sites[index as usize]) <= square;
-                    found.extend((first..first + count).filter(near).map(SiteId::Point));
+                    for index in first..first + count {
+                        let point = &self.point_sites[index as usize];
+                        let square = distance_squared(x, point);
+                        if square <= limit {
+                            visit(SiteId::Point(index), point, square);
+                        }
+                    }
                 }
                 Content::Sites(first, count) => {
-                    let square = (reach + self.slack).powi(2);
-                    let near = |&index: &u32| self.sites[index as usize].distance_squared(x) <= square;
-                    found.extend((first..first + count).filter(near).map(SiteId::Listed));
+                    for index in first..first + count {
+                        let closest = self.sites[index as usize].closest(x);
+                        let square = distance_squared(x, &closest);
+                        if square <= limit {
+                            visit(SiteId::Listed(index), &closest, square);
+                        }
+                    }
                 }
                 Content::Open(first, count) => stack.extend(first..first + count),
                 Content::Closed(points) => {

@@ -63,24 +63,27 @@ pub(crate) struct BoxTree {
     order: Vec<u32>,
     /// Where an item is in `order`; `u32::MAX` for those left out.
     places: Vec<u32>,
+    /// The items' boxes along the curve.
+    boxes: Vec<Box32>,
+    given: Vec<Option<Box32>>,
     keys: Vec<u64>,
 }
 
 impl BoxTree {
     /// Makes the tree over those of `items` that have a box.
     pub(crate) fn build(&mut self, items: usize, box_of: impl Fn(u32) -> Option<Box32> + Sync, parallel: bool) {
-        let Self { nodes, leaves, order, places, keys } = self;
-        let whole = |item: u32| box_of(item).unwrap_or(Box32::EMPTY);
-        let join = |a: Box32, b: Box32| a.union(&b);
+        let Self { nodes, leaves, order, places, boxes, given, keys } = self;
         let count = items as u32;
-        let all = if parallel {
-            (0..count).into_par_iter().map(whole).reduce(|| Box32::EMPTY, join)
+        given.clear();
+        if parallel {
+            given.par_extend((0..count).into_par_iter().map(&box_of));
         } else {
-            (0..count).map(whole).fold(Box32::EMPTY, join)
-        };
+            given.extend((0..count).map(box_of));
+        }
+        let all = given.iter().flatten().fold(Box32::EMPTY, |all, own| all.union(own));
         let scale: [f32; 3] = std::array::from_fn(|axis| 1023.0 / (all.high[axis] - all.low[axis]).max(f32::MIN_POSITIVE));
         let key = |item: u32| {
-            let own = box_of(item)?;
+            let own = given[item as usize]?;
             let code = (0..3).fold(0_u64, |code, axis| {
                 let middle = 0.5 * (own.low[axis] + own.high[axis]);
                 code | spread(((middle - all.low[axis]) * scale[axis]) as u64) << axis
@@ -105,9 +108,11 @@ impl BoxTree {
         *leaves = order.len().div_ceil(LEAF).next_power_of_two();
         nodes.clear();
         nodes.resize(2 * *leaves, Box32::EMPTY);
-        for (place, &item) in order.iter().enumerate() {
+        boxes.clear();
+        boxes.extend(order.iter().filter_map(|&item| given[item as usize]));
+        for (place, own) in boxes.iter().enumerate() {
             let leaf = *leaves + leaf_of(place, order.len(), *leaves);
-            nodes[leaf] = nodes[leaf].union(&whole(item));
+            nodes[leaf] = nodes[leaf].union(own);
         }
         for node in (1..*leaves).rev() {
             nodes[node] = nodes[2 * node].union(&nodes[2 * node + 1]);
@@ -122,8 +127,19 @@ impl BoxTree {
     /// The items of a leaf.
     #[inline]
     pub(crate) fn items(&self, leaf: usize) -> &[u32] {
+        &self.order[self.range(leaf)]
+    }
+
+    /// Their boxes.
+    #[inline]
+    pub(crate) fn boxes(&self, leaf: usize) -> &[Box32] {
+        &self.boxes[self.range(leaf)]
+    }
+
+    #[inline]
+    fn range(&self, leaf: usize) -> std::ops::Range<usize> {
         let start = |leaf: usize| (leaf * self.order.len()).div_ceil(self.leaves);
-        &self.order[start(leaf)..start(leaf + 1)]
+        start(leaf)..start(leaf + 1)
     }
 
     /// The box of a leaf.
@@ -131,12 +147,14 @@ impl BoxTree {
         &self.nodes[self.leaves + leaf]
     }
 
-    /// Lets an item have a larger box.
+    /// Gives an item another box.
     #[inline]
-    pub(crate) fn grow(&mut self, item: u32, by: &Box32) {
-        let mut node = self.leaves + leaf_of(self.places[item as usize] as usize, self.order.len(), self.leaves);
+    pub(crate) fn set(&mut self, item: u32, to: &Box32) {
+        let place = self.places[item as usize] as usize;
+        self.boxes[place] = *to;
+        let mut node = self.leaves + leaf_of(place, self.order.len(), self.leaves);
         while node > 0 {
-            let grown = self.nodes[node].union(by);
+            let grown = self.nodes[node].union(to);
             if grown == self.nodes[node] {
                 return;
             }

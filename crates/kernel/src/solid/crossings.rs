@@ -36,11 +36,10 @@ impl Crossings {
     pub(crate) fn among(mesh: &TriMesh, most: usize, budget: &Budget) -> Result<Self, Stopped> {
         let kept = if most == usize::MAX { KEPT } else { most };
         let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize].to_array());
-        let boxes: Vec<Box32> = (0..mesh.triangles.len() as u32).into_par_iter().map(|triangle| Box32::of(&corners(triangle))).collect();
         let mut tree = BoxTree::default();
-        tree.build(boxes.len(), |triangle| Some(boxes[triangle as usize]), true);
+        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(triangle))), true);
         budget.cancel.check()?;
-        if boxes.is_empty() {
+        if mesh.triangles.is_empty() {
             return Ok(Self::default());
         }
         let chunks: Vec<Self> = (0..tree.leaves().div_ceil(CHUNK))
@@ -49,7 +48,7 @@ impl Crossings {
                 let mut found = Self::default();
                 if budget.cancel.check().is_ok() {
                     for leaf in chunk * CHUNK..((chunk + 1) * CHUNK).min(tree.leaves()) {
-                        of_leaf(mesh, &tree, &boxes, leaf, kept, &corners, &mut found);
+                        of_leaf(mesh, &tree, leaf, kept, &corners, &mut found);
                     }
                 }
                 found
@@ -69,7 +68,6 @@ impl Crossings {
 fn of_leaf(
     mesh: &TriMesh,
     tree: &BoxTree,
-    boxes: &[Box32],
     leaf: usize,
     kept: usize,
     corners: &impl Fn(u32) -> [Point; 3],
@@ -90,11 +88,11 @@ fn of_leaf(
         if other < leaf {
             return true;
         }
-        for (place, &a) in tree.items(leaf).iter().enumerate() {
+        for (place, (&a, own_box)) in tree.items(leaf).iter().zip(tree.boxes(leaf)).enumerate() {
             let own = corners(a);
             let first = if other == leaf { place + 1 } else { 0 };
-            for &b in &tree.items(other)[first..] {
-                if boxes[a as usize].meets(&boxes[b as usize])
+            for (&b, b_box) in tree.items(other).iter().zip(tree.boxes(other)).skip(first) {
+                if own_box.meets(b_box)
                     && contact::meet([&mesh.triangles[a as usize], &mesh.triangles[b as usize]], [&own, &corners(b)])
                 {
                     note(a, b);
