@@ -16,25 +16,45 @@ const MOST_PIECES: usize = 16;
 /// Halvings that find where two sites are equally far.
 const HALVINGS: usize = 16;
 
-/// Whether a triangle is farther than `least` from a convex site, for sure. For closest candidates p of the site and q of the
+/// A direction that shows that a triangle is farther than `least` from a convex site. For closest candidates p of the site and q of the
 /// triangle, the plane across q - p parts them: distance >= min over corners t of (t - p') . u, u the unit vector and p' the site's
 /// extreme point along u. Alternating projections converge to the closest pair.
-pub(super) fn is_clear(triangle: &[Point; 3], site: &Site, least: f64) -> bool {
+pub(super) fn parting(triangle: &[Point; 3], site: &Site, least: f64) -> Option<Direction> {
     let mut q: Point = std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0);
     for _ in 0..STEPS {
         let p = site.closest(&q);
         let offset = subtract(&q, &p);
         let length = dot(&offset, &offset).sqrt();
         if length <= least {
-            return false;
+            return None;
         }
-        let lowest = triangle.iter().map(|corner| dot(corner, &offset)).fold(f64::INFINITY, f64::min);
-        if lowest - highest(site, &offset) > least * length {
-            return true;
+        let direction = Direction::new(offset.map(|part| part / length), triangle);
+        if direction.parts(site, least) {
+            return Some(direction);
         }
         q = closest_on_triangle(&p, &triangle[0], &triangle[1], &triangle[2]);
     }
-    false
+    None
+}
+
+/// A unit vector with the least value of a triangle along it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Direction {
+    unit: Point,
+    lowest: f64,
+}
+
+impl Direction {
+    #[inline]
+    fn new(unit: Point, triangle: &[Point; 3]) -> Self {
+        Self { unit, lowest: triangle.iter().map(|corner| dot(corner, &unit)).fold(f64::INFINITY, f64::min) }
+    }
+
+    /// Whether it shows that the triangle is farther from a site than `least`.
+    #[inline]
+    fn parts(&self, site: &Site, least: f64) -> bool {
+        self.lowest - highest(site, &self.unit) > least
+    }
 }
 
 /// Sites near places, from lists of nodes that are refined from coarse to fine places.
@@ -113,6 +133,14 @@ struct View {
     highest: f64,
 }
 
+impl View {
+    /// Whether the plane across the view shows that a triangle is farther from the site than `least`.
+    #[inline]
+    fn parts(&self, triangle: &[Point; 3], least: f64) -> bool {
+        triangle.iter().all(|point| dot(&self.normal, point) - self.highest > least)
+    }
+}
+
 /// The views from a vertex, the nearest first.
 #[derive(Clone, Copy, Debug, Default)]
 struct Range {
@@ -140,6 +168,8 @@ pub(super) struct Nearby {
     pieces: Vec<[Marked; 4]>,
     /// Sites that a triangle is clear of.
     cleared: Vec<SiteId>,
+    /// Directions that showed it.
+    directions: Vec<Direction>,
 }
 
 impl Nearby {
@@ -274,6 +304,9 @@ impl Nearby {
             if made >= MOST_PIECES {
                 return false;
             }
+            if self.is_cut(tree, &piece) {
+                continue;
+            }
             let Some((p, q, middle)) = self.split(tree, &piece) else { return false };
             let (mut first, mut second) = (piece, piece);
             (first[p], second[q]) = (middle, middle);
@@ -296,32 +329,57 @@ impl Nearby {
         let mut share = 0.5;
         if a.mask & b.mask == 0 {
             let (first, second) = (self.nearest(tree, a)?, self.nearest(tree, b)?);
+            // The first covers a beginning of the edge, the second an end: a place in both is looked for.
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..HALVINGS {
                 share = 0.5 * (low + high);
                 let at = between(&a.at, &b.at, share);
-                if first.distance_squared(&at) <= second.distance_squared(&at) {
-                    low = share;
-                } else {
-                    high = share;
+                match (first.distance_squared(&at) <= self.square, second.distance_squared(&at) <= self.square) {
+                    (true, false) => low = share,
+                    (false, true) => high = share,
+                    _ => break,
                 }
             }
         }
         let at = between(&a.at, &b.at, share);
-        let mut mask = 0;
-        for (number, &site) in self.sites.iter().enumerate() {
-            if tree.site(site).distance_squared(&at) <= self.square {
-                mask |= 1 << number;
+        // What covers both ends covers what is between.
+        let mut mask = a.mask & b.mask;
+        let some = piece.iter().fold(0, |some, corner| some | corner.mask) & !mask;
+        for bit in bits(some) {
+            if tree.site(self.sites[bit]).distance_squared(&at) <= self.square {
+                mask |= 1 << bit;
             }
         }
         (mask != 0).then_some((p, q, Marked { at, mask }))
     }
 
+    /// Whether a site covers three of the corners, and another what the first leaves at the fourth. The square of the distance is convex: with D at the
+    /// fourth corner and at most F at the others, of every line from there the first covers all from the share (D - square) / (D - F) on.
+    fn is_cut(&self, tree: &Tree<'_>, piece: &[Marked; 4]) -> bool {
+        (0..4).any(|k| {
+            let others = [(k + 1) % 4, (k + 2) % 4, (k + 3) % 4].map(|other| &piece[other]);
+            bits(others[0].mask & others[1].mask & others[2].mask).take(2).any(|first| {
+                let site = tree.site(self.sites[first]);
+                let from = site.distance_squared(&piece[k].at);
+                let far = others.iter().map(|other| site.distance_squared(&other.at)).fold(0.0, f64::max);
+                let share = ((from - self.square) / (from - far)) * (1.0 + 1e-9);
+                if !(0.0..=1.0).contains(&share) {
+                    return false;
+                }
+                bits(piece[k].mask).take(4).any(|second| {
+                    let site = tree.site(self.sites[second]);
+                    others.iter().all(|other| {
+                        other.mask >> second & 1 == 1 || site.distance_squared(&between(&piece[k].at, &other.at, share)) <= self.square
+                    })
+                })
+            })
+        })
+    }
+
     /// The nearest site of those that cover a point.
     fn nearest(&self, tree: &Tree<'_>, marked: &Marked) -> Option<Site> {
-        let covering = self.sites.iter().enumerate().filter(|(number, _)| marked.mask >> number & 1 == 1);
         let with_square = |site: Site| (site.distance_squared(&marked.at), site);
-        covering.map(|(_, &id)| with_square(tree.site(id))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
+        bits(marked.mask).map(|bit| with_square(tree.site(self.sites[bit]))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
     }
 
     /// Whether a triangle of vertices is at least `least` from all sites.
@@ -335,24 +393,44 @@ impl Nearby {
         for (&corner, point) in corners.iter().zip(triangle) {
             self.see(tree, places, corner, point, enough);
         }
-        self.cleared.clear();
+        let Self { ranges, views, cleared, directions, .. } = self;
+        let views = |corner: u32| {
+            let range = ranges[corner as usize];
+            &views[range.first as usize..(range.first + range.count) as usize]
+        };
+        cleared.clear();
+        directions.clear();
         for corner in corners {
-            let range = self.ranges[corner as usize];
-            for view in &self.views[range.first as usize..(range.first + range.count) as usize] {
-                if view.square >= enough {
-                    break;
-                }
-                if triangle.iter().all(|point| dot(&view.normal, point) - view.highest > least) || self.cleared.contains(&view.site) {
+            for view in views(corner).iter().take_while(|view| view.square < enough) {
+                if view.parts(triangle, least) || cleared.contains(&view.site) {
                     continue;
                 }
-                if !is_clear(triangle, &tree.site(view.site), least) {
-                    return false;
+                let site = tree.site(view.site);
+                if directions.is_empty() {
+                    // Sites with a common closest point are parted by one plane.
+                    let nearest = corners.iter().filter_map(|&corner| views(corner).first());
+                    let sum = nearest.fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.normal[axis]));
+                    let length = dot(&sum, &sum).sqrt().max(f64::MIN_POSITIVE);
+                    directions.push(Direction::new(sum.map(|part| part / length), triangle));
                 }
-                self.cleared.push(view.site);
+                if !directions.iter().any(|direction| direction.parts(&site, least)) {
+                    let Some(direction) = parting(triangle, &site, least) else { return false };
+                    directions.push(direction);
+                }
+                cleared.push(view.site);
             }
         }
         true
     }
+}
+
+/// The bits of a mask, the lowest first.
+fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = mask.trailing_zeros() as usize;
+        mask &= mask.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
 }
 
 /// The largest value of a site's points along a direction.

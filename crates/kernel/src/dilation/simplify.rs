@@ -108,7 +108,11 @@ pub(super) struct Simplifier<'a> {
     choices: Vec<(f64, usize)>,
     normals: Vec<Point>,
     lengths: Vec<f64>,
-    close: Vec<u32>,
+    /// The least cost beyond the pass that was met when a vertex was ranked last.
+    due: Vec<f64>,
+    /// Triangles lower than what rounding moves, as they were met last.
+    slivers: Vec<u32>,
+    close: Vec<(u32, Box32)>,
     stamps: Vec<u32>,
     stamp: u32,
     /// Triangles of a star, old or new.
@@ -130,6 +134,8 @@ impl<'a> Simplifier<'a> {
             choices: Vec::new(),
             normals: Vec::new(),
             lengths: Vec::new(),
+            due: Vec::new(),
+            slivers: Vec::new(),
             close: Vec::new(),
             stamps: Vec::new(),
             stamp: 0,
@@ -156,16 +162,22 @@ impl<'a> Simplifier<'a> {
         surface.settled.resize(mesh.points.len(), false);
         self.merge(&mut mesh, &inside, &surface.settled);
         for _ in 0..FLIP_ROUNDS {
-            if !self.flip(&mut mesh, &inside) {
+            if !self.flip(&mut mesh, &inside, setting.rounding) {
                 break;
             }
+        }
+        if self.clean_only {
+            self.remove_slivers(setting, &mut mesh, &inside);
+            self.write(&mut mesh, &inside, surface);
+            return;
         }
         self.index(&mesh);
         // A settled vertex waits until something changes; `fresh` says that something did since its last trial.
         let mut fresh: Vec<bool> = surface.settled.iter().map(|settled| !settled).collect();
-        let passes = if self.clean_only { &PASSES[..1] } else { &PASSES[..] };
+        self.due.clear();
+        self.due.resize(mesh.points.len(), 0.0);
         let mut lower = 0.0;
-        for (number, &pass) in passes.iter().enumerate() {
+        for (number, &pass) in PASSES.iter().enumerate() {
             if number == LIFT_BEFORE {
                 self.lift_all(setting, core, &mut mesh, &inside, &mut fresh, &mut surface.settled);
             }
@@ -174,7 +186,11 @@ impl<'a> Simplifier<'a> {
                 if !inside[vertex as usize] || surface.settled[vertex as usize] || !mesh.is_used(vertex) {
                     continue;
                 }
-                let from = if std::mem::take(&mut fresh[vertex as usize]) { 0.0 } else { lower };
+                let is_fresh = std::mem::take(&mut fresh[vertex as usize]);
+                if !is_fresh && self.due[vertex as usize] > upper {
+                    continue;
+                }
+                let from = if is_fresh { 0.0 } else { lower };
                 if self.remove(setting, &mut mesh, &inside, vertex, from, upper) {
                     for &neighbour in &self.star.ring {
                         fresh[neighbour as usize] = true;
@@ -188,6 +204,22 @@ impl<'a> Simplifier<'a> {
             lower = upper;
         }
         self.write(&mut mesh, &inside, surface);
+    }
+
+    /// Removes vertices of the slivers that could not be turned.
+    fn remove_slivers(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool]) {
+        let slivers = std::mem::take(&mut self.slivers);
+        if !slivers.is_empty() {
+            self.due.clear();
+            self.due.resize(mesh.points.len(), 0.0);
+            self.index(mesh);
+            for corner in slivers.iter().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<Vec<u32>>() {
+                if inside[corner as usize] && mesh.is_used(corner) {
+                    self.remove(setting, mesh, inside, corner, 0.0, PASSES[0] * (setting.outer - setting.least));
+                }
+            }
+        }
+        self.slivers = slivers;
     }
 
     /// Moves vertices outwards to the end of the band where the distance is smooth: chords between them have the whole band then.
@@ -284,12 +316,17 @@ impl<'a> Simplifier<'a> {
     }
 
     /// Turns the longest edge of triangles without area, when that leaves none: the surface as a set does not change. Whether one was turned.
-    fn flip(&mut self, mesh: &mut HalfEdges, inside: &[bool]) -> bool {
+    fn flip(&mut self, mesh: &mut HalfEdges, inside: &[bool], rounding: f64) -> bool {
         let mut turned = false;
+        self.slivers.clear();
         for triangle in 0..mesh.triangles() {
             let Some(corners) = mesh.triangle(triangle) else { continue };
             let points = corners.map(|corner| mesh.points[corner as usize]);
-            if !corners.iter().all(|&corner| inside[corner as usize]) || !contact::is_flat(&points) {
+            if !corners.iter().all(|&corner| inside[corner as usize]) || !is_sliver(&points, LEAST_HEIGHT * rounding) {
+                continue;
+            }
+            self.slivers.push(triangle);
+            if !contact::is_flat(&points) {
                 continue;
             }
             let length = |&k: &usize| distance_squared(&points[k], &points[(k + 1) % 3]);
@@ -371,7 +408,8 @@ impl<'a> Simplifier<'a> {
 
     /// Lists the neighbours that the vertex may move to, the cheapest first.
     fn rank(&mut self, setting: &Setting, mesh: &HalfEdges, vertex: u32, lower: f64, upper: f64) {
-        let Self { star, normals, lengths, choices, .. } = self;
+        let Self { star, normals, lengths, choices, due, .. } = self;
+        let mut later = f64::INFINITY;
         let count = star.ring.len();
         let origin = &mesh.points[vertex as usize];
         let at = |k: usize| subtract(&mesh.points[star.ring[k % count] as usize], origin);
@@ -403,8 +441,11 @@ impl<'a> Simplifier<'a> {
             let tiny = length <= TINY * setting.rounding;
             if planks && (tiny || (cost > lower && cost <= upper)) {
                 choices.push((if tiny { length * 1e-6 } else { cost }, m));
+            } else if planks && cost > upper {
+                later = later.min(cost);
             }
         }
+        due[vertex as usize] = later;
         choices.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
@@ -509,16 +550,18 @@ impl<'a> Simplifier<'a> {
         close.clear();
         boxes.query(&whole, 0, |leaf| {
             let met = boxes.items(leaf).iter().zip(boxes.boxes(leaf)).filter(|(_, own)| own.meets(&whole));
-            close.extend(met.map(|(&triangle, _)| triangle));
+            close.extend(met.map(|(&triangle, own)| (triangle, *own)));
             true
         });
-        for &triangle in close.iter() {
+        for &(triangle, own_box) in close.iter() {
+            if !own.iter().any(|facet| own_box.meets(&facet.bounds)) {
+                continue;
+            }
             let Some(corners) = mesh.triangle(triangle) else { continue };
             if corners.contains(&vertex) {
                 continue;
             }
             let points = corners.map(point);
-            let own_box = Box32::of(&points);
             for facet in own.iter() {
                 if own_box.meets(&facet.bounds)
                     && !facet.parts(&corners, &points)
@@ -533,6 +576,13 @@ impl<'a> Simplifier<'a> {
         }
         found
     }
+}
+
+/// Whether a triangle's least height is below `least`.
+fn is_sliver(points: &[Point; 3], least: f64) -> bool {
+    let normal = cross(&subtract(&points[1], &points[0]), &subtract(&points[2], &points[0]));
+    let longest = (0..3).map(|k| distance_squared(&points[k], &points[(k + 1) % 3])).fold(0.0, f64::max);
+    dot(&normal, &normal) <= least * least * longest
 }
 
 /// The triangles of a star of `count` that are kept when its vertex moves to ring m.
