@@ -13,7 +13,10 @@ const STEPS: usize = 6;
 const MOST_COVERING: usize = 64;
 /// Tetrahedra that a swept one is cut into at most.
 const MOST_PIECES: usize = 16;
-/// Halvings that find where two sites are equally far.
+/// Sites that are tried to cut a tetrahedron at a corner: for the three others, and for the rest.
+const MOST_FIRST: usize = 1;
+const MOST_SECOND: usize = 2;
+/// Halvings that look for a place that two sites cover.
 const HALVINGS: usize = 16;
 
 /// A direction that shows that a triangle is farther than `least` from a convex site. For closest candidates p of the site and q of the
@@ -358,7 +361,7 @@ impl Nearby {
     fn is_cut(&self, tree: &Tree<'_>, piece: &[Marked; 4]) -> bool {
         (0..4).any(|k| {
             let others = [(k + 1) % 4, (k + 2) % 4, (k + 3) % 4].map(|other| &piece[other]);
-            bits(others[0].mask & others[1].mask & others[2].mask).take(2).any(|first| {
+            bits(others[0].mask & others[1].mask & others[2].mask).take(MOST_FIRST).any(|first| {
                 let site = tree.site(self.sites[first]);
                 let from = site.distance_squared(&piece[k].at);
                 let far = others.iter().map(|other| site.distance_squared(&other.at)).fold(0.0, f64::max);
@@ -366,7 +369,7 @@ impl Nearby {
                 if !(0.0..=1.0).contains(&share) {
                     return false;
                 }
-                bits(piece[k].mask).take(4).any(|second| {
+                bits(piece[k].mask).take(MOST_SECOND).any(|second| {
                     let site = tree.site(self.sites[second]);
                     others.iter().all(|other| {
                         other.mask >> second & 1 == 1 || site.distance_squared(&between(&piece[k].at, &other.at, share)) <= self.square
@@ -387,7 +390,14 @@ impl Nearby {
     /// d^2 - |x|^2 is concave, so d^2 is at least the least value at a corner less R^2, R the radius of the
     /// smallest ball around the triangle, and R^2 is at most a third of its longest edge squared. For sites that are nearer, a plane tells: first those
     /// of the corners.
-    pub(super) fn is_clear(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: [u32; 3], triangle: &[Point; 3], least: f64) -> bool {
+    pub(super) fn is_clear(
+        &mut self,
+        tree: &mut Tree<'_>,
+        places: &mut Places,
+        corners: [u32; 3],
+        triangle: &[Point; 3],
+        least: f64,
+    ) -> bool {
         let longest = (0..3).map(|k| distance_squared(&triangle[k], &triangle[(k + 1) % 3])).fold(0.0, f64::max);
         let enough = least * least * 1.000_000_001 + longest / 3.0;
         for (&corner, point) in corners.iter().zip(triangle) {

@@ -42,7 +42,7 @@ const MOST_AROUND: usize = 24;
 /// Triangles around a vertex afterwards.
 const MOST_AFTER: usize = 40;
 /// How far the new position may be from the planes of the old triangles, in units of the band, pass by pass.
-const PASSES: [f64; 7] = [1e-6, 0.01, 0.05, 0.12, 0.3, 2.0, 4.0];
+const PASSES: [f64; 6] = [1e-6, 0.01, 0.05, 0.12, 0.3, 2.0];
 /// Before this pass vertices are lifted.
 const LIFT_BEFORE: usize = 4;
 /// The share of an edge's length that is added: where all is flat, short edges go first.
@@ -52,11 +52,13 @@ const LEAST_COSINE: f64 = 0.1;
 /// Heights of new triangles in units of rounding, and lengths of edges that are as good as none.
 const LEAST_HEIGHT: f64 = 8.0;
 const TINY: f64 = 4.0;
+/// How far vertices of slivers may move off their planes, in units of rounding, where nothing else is simplified.
+const SLIVER_MOVE: f64 = 64.0;
 /// Vertices are lifted by this share of the band at least, and no normal turns by more than this cosine.
 const LEAST_LIFT: f64 = 0.05;
 const LEAST_TURN: f64 = 0.7;
 /// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
-const FIRST_LOOK: f64 = 0.9;
+const FIRST_LOOK: f64 = 0.6;
 /// Sweeps that turn edges, at most.
 const FLIP_ROUNDS: usize = 8;
 
@@ -78,7 +80,7 @@ impl Facet {
         Self { corners, points, bounds: Box32::of(&points), normal: cross(&p, &q), error }
     }
 
-    /// Whether the plane surely parts the triangle from what another has besides common corners.
+    /// Whether a plane surely parts the triangle from what another has besides common corners: its own, or one through an edge and the normal.
     #[inline]
     fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
         let (mut above, mut below) = (true, true);
@@ -91,7 +93,23 @@ impl Facet {
                 below &= side < -error;
             }
         }
-        above || below
+        above || below || (0..3).any(|k| self.is_beyond(k, corners, points))
+    }
+
+    /// Whether another triangle lies beyond edge k, but for common corners on that edge. The vector m = edge x normal is exact to 16 roundings of
+    /// |edge| |normal|, products with it to 32 with |offset|; with exact m the triangle itself has no positive value, and 0 only on the edge.
+    fn is_beyond(&self, k: usize, corners: &[u32; 3], points: &[Point; 3]) -> bool {
+        if corners.contains(&self.corners[(k + 2) % 3]) {
+            return false;
+        }
+        let (start, end) = (self.corners[k], self.corners[(k + 1) % 3]);
+        let edge = subtract(&self.points[(k + 1) % 3], &self.points[k]);
+        let outwards = cross(&edge, &self.normal);
+        let error = self.error * (edge[0].abs() + edge[1].abs() + edge[2].abs());
+        corners.iter().zip(points).filter(|&(&corner, _)| corner != start && corner != end).all(|(_, point)| {
+            let offset = subtract(point, &self.points[k]);
+            dot(&outwards, &offset) > error * (offset[0].abs() + offset[1].abs() + offset[2].abs())
+        })
     }
 }
 
@@ -206,16 +224,18 @@ impl<'a> Simplifier<'a> {
         self.write(&mut mesh, &inside, surface);
     }
 
-    /// Removes vertices of the slivers that could not be turned.
+    /// Removes vertices of the slivers that could not be turned: rounding to single precision may fold them over their neighbours, and these are the
+    /// only crossings that a lattice's surface was seen to have.
     fn remove_slivers(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool]) {
         let slivers = std::mem::take(&mut self.slivers);
         if !slivers.is_empty() {
             self.due.clear();
             self.due.resize(mesh.points.len(), 0.0);
             self.index(mesh);
+            let upper = (PASSES[0] * (setting.outer - setting.least)).max(SLIVER_MOVE * setting.rounding);
             for corner in slivers.iter().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<Vec<u32>>() {
                 if inside[corner as usize] && mesh.is_used(corner) {
-                    self.remove(setting, mesh, inside, corner, 0.0, PASSES[0] * (setting.outer - setting.least));
+                    self.remove(setting, mesh, inside, corner, 0.0, upper);
                 }
             }
         }

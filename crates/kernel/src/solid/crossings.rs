@@ -65,14 +65,7 @@ impl Crossings {
     }
 }
 
-fn of_leaf(
-    mesh: &TriMesh,
-    tree: &BoxTree,
-    leaf: usize,
-    kept: usize,
-    corners: &impl Fn(u32) -> [Point; 3],
-    found: &mut Crossings,
-) {
+fn of_leaf(mesh: &TriMesh, tree: &BoxTree, leaf: usize, kept: usize, corners: &impl Fn(u32) -> [Point; 3], found: &mut Crossings) {
     let mut note = |a: u32, b: u32| {
         found.count += 1;
         if found.first.len() < kept {
@@ -92,9 +85,7 @@ fn of_leaf(
             let own = corners(a);
             let first = if other == leaf { place + 1 } else { 0 };
             for (&b, b_box) in tree.items(other).iter().zip(tree.boxes(other)).skip(first) {
-                if own_box.meets(b_box)
-                    && contact::meet([&mesh.triangles[a as usize], &mesh.triangles[b as usize]], [&own, &corners(b)])
-                {
+                if own_box.meets(b_box) && contact::meet([&mesh.triangles[a as usize], &mesh.triangles[b as usize]], [&own, &corners(b)]) {
                     note(a, b);
                 }
             }
