@@ -28,7 +28,7 @@ pub(super) fn next(half: u32) -> u32 {
 /// The one before.
 #[inline]
 pub(super) fn previous(half: u32) -> u32 {
-    if half % 3 == 0 { half + 2 } else { half - 1 }
+    if half.is_multiple_of(3) { half + 2 } else { half - 1 }
 }
 
 /// The closed fan of triangles around a vertex v: triangle k is (v, ring k, ring k + 1).

@@ -18,11 +18,11 @@ impl Box32 {
     pub(crate) fn of(points: &[Point]) -> Self {
         let mut result = Self::EMPTY;
         for point in points {
-            for axis in 0..3 {
-                let near = point[axis] as f32;
+            for (axis, &x) in point.iter().enumerate() {
+                let near = x as f32;
                 let exact = f64::from(near);
-                let low = if exact > point[axis] { near.next_down() } else { near };
-                let high = if exact < point[axis] { near.next_up() } else { near };
+                let low = if exact > x { near.next_down() } else { near };
+                let high = if exact < x { near.next_up() } else { near };
                 result.low[axis] = result.low[axis].min(low);
                 result.high[axis] = result.high[axis].max(high);
             }
