@@ -153,6 +153,9 @@ pub(super) struct SolidifyArgs {
     /// Leave all triangles of the lattice: quicker, and many times more triangles.
     #[arg(long)]
     pub(super) no_simplify: bool,
+    /// Examine at which radii nearby the topology changes, and from which on the shape is one piece: takes longer.
+    #[arg(long)]
+    pub(super) stability: bool,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]

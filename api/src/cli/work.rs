@@ -22,19 +22,25 @@ pub(super) struct Manner {
 
 /// `lacuna solidify`.
 pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: Some(args.radius), normals: false, simplify: !args.no_simplify };
+    let params = Params {
+        tolerance_mm: args.tolerance,
+        radius_mm: Some(args.radius),
+        normals: false,
+        simplify: !args.no_simplify,
+        stability: args.stability,
+    };
     make(JobKind::Solidify, &args.model, params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna evaluate`.
 pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: None, normals: args.normals, simplify: true };
+    let params = Params { tolerance_mm: args.tolerance, radius_mm: None, normals: args.normals, simplify: true, stability: false };
     make(JobKind::Evaluate, &args.model, params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: args.radius, normals: false, simplify: true };
+    let params = Params { tolerance_mm: args.tolerance, radius_mm: args.radius, normals: false, simplify: true, stability: false };
     let job = job_of(JobKind::Measure, &args.model, params, &[], &args.limits)?;
     let (outcome, _) = perform(&job, &args.limits, manner, |_, _| Ok(Vec::new()))?;
     print_json(&outcome.certificate)

@@ -28,6 +28,8 @@ pub struct Params {
     pub normals: bool,
     /// Whether a solid has no more triangles than its bound needs: else it has all of the lattice.
     pub simplify: bool,
+    /// Whether the topology of a solid is examined at radii nearby.
+    pub stability: bool,
 }
 
 /// A model with the name that the job gives it.

@@ -953,6 +953,11 @@ pub(super) const JOB_PARAMS: Object = Object {
             "Whether a solid has no more triangles than its bound needs, else all of the lattice: for solidify alone; true when absent.",
             flag,
         ),
+        optional(
+            "stability",
+            "Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent.",
+            flag,
+        ),
     ],
 };
 

@@ -278,17 +278,23 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(place) => walker.flag(place)?,
         None => false,
     };
-    if let (Some(JobKind::Evaluate | JobKind::Measure), Some(simplify)) = (kind, members.get("simplify")) {
-        walker.fault(&simplify, code::CONFLICTING_MEMBERS, || {
-            "only solidify takes \"simplify\"; remove it, or ask for the kind \"solidify\"".into()
-        });
-        return None;
+    for name in ["simplify", "stability"] {
+        if let (Some(JobKind::Evaluate | JobKind::Measure), Some(place)) = (kind, members.get(name)) {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+                format!("only solidify takes \"{name}\"; remove it, or ask for the kind \"solidify\"")
+            });
+            return None;
+        }
     }
     let simplify = match members.get("simplify") {
         Some(place) => walker.flag(place)?,
         None => true,
     };
-    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, simplify })
+    let stability = match members.get("stability") {
+        Some(place) => walker.flag(place)?,
+        None => false,
+    };
+    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, simplify, stability })
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {

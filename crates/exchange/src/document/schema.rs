@@ -155,12 +155,15 @@ fn job() -> Value {
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
         kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"], "not": { "required": ["normals"] } } } })),
-        kind("evaluate", json!({ "properties": { "params": { "not": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["simplify"] }] } } } })),
+        kind(
+            "evaluate",
+            json!({ "properties": { "params": { "not": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["simplify"] }, { "required": ["stability"] }] } } } })
+        ),
         kind(
             "measure",
             json!({ "properties": {
                 "outputs": { "maxItems": 0 },
-                "params": { "not": { "anyOf": [{ "required": ["normals"] }, { "required": ["simplify"] }] } },
+                "params": { "not": { "anyOf": [{ "required": ["normals"] }, { "required": ["simplify"] }, { "required": ["stability"] }] } },
             } }),
         ),
     ]);

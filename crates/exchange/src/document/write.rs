@@ -258,7 +258,8 @@ object! {
         .put("tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
         .put_if(params.normals, "normals", &true)?
-        .put_if(!params.simplify, "simplify", &false)?;
+        .put_if(!params.simplify, "simplify", &false)?
+        .put_if(params.stability, "stability", &true)?;
     Limits: |limits, members| members
         .put("seconds", &Number(limits.seconds))?
         .put("triangles", &limits.triangles)?

@@ -23,6 +23,7 @@ mod outside;
 mod plan;
 mod simplify;
 mod smooth;
+mod stability;
 mod stitch;
 mod tree;
 
@@ -33,6 +34,7 @@ use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
 pub use error::DilationError;
 use plan::Plan;
+pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
 
 /// A dilated shape with what is proven of it. Lengths in mm.
 #[derive(Clone, Debug)]
