@@ -11,10 +11,10 @@
 //! depends on the face's values alone, so that neighbours fit, and the surface is a manifold: around a point inside a
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
-use super::plan::Setting;
-use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
 use super::critical::Critical;
+use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
+use super::plan::Setting;
 use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::tree::{Candidates, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
@@ -375,7 +375,7 @@ impl<'a> Workshop<'a> {
             return;
         }
         if self.cut_sites(setting, &frame) == Cut::Empty {
-                // The solid's other parts lie in what sites cover.
+            // The solid's other parts lie in what sites cover.
             return;
         }
         let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
@@ -541,7 +541,10 @@ impl<'a> Workshop<'a> {
         self.nearby.clear();
         for k in 0..4 {
             let Value { square, site, .. } = frame.values[k];
-            if square.is_finite() && self.nearby.iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
+            if square.is_finite()
+                && self.nearby.iter().all(|nearby| nearby.site != site)
+                && self.consider(setting, frame, site) == Cut::Empty
+            {
                 return Cut::Empty;
             }
         }

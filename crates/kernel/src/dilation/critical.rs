@@ -34,7 +34,8 @@ impl Affine {
         let columns = [1, 2, 3].map(|k| subtract(&positions[k], &positions[0]));
         let dual = [cross(&columns[1], &columns[2]), cross(&columns[2], &columns[0]), cross(&columns[0], &columns[1])];
         let determinant = dot(&columns[0], &dual[0]);
-        let slope: Point = std::array::from_fn(|axis| (0..3).map(|k| (values[k + 1] - values[0]) * dual[k][axis]).sum::<f64>() / determinant);
+        let slope: Point =
+            std::array::from_fn(|axis| (0..3).map(|k| (values[k + 1] - values[0]) * dual[k][axis]).sum::<f64>() / determinant);
         Self { at_base: values[0], slope, steepness: dot(&slope, &slope).sqrt() }
     }
 
@@ -227,7 +228,6 @@ fn is_farther(x: &Point, others: &[Point], distance: f64) -> bool {
     false
 }
 
-
 /// Whether a plane was found that parts two sets of points: Gilbert's search for the shortest difference (1966). When it gives up, there may be one yet.
 fn are_parted(points: &[Point], others: &[Point]) -> bool {
     let mean = |points: &[Point]| -> Point {
@@ -257,4 +257,3 @@ fn are_parted(points: &[Point], others: &[Point]) -> bool {
 fn cross(a: &Point, b: &Point) -> Point {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
-

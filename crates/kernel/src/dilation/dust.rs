@@ -49,7 +49,13 @@ pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candid
     count
 }
 
-fn is_dust<'a>(setting: &Setting, rule: &'a SiteRule<'a>, candidates: &Candidates, shell: &Shell, tree: &mut Option<(Tree<'a>, Vec<u32>)>) -> bool {
+fn is_dust<'a>(
+    setting: &Setting,
+    rule: &'a SiteRule<'a>,
+    candidates: &Candidates,
+    shell: &Shell,
+    tree: &mut Option<(Tree<'a>, Vec<u32>)>,
+) -> bool {
     let width = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(f64::INFINITY, f64::min);
     if width >= 2.0 * (setting.least - 2.0 * setting.rounding) {
         return false;

@@ -73,17 +73,16 @@ pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budge
 ///
 /// # Errors
 /// As [`dilate`].
-pub fn dilate_unsimplified(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
-    run(attractor, radius, tolerance, budget, false)
-}
-
-fn run(
+pub fn dilate_unsimplified(
     attractor: &Attractor,
     radius: Radius,
     tolerance: Tolerance,
     budget: &Budget,
-    simplify: bool,
 ) -> Result<Dilation, DilationError> {
+    run(attractor, radius, tolerance, budget, false)
+}
+
+fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
     let Some(Resolved { attractor: resolved, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
         return Plan::new(attractor, radius, tolerance, simplify, budget)?.run(attractor, budget);
     };

@@ -1,11 +1,11 @@
 //! Space and automaton refined together: cubes of space that the surface cannot meet are dropped with all
 //! their cells, cells are expanded only as far as the cube's size asks.
 
-use super::block::{BlockSurface, SIDE, Workshop, signed_side};
-use super::tree::{Candidate, Candidates};
 use super::DilationError;
+use super::block::{BlockSurface, SIDE, Workshop, signed_side};
 use super::lattice::Grading;
 use super::plan::Setting;
+use super::tree::{Candidate, Candidates};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, child_points, distance_squared};
 use crate::attractor::sites::SiteRule;
@@ -43,7 +43,10 @@ impl Node {
     /// Its eight halves.
     pub(super) fn children(self) -> Vec<Self> {
         let half = self.blocks / 2;
-        let child = |octant: i64| Self { first_block: std::array::from_fn(|axis| self.first_block[axis] + half * (octant >> axis & 1)), blocks: half };
+        let child = |octant: i64| Self {
+            first_block: std::array::from_fn(|axis| self.first_block[axis] + half * (octant >> axis & 1)),
+            blocks: half,
+        };
         (0..8).map(child).collect()
     }
 }
@@ -82,7 +85,8 @@ impl<'a> Pass<'a> {
     }
 
     fn is_wanted(&self, node: Node) -> bool {
-        let inside = |block: &[i64; 3]| (0..3).all(|axis| (node.first_block[axis]..node.first_block[axis] + node.blocks).contains(&block[axis]));
+        let inside =
+            |block: &[i64; 3]| (0..3).all(|axis| (node.first_block[axis]..node.first_block[axis] + node.blocks).contains(&block[axis]));
         // The first axis orders the set.
         let first = [node.first_block[0], i64::MIN, i64::MIN];
         let end = [node.first_block[0] + node.blocks, i64::MIN, i64::MIN];
@@ -110,7 +114,12 @@ impl<'a> Pass<'a> {
     /// The cells that may cover something of the cube, and the solids whose
     /// surface meets the cube, of those that are still `open`; `None` when the result's surface cannot meet
     /// the cube.
-    pub(super) fn reduce(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<(Candidates, Vec<u32>)>, DilationError> {
+    pub(super) fn reduce(
+        &self,
+        node: Node,
+        candidates: &Candidates,
+        open: &[u32],
+    ) -> Result<Option<(Candidates, Vec<u32>)>, DilationError> {
         let (middle, half) = self.extent(node);
         let size = CELL_SHARE * half;
         let mut brackets = Vec::with_capacity(candidates.cells.len());

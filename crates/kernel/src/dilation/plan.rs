@@ -1,9 +1,9 @@
 //! Pitch, thresholds and bounds of a dilation.
 
-use super::block::{self, BlockSurface};
-use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::assemble::{Assembly, Blocks};
+use super::block::{self, BlockSurface};
 use super::dust;
+use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Node, Pass};
 use super::outside::MOST;
 use super::smooth::MOST_NOISE;
@@ -14,8 +14,8 @@ use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::{Crossings, Solid, SolidError, TriMesh};
-use glam::DVec3;
 use crate::tolerance::{Radius, Tolerance};
+use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
@@ -172,7 +172,8 @@ impl<'a> Plan<'a> {
         // The unit of values is below 8 r^2 / MOST, and noise of 32 units moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^16.
         let extra = rounding + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
-        let pitch = Self::pitch(&rule, radius, aimed - extra).min(COARSEST * radius);
+        // The inner bound rounds down: see `Setting::least`.
+        let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
@@ -192,7 +193,10 @@ impl<'a> Plan<'a> {
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
         // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
-        Setting { clean_only: self.clean_only, ..Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds) }
+        Setting {
+            clean_only: self.clean_only,
+            ..Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds)
+        }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
@@ -333,7 +337,16 @@ impl<'a> Plan<'a> {
             other => other.into(),
         })?;
         let crossings = Crossings::of(solid.mesh(), budget)?.count;
-        Ok(Dilation { solid, crossings, inner_mm: inner, outer_mm: outer, pitch_mm: setting.lattice.pitch, leaf_cells, bounds: self.bounds, uncertain: uncertain as u64 })
+        Ok(Dilation {
+            solid,
+            crossings,
+            inner_mm: inner,
+            outer_mm: outer,
+            pitch_mm: setting.lattice.pitch,
+            leaf_cells,
+            bounds: self.bounds,
+            uncertain: uncertain as u64,
+        })
     }
 }
 
@@ -342,9 +355,9 @@ fn blocks_around(cubes: &[Cube]) -> BTreeSet<[i64; 3]> {
     let side = block::SIDE as i64;
     let around = |cube: &Cube| {
         let base = cube.base();
-        (0..27).map(move |code: i64| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1]).map(move |offset| {
-            std::array::from_fn(|axis: usize| (base[axis] + offset[axis]).div_euclid(side))
-        })
+        (0..27)
+            .map(move |code: i64| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1])
+            .map(move |offset| std::array::from_fn(|axis: usize| (base[axis] + offset[axis]).div_euclid(side)))
     };
     cubes.iter().flat_map(around).collect()
 }

@@ -47,10 +47,7 @@ pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
     for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
         let own = SIMPLICES.iter().filter(|&&part| part != s && part & s == part).all(|&part| result >> part & 1 == 1);
-        let is_smooth = nothing
-            || (own
-                && is_long(&frame.numbers, s)
-                && (0..squares.len()).any(|site| serves(s, site)));
+        let is_smooth = nothing || (own && is_long(&frame.numbers, s) && (0..squares.len()).any(|site| serves(s, site)));
         result |= u16::from(is_smooth) << s;
     }
     result

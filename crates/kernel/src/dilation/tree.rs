@@ -416,9 +416,16 @@ fn spatial_order(candidates: &Candidates, class: impl Fn(&Cell) -> u32) -> Vec<u
     }
     let size = (0..3).map(|axis| high[axis] - low[axis]).fold(f64::MIN_POSITIVE, f64::max);
     let spread = |x: u64| (0..BITS).fold(0, |code, bit| code | (x >> bit & 1) << (3 * bit));
-    let code = |centre: Point| (0..3).fold(0, |code, axis| code | spread(((centre[axis] - low[axis]) / size * f64::from((1 << BITS) - 1)) as u64) << axis);
-    let mut order: Vec<(u32, u64, u32)> =
-        candidates.cells.iter().zip(centres).enumerate().map(|(index, (candidate, centre))| (class(&candidate.cell), code(centre), index as u32)).collect();
+    let code = |centre: Point| {
+        (0..3).fold(0, |code, axis| code | spread(((centre[axis] - low[axis]) / size * f64::from((1 << BITS) - 1)) as u64) << axis)
+    };
+    let mut order: Vec<(u32, u64, u32)> = candidates
+        .cells
+        .iter()
+        .zip(centres)
+        .enumerate()
+        .map(|(index, (candidate, centre))| (class(&candidate.cell), code(centre), index as u32))
+        .collect();
     order.sort_unstable();
     order.into_iter().map(|(.., index)| index).collect()
 }
@@ -442,10 +449,8 @@ impl Best {
         if square > self.limit {
             return;
         }
-        if let Some(hit) = &self.hit {
-            if square == hit.distance_squared && !is_first(tree, (closest, site), hit) {
-                return;
-            }
+        if self.hit.is_some_and(|hit| square == hit.distance_squared && !is_first(tree, (closest, site), &hit)) {
+            return;
         }
         self.limit = square;
         self.distance = square.sqrt();
