@@ -20,7 +20,7 @@ from judge import HERE, compiled, judge, read_mesh
 
 MEMORY = 12 << 30
 # Cells in parts of the tolerance; sides of a great circle for the hulls.
-SPACINGS = (4, 2.8, 2, 1.4, 1, 0.7, 0.5, 0.35)
+SPACINGS = (2, 1.4, 1, 0.7, 0.5, 0.35)
 SIDES = (8, 12, 16, 20, 24, 32)
 PROGRAMS = ("lacuna", "manifold", "openvdb", "meshlib", "libigl")
 
@@ -83,7 +83,7 @@ def compare(program, made, divisor, options, functions, first):
         return row | best
     tried, best = [], {"failed": "nothing to try"}
     for setting in SIDES if program == "manifold" else SPACINGS:
-        if program != "manifold" and setting > first.get((program, made.name), 4):
+        if program != "manifold" and setting > first.get((program, made.name), SPACINGS[0]):
             continue
         found = attempt(program, made, divisor, setting, options, functions)
         tried.append([setting, found.get("failed") or round(found["error_over_tolerance"], 3), round(found.get("cpu", 0), 3)])
