@@ -32,12 +32,11 @@ class Shape:
         return 0.01 * self.diagonal
 
     def write(self, path):
-        """As Wavefront OBJ: `l` for points (a segment without length) and segments, `f` for triangles."""
+        """As Wavefront OBJ: `l` for points (lines of one vertex) and segments, `f` for triangles."""
         word = "f" if self.cells.shape[1] == 3 else "l"
-        cells = np.repeat(self.cells, 2, axis=1) if self.cells.shape[1] == 1 else self.cells
         with open(path, "w") as out:
             out.writelines("v %.17g %.17g %.17g\n" % tuple(v) for v in self.vertices)
-            out.writelines(f"{word} {' '.join(map(str, c))}\n" for c in (cells + 1).tolist())
+            out.writelines(f"{word} {' '.join(map(str, c))}\n" for c in (self.cells + 1).tolist())
 
 
 def uniform(seed):

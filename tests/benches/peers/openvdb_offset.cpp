@@ -35,7 +35,8 @@ int main(int, char** arguments) {
             vertices.push_back(v);
         } else if (kind == "l" || kind == "f") {
             unsigned a, b, c;
-            words >> a >> b;
+            words >> a;
+            if (!(words >> b)) b = a;
             if (!(words >> c)) c = b;
             cells.emplace_back(a - 1, b - 1, c - 1);
         }
@@ -66,7 +67,7 @@ int main(int, char** arguments) {
         result.write(reinterpret_cast<const char*>(&v), sizeof v);
     }
     for (const auto& t : triangles) {
-        const uint32_t corners[3] = {uint32_t(t[0]), uint32_t(t[2]), uint32_t(t[1])}; // its faces look inwards here
+        const uint32_t corners[3] = {uint32_t(t[0]), uint32_t(t[1]), uint32_t(t[2])};
         result.write(reinterpret_cast<const char*>(corners), sizeof corners);
     }
     long peak = 0;

@@ -1,0 +1,116 @@
+"""Writes the tables of results.json and truth.json as Markdown.
+
+    python tables.py RESULTS_FOLDER
+"""
+import json
+import sys
+from pathlib import Path
+
+from inputs import SHAPES
+
+
+def number(value, digits=3):
+    """With so many significant digits, thousands set apart."""
+    if value is None:
+        return "-"
+    if value >= 1000:
+        return f"{value:,.0f}"
+    return f"{value:.{digits}g}"
+
+
+def topology(row, truth):
+    """Pieces, genus and cavities, and whether they are the truth."""
+    if "euler" not in row:
+        return "not closed" if row.get("manifold") is False else "not counted"
+    pieces = row["shells"] - row["cavities"]
+    counts = f"{pieces} / {row['genus']} / {row['cavities']}"
+    if not row["manifold"]:
+        return f"not a manifold, {counts}"
+    if truth is None:
+        return counts
+    true = [truth["pieces"], truth["genus"], truth["cavities"]]
+    if [pieces, row["genus"], row["cavities"]] == true:
+        return f"{counts}, right"
+    band = truth["betti"].values() if row["divisor"] == 10 else [truth["betti"][k] for k in ("r + r/40", "r, upper", "r", "r - r/40")]
+    low, high = [min(b[k] for b in band) for k in range(3)], [max(b[k] for b in band) for k in range(3)]
+    within = all(low[k] <= (pieces, row["genus"], row["cavities"])[k] <= high[k] for k in range(3))
+    return f"{counts}, {'within the band' if within and low != high else '**wrong**'}"
+
+
+def passes(row):
+    """Whether the error is met."""
+    return row.get("error_over_tolerance", 9) <= 1
+
+
+def comparison(rows, truth, divisor):
+    """One table for a tolerance."""
+    lines = [
+        "| shape | program | setting | CPU s | wall s | peak MB | triangles | error / e | pieces / genus / cavities | crossings |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name in SHAPES:
+        for row in (r for r in rows if r["shape"] == name and r["divisor"] == divisor):
+            if "cpu" not in row:
+                lines.append(f"| {name} | {row['program']} | | | | | | no result: {row['failed']} | | |")
+                continue
+            error = number(row["error_over_tolerance"], 4) + ("" if passes(row) else ", **fails**") + (" (sampled)" if "sampled_triangles" in row else "")
+            if row.get("solid") is False:
+                error += ", **not the solid**"
+            lines.append(
+                f"| {name} | {row['program']} | {row.get('setting', '')} | {number(row['cpu'])} | {number(row['wall'])} | {number(row['peak_mb'])} | "
+                f"{number(row['triangles'])} | {error} | {topology(row, truth.get(name))} | {number(row.get('crossings'))} |"
+            )
+    return "\n".join(lines)
+
+
+def ratios(rows, truth, divisor):
+    """lacuna beside the best peer that reaches the tolerance."""
+    lines = [
+        "| shape | lacuna CPU s | best peer at error <= e | its CPU s | its topology | peer / lacuna, CPU | triangles, lacuna | of the best grid | of the hulls | memory, lacuna / peer |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name in SHAPES:
+        own = next((r for r in rows if (r["program"], r["shape"], r["divisor"]) == ("lacuna", name, divisor)), None)
+        others = [r for r in rows if r["shape"] == name and r["divisor"] == divisor and r["program"] != "lacuna" and passes(r)]
+        if own is None:
+            continue
+        best = min(others, key=lambda r: r["cpu"], default=None)
+        grid = min((r["triangles"] for r in others if r["program"] != "manifold"), default=None)
+        hulls = min((r["triangles"] for r in others if r["program"] == "manifold"), default=None)
+        cells = [name, number(own.get("cpu"))]
+        cells += ["none", "-", "-", "-"] if best is None else [
+            best["program"], number(best["cpu"]), topology(best, truth.get(name)), number(best["cpu"] / own["cpu"]) if "cpu" in own else "-"]
+        memory = f"{number(own['peak_mb'])} / {number(best['peak_mb'])} MB" if best and "cpu" in own else number(own.get("peak_mb"))
+        cells += [number(own.get("triangles")), number(grid), number(hulls), memory]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def truths(truth):
+    """The table of the alpha complexes."""
+    labels = ["r - r/10", "r - r/40", "r", "r, upper", "r + r/40", "r + r/10"]
+    lines = ["| shape | samples | c / r | " + " | ".join(labels) + " | at r |", "| --- " * (len(labels) + 4) + "|"]
+    for name in (n for n in SHAPES if n in truth):
+        found = truth[name]
+        cells = [" / ".join(map(str, found["betti"][label])) for label in labels]
+        verdict = "stable to r/10" if found["stable_r/10"] else "stable to r/40" if found["stable_r/40"] else "settled" if found["settled"] else "not settled"
+        lines.append(f"| {name} | {found['samples']:,} | {found['cover_over_radius']} | " + " | ".join(cells) + f" | {verdict} |")
+    return "\n".join(lines)
+
+
+def main():
+    """To standard output and to tables.md."""
+    folder = Path(sys.argv[1])
+    rows = json.loads((folder / "results.json").read_text())
+    truth = json.loads((folder / "truth.json").read_text()) if (folder / "truth.json").exists() else {}
+    parts = []
+    for divisor in sorted({r["divisor"] for r in rows}):
+        parts += [f"### r/{divisor}: lacuna and the best peer", ratios(rows, truth, divisor), f"### r/{divisor}: every run", comparison(rows, truth, divisor)]
+    parts += ["### The true topology: pieces / handles / cavities of the alpha complex", truths(truth)]
+    text = "\n\n".join(parts) + "\n"
+    (folder / "tables.md").write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
