@@ -58,7 +58,8 @@ def run(words, out, limit):
         return {"failed": (said[-1] if said else f"ended with {done.returncode}")[:200]}
     measured = json.loads(done.stdout.strip().splitlines()[-1])
     if isinstance(measured["cpu"], list):
-        measured = {"cpu": statistics.median(measured["cpu"]), "wall": statistics.median(measured["wall"]), "peak_mb": measured["rss_mb"]}
+        measured["cpu"], measured["wall"] = statistics.median(measured["cpu"]), statistics.median(measured["wall"])
+        measured["peak_mb"] = measured.pop("rss_mb")
     return measured
 
 

@@ -16,6 +16,7 @@ differ, a mesh within the tolerance may rightly have another one.
 """
 import json
 import sys
+from array import array
 from pathlib import Path
 
 import gudhi
@@ -26,7 +27,7 @@ from scipy.sparse.csgraph import connected_components
 from inputs import SHAPES, shape
 
 # c in parts of r, coarsest first, as long as the number of samples is bearable.
-FINENESS = (0.2, 0.1, 0.05, 0.025)
+FINENESS = (0.3, 0.2, 0.1, 0.05, 0.025)
 MOST_SAMPLES = 350_000
 
 
@@ -80,12 +81,12 @@ class Filtration:
     def __init__(self, points):
         tree = gudhi.AlphaComplex(points=points, precision="safe").create_simplex_tree()
         self.dimension = points.shape[1]
-        corners, values = [[] for _ in range(self.dimension + 1)], [[] for _ in range(self.dimension + 1)]
+        corners, values = [array("i") for _ in range(self.dimension + 1)], [array("d") for _ in range(self.dimension + 1)]
         for simplex, value in tree.get_simplices():
-            corners[len(simplex) - 1].append(simplex)
+            corners[len(simplex) - 1].extend(simplex)
             values[len(simplex) - 1].append(value)
-        self.corners = [np.sort(np.array(c, np.int32), axis=1) for c in corners]
-        self.values = [np.array(v) for v in values]
+        self.corners = [np.sort(np.frombuffer(c, np.int32).reshape(-1, k + 1), axis=1) for k, c in enumerate(corners)]
+        self.values = [np.frombuffer(v) for v in values]
         if self.dimension == 3:
             self.sides = self.sides_of_tetrahedra()
 
@@ -135,8 +136,8 @@ def truth(name):
         if found and len(points) > MOST_SAMPLES:
             break
         filtration = Filtration(points)
-        upper = r * np.sqrt(1 + fineness**2)
-        radii = {"r + r/10": upper + r / 10, "r + r/40": upper + r / 40, "r, upper": upper, "r": r, "r - r/40": r - r / 40, "r - r/10": r - r / 10}
+        upper = lambda radius: np.hypot(radius, fineness * r)
+        radii = {"r + r/10": upper(1.1 * r), "r + r/40": upper(1.025 * r), "r, upper": upper(r), "r": r, "r - r/40": 0.975 * r, "r - r/10": 0.9 * r}
         betti_numbers = {label: filtration.betti(radius * radius) for label, radius in radii.items()}
         found = {"samples": len(points), "cover_over_radius": fineness, "betti": betti_numbers}
         if betti_numbers["r"] == betti_numbers["r, upper"]:
