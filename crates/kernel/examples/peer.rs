@@ -86,12 +86,13 @@ fn main() -> Outcome<()> {
     let dilation = last.ok_or("no run")?;
     write(&dilation, output, scale)?;
     let (inner, outer, pitch) = (dilation.inner_mm / scale, dilation.outer_mm / scale, dilation.pitch_mm / scale);
-    println!(
+    writeln!(
+        std::io::stdout(),
         "{{\"wall\": {wall:?}, \"cpu\": {cpu:?}, \"rss_mb\": {}, \"claimed_inner\": {inner}, \"claimed_outer\": {outer}, \"pitch\": {pitch}, \
          \"claimed_crossings\": {}, \"uncertain\": {}}}",
         peak_memory()?,
         dilation.crossings,
         dilation.uncertain
-    );
+    )?;
     Ok(())
 }
