@@ -28,8 +28,7 @@ def topology(row, truth):
         return f"not a manifold, {counts}"
     if truth is None:
         return counts
-    true = [truth["pieces"], truth["genus"], truth["cavities"]]
-    if [pieces, row["genus"], row["cavities"]] == true:
+    if [pieces, row["genus"], row["cavities"]] in (truth["betti"]["r"], truth["betti"]["r, upper"]):
         return f"{counts}, right"
     band = truth["betti"].values() if row["divisor"] == 10 else [truth["betti"][k] for k in ("r + r/40", "r, upper", "r", "r - r/40")]
     low, high = [min(b[k] for b in band) for k in range(3)], [max(b[k] for b in band) for k in range(3)]

@@ -142,6 +142,51 @@ class Faults(unittest.TestCase):
         self.assertEqual([found["manifold"], found["pinched_vertices"]], [False, 1])
 
 
+def lengths(made):
+    """Of the segments."""
+    return np.linalg.norm(np.diff(made.vertices[made.cells], axis=1)[:, 0], axis=1)
+
+
+def areas(made):
+    """Of the triangles."""
+    corner = made.vertices[made.cells]
+    return np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+
+
+class Shapes(unittest.TestCase):
+    """Measures of the shapes that are known in closed form."""
+
+    def test_wires(self):
+        for name, count, length in (("koch5", 4**5, 3.0**-5), ("dragon11", 2**11, 2**-5.5), ("sierp7", 3**8, 2.0**-7), ("hilbert4", 8**4 - 1, 1 / 15)):
+            made = shape(name)
+            with self.subTest(name):
+                self.assertEqual(len(made.cells), count)
+                self.assertTrue(np.allclose(lengths(made), length, rtol=1e-9))
+        self.assertEqual(len(np.unique(np.round(shape("hilbert4").vertices * 15), axis=0)), 8**4)
+        self.assertEqual(len(shape("sierp7").vertices), (3**8 + 3) // 2)
+
+    def test_trees(self):
+        made = shape("tree20k")
+        self.assertEqual([len(made.vertices), len(made.cells)], [20001, 20000])
+        generation = np.round(np.log(lengths(made)) / np.log(0.7)).astype(int)
+        self.assertTrue(np.array_equal(np.bincount(generation)[:9], 3 ** np.arange(9)))
+
+    def test_surfaces(self):
+        self.assertAlmostEqual(areas(shape("tetra6")).sum(), np.sqrt(3), delta=1e-12)
+        sponge = shape("menger3")
+        self.assertEqual(len(sponge.cells) // 2, 2 * 20**3 + 4 * 8**3)
+        self.assertAlmostEqual(areas(sponge).sum(), (2 * 20**3 + 4 * 8**3) / 9**3, delta=1e-9)
+        self.assertEqual(topology(sponge.vertices, sponge.cells)["manifold"], True)
+
+    def test_fields_and_dust(self):
+        takagi = shape("takagi128").vertices.reshape(129, 129, 3)
+        self.assertAlmostEqual(takagi[64, 64, 2], 0.25, delta=1e-15)  # T(1/2) = 1/2
+        self.assertAlmostEqual(takagi[32, 64, 2], 0.25, delta=1e-15)  # T(1/4) = 1/2
+        dust = shape("cantor4").vertices
+        self.assertEqual(len(np.unique(dust, axis=0)), 8**4)
+        self.assertFalse(((np.round(dust * 81) // 27 == 1) & (dust != 1 / 3)).any())  # nothing within the middle third
+
+
 class Truth(unittest.TestCase):
     """Betti numbers that are known."""
 
