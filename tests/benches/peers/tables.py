@@ -1,12 +1,14 @@
 """Writes the tables of results.json and truth.json as Markdown.
 
-    python tables.py RESULTS_FOLDER
+    python tables.py RESULTS_FOLDER [PAGE.md]     between the marks of the page as well
 """
 import json
 import sys
 from pathlib import Path
 
 from inputs import SHAPES
+
+MARKS = ("<!-- tables -->", "<!-- end of tables -->")
 
 
 def number(value, digits=3):
@@ -64,26 +66,33 @@ def comparison(rows, truth, divisor):
     return "\n".join(lines)
 
 
+def right(row, truth):
+    """Whether a row has the error, the solid and the topology, as far as those were measured."""
+    words = topology(row, truth.get(row["shape"]))
+    return passes(row) and row.get("solid", True) and not any(w in words for w in ("wrong", "not a manifold", "not closed"))
+
+
 def ratios(rows, truth, divisor):
-    """lacuna beside the best peer that reaches the tolerance."""
+    """lacuna beside the best peers: of those with the error, and of those with error and topology."""
     lines = [
-        "| shape | lacuna CPU s | best peer at error <= e | its CPU s | its topology | peer / lacuna, CPU | triangles, lacuna | of the best grid | of the hulls | memory, lacuna / peer |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| shape | lacuna CPU s | cheapest peer within e | cheapest with the topology too | times lacuna | triangles: lacuna, best grid, hulls | peak MB: lacuna, that peer |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name in SHAPES:
         own = next((r for r in rows if (r["program"], r["shape"], r["divisor"]) == ("lacuna", name, divisor)), None)
-        others = [r for r in rows if r["shape"] == name and r["divisor"] == divisor and r["program"] != "lacuna" and passes(r)]
-        if own is None:
+        run = [r for r in rows if r["shape"] == name and r["divisor"] == divisor and r["program"] != "lacuna"]
+        if own is None or not run:
             continue
-        best = min(others, key=lambda r: r["cpu"], default=None)
-        grid = min((r["triangles"] for r in others if r["program"] != "manifold"), default=None)
-        hulls = min((r["triangles"] for r in others if r["program"] == "manifold"), default=None)
-        cells = [name, number(own.get("cpu"))]
-        cells += ["none", "-", "-", "-"] if best is None else [
-            best["program"], number(best["cpu"]), topology(best, truth.get(name)), number(best["cpu"] / own["cpu"]) if "cpu" in own else "-"]
-        memory = f"{number(own['peak_mb'])} / {number(best['peak_mb'])} MB" if best and "cpu" in own else number(own.get("peak_mb"))
-        cells += [number(own.get("triangles")), number(grid), number(hulls), memory]
-        lines.append("| " + " | ".join(cells) + " |")
+        within = [r for r in run if passes(r)]
+        any_peer, peer = (min(some, key=lambda r: r["cpu"], default=None) for some in (within, [r for r in within if right(r, truth)]))
+        cpu = "no result" if "cpu" not in own else number(own["cpu"]) + ("" if right(own, truth) else " (not right)")
+        named = [f"{p['program']}, {number(p['cpu'])} s" if p else f"none of {len(run)}" for p in (any_peer, peer)]
+        triangles = [own.get("triangles"), min((r["triangles"] for r in within if r["program"] != "manifold"), default=None),
+                     min((r["triangles"] for r in within if r["program"] == "manifold"), default=None)]
+        lines.append(
+            f"| {name} | {cpu} | {named[0]} | {named[1]} | {number(peer['cpu'] / own['cpu']) if peer and 'cpu' in own else '-'} | "
+            f"{' / '.join(map(number, triangles))} | {number(own.get('peak_mb'))} / {number(peer['peak_mb']) if peer else '-'} |"
+        )
     return "\n".join(lines)
 
 
@@ -100,17 +109,19 @@ def truths(truth):
 
 
 def main():
-    """To standard output and to tables.md."""
+    """To tables.md, and between the marks of the page if one is given."""
     folder = Path(sys.argv[1])
     rows = json.loads((folder / "results.json").read_text())
     truth = json.loads((folder / "truth.json").read_text()) if (folder / "truth.json").exists() else {}
     parts = []
     for divisor in sorted({r["divisor"] for r in rows}):
-        parts += [f"### r/{divisor}: lacuna and the best peer", ratios(rows, truth, divisor), f"### r/{divisor}: every run", comparison(rows, truth, divisor)]
+        parts += [f"### e = r/{divisor}: lacuna and the best peers", ratios(rows, truth, divisor), f"### e = r/{divisor}: every run", comparison(rows, truth, divisor)]
     parts += ["### The true topology: pieces / handles / cavities of the alpha complex", truths(truth)]
     text = "\n\n".join(parts) + "\n"
     (folder / "tables.md").write_text(text)
-    print(text)
+    for page in map(Path, sys.argv[2:]):
+        before, _, rest = page.read_text().partition(MARKS[0])
+        page.write_text(f"{before}{MARKS[0]}\n{text}{MARKS[1]}{rest.partition(MARKS[1])[2]}")
 
 
 if __name__ == "__main__":
