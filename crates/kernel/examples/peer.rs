@@ -1,81 +1,98 @@
-//! Adapter for the comparison with other programs: IN.obj RADIUS TOLERANCE OUT.bin REPEATS.
-use lacuna_kernel::budget::Budget;
-use lacuna_kernel::dilation::{dilate, dilate_unsimplified};
+//! lacuna's side of the comparison in `tests/benches/peers`: thickens the points, lines and triangles of a Wavefront file, prints what it
+//! cost and what it claims as JSON, and writes the mesh in the comparison's format.
+//!
+//! `peer IN.obj RADIUS TOLERANCE OUT.bin [REPEATS [SCALE]]`; everything is multiplied by SCALE on the way in and divided on the way out,
+//! because the kernel works in millimetres. With `RAW` in the environment the lattice's mesh is left as it is.
+use std::error::Error;
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::time::Instant;
+
+use glam::DVec3;
+use lacuna_kernel::budget::{Budget, Limits};
+use lacuna_kernel::dilation::{Dilation, dilate, dilate_unsimplified};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
-use std::io::Write;
-fn cpu() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
-    let f: Vec<&str> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
-    (f[11].parse::<f64>().unwrap() + f[12].parse::<f64>().unwrap()) / 100.0
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// CPU seconds of all threads of this process so far; Linux counts them in hundredths.
+fn cpu_seconds() -> Outcome<f64> {
+    let stat = fs::read_to_string("/proc/self/stat")?;
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    Ok((fields[11].parse::<f64>()? + fields[12].parse::<f64>()?) / 100.0)
 }
-fn main() {
-    let a: Vec<String> = std::env::args().collect();
-    let text = std::fs::read_to_string(&a[1]).unwrap();
+
+/// Peak of the resident memory in megabytes.
+fn peak_memory() -> Outcome<f64> {
+    let status = fs::read_to_string("/proc/self/status")?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM")).ok_or("no VmHWM")?;
+    Ok(line.split_whitespace().nth(1).ok_or("no value")?.parse::<f64>()? / 1024.0)
+}
+
+/// Vertices, and the lines and faces as lists of them.
+fn read(path: &str, scale: f64) -> Outcome<Model> {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let mut w = line.split_whitespace();
-        match w.next() {
+    for line in fs::read_to_string(path)?.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
             Some("v") => {
-                let c: Vec<f64> = w.map(|x| x.parse().unwrap()).collect();
-                vertices.push(glam::DVec3::new(c[0], c[1], c[2]))
+                let x = words.map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+                vertices.push(scale * DVec3::new(x[0], x[1], x[2]));
             }
-            Some("l" | "f") => faces.push(w.map(|x| x.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect()),
+            Some("l" | "f") => faces.push(words.map(|word| word.parse::<u32>().map(|i| i - 1)).collect::<Result<Vec<_>, _>>()?),
             _ => {}
         }
     }
-    let scale: f64 = a.get(6).map_or(1.0, |s| s.parse().unwrap());
-    vertices.iter_mut().for_each(|v: &mut glam::DVec3| *v *= scale);
-    let model = Model { name: None, shape: Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Surface }) };
-    let attractor = model.lower().unwrap().attractor;
-    let (r, t) =
-        (Radius::new(scale * a[2].parse::<f64>().unwrap()).unwrap(), Tolerance::new(scale * a[3].parse::<f64>().unwrap()).unwrap());
-    let (mut walls, mut cpus) = (vec![], vec![]);
-    let mut out = None;
-    for _ in 0..a[5].parse::<usize>().unwrap() {
-        let (c, w) = (cpu(), std::time::Instant::now());
-        let f = if std::env::var_os("RAW").is_some() { dilate_unsimplified } else { dilate };
-        let d = f(
-            &attractor,
-            r,
-            t,
-            &Budget {
-                limits: lacuna_kernel::budget::Limits { triangles: u64::MAX, memory_bytes: 12 << 30, ..Default::default() },
-                ..Default::default()
-            },
-        );
-        if let Err(e) = &d {
-            eprintln!("{e} {} s wall {} cpu", w.elapsed().as_secs_f64(), cpu() - c);
-        }
-        let d = d.unwrap();
-        walls.push(w.elapsed().as_secs_f64());
-        cpus.push(cpu() - c);
-        out = Some(d);
+    Ok(Model { name: None, shape: Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Surface }) })
+}
+
+/// Counts, coordinates and corners, little endian.
+fn write(dilation: &Dilation, path: &str, scale: f64) -> Outcome<()> {
+    let mesh = dilation.solid.mesh();
+    let mut file = BufWriter::new(fs::File::create(path)?);
+    file.write_all(&(mesh.vertices.len() as u64).to_le_bytes())?;
+    file.write_all(&(mesh.triangles.len() as u64).to_le_bytes())?;
+    for coordinate in mesh.vertices.iter().flat_map(|v| (*v / scale).to_array()) {
+        file.write_all(&coordinate.to_le_bytes())?;
     }
-    let d = out.unwrap();
-    let mesh = d.solid.mesh();
-    let mut f = std::io::BufWriter::new(std::fs::File::create(&a[4]).unwrap());
-    f.write_all(&(mesh.vertices.len() as u64).to_le_bytes()).unwrap();
-    f.write_all(&(mesh.triangles.len() as u64).to_le_bytes()).unwrap();
-    for v in &mesh.vertices {
-        for x in (*v / scale).to_array() {
-            f.write_all(&x.to_le_bytes()).unwrap()
-        }
+    for corner in mesh.triangles.iter().flatten() {
+        file.write_all(&corner.to_le_bytes())?;
     }
-    for t in &mesh.triangles {
-        for x in t {
-            f.write_all(&x.to_le_bytes()).unwrap()
-        }
+    Ok(file.flush()?)
+}
+
+fn main() -> Outcome<()> {
+    let words: Vec<String> = std::env::args().collect();
+    let [_, input, radius, tolerance, output, rest @ ..] = words.as_slice() else {
+        return Err("peer IN.obj RADIUS TOLERANCE OUT.bin [REPEATS [SCALE]]".into());
+    };
+    let repeats: usize = rest.first().map_or(Ok(1), |word| word.parse())?;
+    let scale: f64 = rest.get(1).map_or(Ok(1.0), |word| word.parse())?;
+    let model = read(input, scale)?;
+    let attractor = model.lower().map_err(|findings| format!("{findings:?}"))?.attractor;
+    let radius = Radius::new(scale * radius.parse::<f64>()?)?;
+    let tolerance = Tolerance::new(scale * tolerance.parse::<f64>()?)?;
+    let limits = Limits { triangles: u64::MAX, memory_bytes: 12 << 30, ..Limits::default() };
+    let budget = Budget { limits, ..Budget::default() };
+    let run = if std::env::var_os("RAW").is_some() { dilate_unsimplified } else { dilate };
+    let (mut wall, mut cpu, mut last) = (Vec::new(), Vec::new(), None);
+    for _ in 0..repeats.max(1) {
+        let (cpu_before, start) = (cpu_seconds()?, Instant::now());
+        last = Some(run(&attractor, radius, tolerance, &budget)?);
+        wall.push(start.elapsed().as_secs_f64());
+        cpu.push(cpu_seconds()? - cpu_before);
     }
-    let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    let rss: f64 = status.lines().find(|l| l.starts_with("VmHWM")).unwrap().split_whitespace().nth(1).unwrap().parse().unwrap();
-    eprintln!(
-        "crossings {} {:?} inner {} outer {} pitch {}",
-        d.crossings,
-        d.solid.topology(),
-        d.inner_mm / scale,
-        d.outer_mm / scale,
-        d.pitch_mm / scale
-    );
-    println!("{{\"wall\": {walls:?}, \"cpu\": {cpus:?}, \"rss_mb\": {}}}", rss / 1024.0);
+    let dilation = last.ok_or("no run")?;
+    write(&dilation, output, scale)?;
+    let (inner, outer, pitch) = (dilation.inner_mm / scale, dilation.outer_mm / scale, dilation.pitch_mm / scale);
+    writeln!(
+        std::io::stdout(),
+        "{{\"wall\": {wall:?}, \"cpu\": {cpu:?}, \"rss_mb\": {}, \"claimed_inner\": {inner}, \"claimed_outer\": {outer}, \"pitch\": {pitch}, \
+         \"claimed_crossings\": {}, \"uncertain\": {}}}",
+        peak_memory()?,
+        dilation.crossings,
+        dilation.uncertain
+    )?;
+    Ok(())
 }
