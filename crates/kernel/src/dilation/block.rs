@@ -95,6 +95,8 @@ pub(super) struct Frame {
     pub(super) values: [Value; 4],
     /// Which vertices are covered: their least squared distance is below theta.
     pub(super) covered: u8,
+    /// A point beyond the surface over every vertex, and its squared distance from the sites, or a smaller number.
+    pub(super) witnesses: [(Point, f64); 4],
     /// The finer level of the two cubes.
     pub(super) level: u32,
     /// Whether the order turned the tetrahedron inside out.
@@ -148,13 +150,16 @@ pub(super) struct Value {
     /// The nearest site, and its closest point.
     pub(super) site: SiteId,
     pub(super) closest: Point,
+    node: NodeId,
     /// f less theta as V has it, never 0: see `smooth`.
     pub(super) least: i64,
     /// W less theta.
     pub(super) far: i64,
+    /// The squared distance of the witness from the sites, once it was asked for.
+    witness: f64,
 }
 
-const NOTHING: Value = Value { square: UNKNOWN, site: SiteId::Listed(0), closest: [0.0; 3], least: 1, far: 1 };
+const NOTHING: Value = Value { square: UNKNOWN, site: SiteId::Listed(0), closest: [0.0; 3], node: 0, least: 1, far: 1, witness: UNKNOWN };
 
 impl<'a> Workshop<'a> {
     pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
@@ -279,27 +284,45 @@ impl<'a> Workshop<'a> {
     /// What is known of a vertex: its squared distance if a site is so near that it may matter around it, else FAR; DEEP where
     /// a site is sure to cover all around.
     fn value(&mut self, setting: &Setting, surface: &BlockSurface, number: Number) -> Value {
-        const HALF: i64 = UNITS / 2;
-        let local: [i64; 3] = std::array::from_fn(|axis| i64::from(number[axis]) - UNITS * surface.first_cube[axis]);
-        let centre = local[0] % UNITS == HALF;
-        let whole = local.iter().all(|x| x % UNITS == if centre { HALF } else { 0 } && *x >= 0);
-        if !whole {
-            if let Some(&known) = self.fine.get(&number) {
-                return known;
-            }
-            let value = self.measured(setting, number);
-            self.fine.insert(number, value);
-            return value;
-        }
-        let cube = local.map(|x| (x / UNITS) as usize);
-        let index = (cube[2] * LAYER + cube[1]) * LAYER + cube[0];
-        let known = self.values[usize::from(centre)][index];
+        let known = *self.slot(surface, number);
         if !known.square.is_nan() {
             return known;
         }
         let value = self.measured(setting, number);
-        self.values[usize::from(centre)][index] = value;
+        *self.slot(surface, number) = value;
         value
+    }
+
+    /// Where the value of a vertex is kept.
+    fn slot(&mut self, surface: &BlockSurface, number: Number) -> &mut Value {
+        const HALF: i64 = UNITS / 2;
+        let local: [i64; 3] = std::array::from_fn(|axis| i64::from(number[axis]) - UNITS * surface.first_cube[axis]);
+        let centre = local[0] % UNITS == HALF;
+        if local.iter().any(|x| x % UNITS != if centre { HALF } else { 0 } || *x < 0) {
+            return self.fine.entry(number).or_insert(NOTHING);
+        }
+        let cube = local.map(|x| (x / UNITS) as usize);
+        &mut self.values[usize::from(centre)][(cube[2] * LAYER + cube[1]) * LAYER + cube[0]]
+    }
+
+    /// The witnesses of the vertices of a tetrahedron: see [`smooth::smooth`].
+    fn witnesses(&mut self, setting: &Setting, surface: &BlockSurface, frame: &mut Frame) {
+        for k in 0..4 {
+            let value = frame.values[k];
+            let offset = subtract(&frame.positions[k], &value.closest);
+            let share = WITNESS * setting.reach / value.square.sqrt();
+            let y: Point = std::array::from_fn(|axis| value.closest[axis] + share * offset[axis]);
+            let square = if value.witness.is_nan() {
+                let most = WITNESS * setting.reach;
+                let hit = self.tree.nearest(&y, &self.near, Some(value.node), most, 0.0);
+                let square = hit.map_or(most * most, |hit| hit.distance_squared);
+                self.slot(surface, frame.numbers[k]).witness = square;
+                square
+            } else {
+                value.witness
+            };
+            frame.witnesses[k] = (y, square);
+        }
     }
 
     fn measured(&mut self, setting: &Setting, number: Number) -> Value {
@@ -312,7 +335,7 @@ impl<'a> Workshop<'a> {
         self.seed = Some(hit.node);
         let square = if hit.distance_squared < setting.deep * setting.deep { DEEP } else { hit.distance_squared };
         let least = setting.integer(hit.distance_squared) - 1 - noise;
-        Value { square, site: hit.site, closest: hit.closest, least: if least == 0 { -1 } else { least }, far }
+        Value { square, site: hit.site, closest: hit.closest, node: hit.node, least: if least == 0 { -1 } else { least }, far, witness: UNKNOWN }
     }
 
     /// Whether a point lies in a solid: the sign of its offset from the nearest point of the surface along
@@ -352,6 +375,7 @@ impl<'a> Workshop<'a> {
             mirrored: is_mirrored(&numbers),
             numbers,
             values,
+            witnesses: [([0.0; 3], 0.0); 4],
             covered,
             level,
         })
@@ -359,18 +383,22 @@ impl<'a> Workshop<'a> {
 
     /// Emits the surface in a tetrahedron; notes the cubes to subdivide if a critical point of the distance may be on the wrong side.
     fn tetrahedron(&mut self, setting: &Setting, numbers: [Number; 4], level: u32, surface: &mut BlockSurface) {
-        let Some(frame) = self.frame(setting, numbers, level, surface) else { return };
+        let Some(mut frame) = self.frame(setting, numbers, level, surface) else { return };
         let theta = setting.reach * setting.reach;
         let squares = smooth::squares(&self.tree, &frame);
         if frame.covered == WHOLE && squares.iter().any(|squares| squares.iter().all(|&square| square < theta)) {
             return;
+        }
+        if frame.covered != 0 {
+            self.witnesses(setting, surface, &mut frame);
         }
         let mut smooth = smooth::smooth(setting, &frame, &squares, smooth::VERTICES);
         if frame.covered != 0 && smooth >> WHOLE & 1 == 0 {
             smooth = self.collect(setting, &frame, smooth);
         }
         let whole = smooth >> WHOLE & 1 == 1;
-        if whole && frame.covered != 0 && self.is_regular(setting, &frame, &squares) {
+        if whole && frame.covered != 0 {
+            // What one site leaves has no critical point: see `is_steep`.
             self.march(&frame, surface);
             return;
         }
@@ -383,10 +411,6 @@ impl<'a> Workshop<'a> {
             self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
         }
         if frame.covered == 0 {
-            return;
-        }
-        if whole {
-            self.march(&frame, surface);
             return;
         }
         for simplex in smooth::largest(smooth, frame.covered) {
@@ -403,31 +427,6 @@ impl<'a> Workshop<'a> {
             }
         }
         self.emit(&frame, surface);
-    }
-
-    /// Whether the distance has no critical point of a value up to `outer` in what the nearest site of the lowest vertex leaves of a tetrahedron.
-    fn is_regular(&mut self, setting: &Setting, frame: &Frame, squares: &[[f64; 4]; 4]) -> bool {
-        let lowest = |k: &usize| frame.values[*k].square;
-        let Some(site) = (0..4).min_by(|a, b| lowest(a).total_cmp(&lowest(b))) else { return false };
-        let theta = setting.reach * setting.reach;
-        let squares = &squares[site];
-        let (mut rest, mut count) = ([[0.0; 3]; 8], 0);
-        let mut add = |x: Point| {
-            rest[count] = x;
-            count += 1;
-        };
-        for p in 0..4 {
-            if squares[p] >= theta {
-                add(frame.positions[p]);
-            }
-            for q in p + 1..4 {
-                if (squares[p] < theta) != (squares[q] < theta) {
-                    let t = (theta - squares[p]) / (squares[q] - squares[p]);
-                    add(std::array::from_fn(|axis| frame.positions[p][axis] + t * (frame.positions[q][axis] - frame.positions[p][axis])));
-                }
-            }
-        }
-        self.has_witness(setting, frame, &rest[..count])
     }
 
     /// Whether a point tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron.
@@ -694,7 +693,9 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
 }
 
-/// How far beyond the surface witnesses are looked for, in units of r.
+/// How far the witnesses of vertices are from the closest points, in units of r.
+pub(super) const WITNESS: f64 = 1.5;
+/// How far beyond the surface witnesses of tetrahedra are looked for, in units of r.
 const WITNESSES: [f64; 2] = [0.5, 0.3];
 /// The bit that tells names of V from those of sites.
 const VIRTUAL: u64 = 1 << 63;

@@ -1,7 +1,7 @@
 //! Pitch, thresholds and bounds of a dilation.
 
 use super::assemble::{Assembly, Blocks};
-use super::block::{self, BlockSurface};
+use super::block::{self, BlockSurface, WITNESS};
 use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Node, Pass};
@@ -89,7 +89,7 @@ impl Setting {
             reach: radius,
             near,
             horizon,
-            sight: horizon + radius,
+            sight: (2.0 * WITNESS * radius).max(horizon + radius) * 1.001,
             far: integer((radius + 1.001 * pitch).powi(2) - theta),
             least: (theta - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
             outer,

@@ -16,6 +16,7 @@ use super::block::Frame;
 use super::lattice::{Number, UNITS};
 use super::plan::Setting;
 use super::tree::Tree;
+use crate::attractor::cell::distance_squared;
 
 /// How far below the least squared distance the values of V are, at most, in units.
 pub(super) const MOST_NOISE: i64 = 32;
@@ -47,11 +48,42 @@ pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
     for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
         let own = SIMPLICES.iter().filter(|&&part| part != s && part & s == part).all(|&part| result >> part & 1 == 1);
-        let is_smooth = nothing || (own && is_long(&frame.numbers, s) && (0..squares.len()).any(|site| serves(s, site)));
+        let is_smooth = nothing || (own && is_long(&frame.numbers, s) && (0..squares.len()).any(|site| serves(s, site) && is_steep(setting, frame, &squares[site], s)));
         result |= u16::from(is_smooth) << s;
     }
     result
 }
+
+/// Whether the distance grows at a rate above [`LEAST_RATE`] towards one point, everywhere in what a site leaves of a simplex.
+///
+/// The rate at x is the distance of x from the hull of its closest points, over d. Where it is at most m, some closest point z has (z - x) . w >= -m d for a unit vector w: then
+/// d(y)^2 <= d^2 + |y - x|^2 + 2 m d |y - x| for y = x + |y - x| w. A larger d(y) tells that the rate is larger. V fills valleys up to `outer`, here and not there: where
+/// the distance hardly changes along them that would make handles.
+fn is_steep(setting: &Setting, frame: &Frame, squares: &[f64; 4], s: u8) -> bool {
+    let theta = setting.reach * setting.reach;
+    let (mut rest, mut count) = ([[0.0; 3]; 8], 0);
+    for p in (0..4).filter(|p| s >> p & 1 == 1) {
+        if squares[p] >= theta {
+            rest[count] = frame.positions[p];
+            count += 1;
+        }
+        for q in (p + 1..4).filter(|q| s >> q & 1 == 1 && (squares[p] < theta) != (squares[*q] < theta)) {
+            let t = (theta - squares[p]) / (squares[q] - squares[p]);
+            rest[count] = std::array::from_fn(|axis| frame.positions[p][axis] + t * (frame.positions[q][axis] - frame.positions[p][axis]));
+            count += 1;
+        }
+    }
+    (0..4).filter(|v| s >> v & 1 == 1).any(|v| {
+        let (y, square) = frame.witnesses[v];
+        rest[..count].iter().all(|x| {
+            let way = distance_squared(x, &y);
+            square > setting.outer * setting.outer + way + 2.0 * LEAST_RATE * setting.outer * way.sqrt()
+        })
+    })
+}
+
+/// See [`is_steep`].
+const LEAST_RATE: f64 = 0.15;
 
 /// The largest smooth simplices that cover something: none contains another.
 pub(super) fn largest(smooth: u16, covered: u8) -> impl Iterator<Item = u8> {
