@@ -305,7 +305,7 @@ impl<'a> Workshop<'a> {
         &mut self.values[usize::from(centre)][(cube[2] * LAYER + cube[1]) * LAYER + cube[0]]
     }
 
-    /// The witnesses of the vertices of a tetrahedron: see [`smooth::smooth`].
+    /// The witnesses of the vertices of a tetrahedron: see [`smooth::served`].
     fn witnesses(&mut self, setting: &Setting, surface: &BlockSurface, frame: &mut Frame) {
         for k in 0..4 {
             let value = frame.values[k];
@@ -392,10 +392,11 @@ impl<'a> Workshop<'a> {
         if frame.covered != 0 {
             self.witnesses(setting, surface, &mut frame);
         }
-        let mut smooth = smooth::smooth(setting, &frame, &squares, smooth::VERTICES);
-        if frame.covered != 0 && smooth >> WHOLE & 1 == 0 {
-            smooth = self.collect(setting, &frame, smooth);
+        let mut served = smooth::served(setting, &frame, &squares, smooth::VERTICES);
+        if frame.covered != 0 && smooth::smooth(served) >> WHOLE & 1 == 0 {
+            served = self.served(setting, &frame, served);
         }
+        let smooth = smooth::smooth(served);
         let whole = smooth >> WHOLE & 1 == 1;
         if whole && frame.covered != 0 {
             // What one site leaves has no critical point: see `is_steep`.
@@ -515,23 +516,23 @@ impl<'a> Workshop<'a> {
         number
     }
 
-    /// Lists the sites that may serve a simplex, and those simplices that one serves.
-    fn collect(&mut self, setting: &Setting, frame: &Frame, mut smooth: u16) -> u16 {
+    /// The simplices that any site serves.
+    fn served(&mut self, setting: &Setting, frame: &Frame, mut served: u16) -> u16 {
         let centre: Point = std::array::from_fn(|axis| frame.positions.iter().map(|x| 0.25 * x[axis]).sum());
         let radius = frame.positions.iter().map(|x| distance_squared(x, &centre)).fold(0.0, f64::max).sqrt();
         let mut found = std::mem::take(&mut self.found);
         found.clear();
         self.tree.collect(&centre, &self.near, setting.outer + radius, &mut found);
         for &id in &found {
-            if smooth >> WHOLE & 1 == 1 {
+            if smooth::smooth(served) >> WHOLE & 1 == 1 {
                 break;
             }
             let site = self.tree.site(id);
             let squares = frame.positions.map(|x| site.distance_squared(&x));
-            smooth = smooth::smooth(setting, frame, &[squares], smooth);
+            served = smooth::served(setting, frame, &[squares], served);
         }
         self.found = found;
-        smooth
+        served
     }
 
     /// Lists the sites near what no site covers of a tetrahedron, which is left in `outside`.

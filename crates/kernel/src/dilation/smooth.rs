@@ -26,8 +26,8 @@ const SIMPLICES: [u8; 11] = [0b0011, 0b0101, 0b1001, 0b0110, 0b1010, 0b1100, 0b0
 /// The tetrahedron itself.
 pub(super) const WHOLE: u8 = 0b1111;
 
-/// The smooth simplices of a tetrahedron: bit s of the result for the simplex with mask s. Simplices that cover nothing are smooth.
-pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], known: u16) -> u16 {
+/// The simplices of a tetrahedron that one of some sites serves, besides those `known` to be: bit s for the simplex with mask s. Those that cover nothing need no site.
+pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], known: u16) -> u16 {
     let covered = |v: usize| frame.covered >> v & 1 == 1;
     let shares: [f64; 4] = std::array::from_fn(|v| share(frame.values[v].least, frame.values[v].far));
     let outer = setting.outer * (1.0 - 1e-9) - setting.slack;
@@ -47,11 +47,16 @@ pub(super) fn smooth(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
     let mut result = known;
     for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
-        let own = SIMPLICES.iter().filter(|&&part| part != s && part & s == part).all(|&part| result >> part & 1 == 1);
-        let is_smooth = nothing || (own && is_long(&frame.numbers, s) && (0..squares.len()).any(|site| serves(s, site) && is_steep(setting, frame, &squares[site], s)));
-        result |= u16::from(is_smooth) << s;
+        let serves = |site: usize| serves(s, site) && is_steep(setting, frame, &squares[site], s);
+        result |= u16::from(nothing || (is_long(&frame.numbers, s) && (0..squares.len()).any(serves))) << s;
     }
     result
+}
+
+/// The smooth simplices, from those that are served by any site: all of their own simplices must be, too.
+pub(super) fn smooth(served: u16) -> u16 {
+    let own = |result: u16, s: u8| SIMPLICES.iter().all(|&part| part == s || part & s != part || result >> part & 1 == 1);
+    SIMPLICES.into_iter().fold(VERTICES, |result, s| result | u16::from(served >> s & 1 == 1 && own(result, s)) << s)
 }
 
 /// Whether the distance grows at a rate above [`LEAST_RATE`] towards one point, everywhere in what a site leaves of a simplex.
