@@ -21,6 +21,7 @@ mod block;
 mod embedding;
 mod lattice;
 mod octree;
+mod stability;
 mod stitch;
 mod tree;
 
@@ -36,6 +37,7 @@ use octree::Pass;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use tree::Candidates;
+pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
 
 /// A dilated shape with what is proven of it. Lengths in mm.
 #[derive(Clone, Debug)]
