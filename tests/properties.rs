@@ -32,7 +32,7 @@ fn job(shape: Shape, kind: JobKind, tolerance_mm: f64, radius_mm: Option<f64>) -
     Job {
         kind,
         inputs: vec![Input { name: "shape".into(), model: Model { name: None, shape } }],
-        params: Params { tolerance_mm, radius_mm, normals: false },
+        params: Params { tolerance_mm, radius_mm, normals: false, stability: false },
         outputs: Vec::new(),
         limits: Limits::default(),
     }

@@ -30,7 +30,7 @@ fn main() {
             name: "shape".into(),
             model: Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) },
         }],
-        params: Params { tolerance_mm, radius_mm: Some(0.4), normals: false },
+        params: Params { tolerance_mm, radius_mm: Some(0.4), normals: false, stability: false },
         outputs: Vec::new(),
         limits,
     };

@@ -150,6 +150,9 @@ pub(super) struct SolidifyArgs {
     /// Radius of the ball, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: f64,
+    /// Examine at which radii nearby the topology changes, and from which on the shape is one piece: takes longer.
+    #[arg(long)]
+    pub(super) stability: bool,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]

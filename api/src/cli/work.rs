@@ -22,19 +22,19 @@ pub(super) struct Manner {
 
 /// `lacuna solidify`.
 pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: Some(args.radius), normals: false };
+    let params = Params { tolerance_mm: args.tolerance, radius_mm: Some(args.radius), normals: false, stability: args.stability };
     make(JobKind::Solidify, &args.model, params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna evaluate`.
 pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: None, normals: args.normals };
+    let params = Params { tolerance_mm: args.tolerance, radius_mm: None, normals: args.normals, stability: false };
     make(JobKind::Evaluate, &args.model, params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: args.radius, normals: false };
+    let params = Params { tolerance_mm: args.tolerance, radius_mm: args.radius, normals: false, stability: false };
     let job = job_of(JobKind::Measure, &args.model, params, &[], &args.limits)?;
     let (outcome, _) = perform(&job, &args.limits, manner, |_, _| Ok(Vec::new()))?;
     print_json(&outcome.certificate)

@@ -19,8 +19,13 @@ pub(super) fn rows(manifest: &Manifest, got: &Value) -> Vec<Row> {
 /// The comparisons of `[exact]` and `[scalar.*]`.
 pub(super) fn stated(manifest: &Manifest, got: &Value) -> Vec<Row> {
     let exact = manifest.exact.iter().flat_map(|exact| &exact.members);
-    let exact = exact.map(|(name, expected)| exact_row(name, expected, got.get(name)));
-    exact.chain(manifest.scalar.iter().map(|(name, scalar)| scalar_row(name, scalar, got.get(name)))).collect()
+    let exact = exact.map(|(name, expected)| exact_row(name, expected, member(got, name)));
+    exact.chain(manifest.scalar.iter().map(|(name, scalar)| scalar_row(name, scalar, member(got, name)))).collect()
+}
+
+/// A member by its name, or one of a member by both with a dot between.
+fn member<'v>(got: &'v Value, name: &str) -> Option<&'v Value> {
+    name.split('.').try_fold(got, |value, part| value.get(part))
 }
 
 fn exact_row(name: &str, expected: &toml::Value, got: Option<&Value>) -> Row {

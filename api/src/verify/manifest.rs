@@ -13,6 +13,9 @@ pub(super) struct Manifest {
     pub(super) kind: CaseKind,
     pub(super) tolerance_mm: Option<f64>,
     pub(super) radius_mm: Option<f64>,
+    /// Whether the topology at radii nearby is examined.
+    #[serde(default)]
+    pub(super) stability: bool,
     pub(super) exact: Option<Exact>,
     #[serde(default)]
     pub(super) scalar: BTreeMap<String, Scalar>,
@@ -141,6 +144,9 @@ impl Manifest {
             (CaseKind::Solidify, None) => return Err("`solidify` needs radius_mm".into()),
             (CaseKind::Evaluate | CaseKind::Solve, Some(_)) => return Err("`evaluate` and `solve` have no radius_mm".into()),
             _ => {}
+        }
+        if self.stability && self.kind != CaseKind::Solidify {
+            return Err("only `solidify` has stability".into());
         }
         let solves = self.kind == CaseKind::Solve;
         if solves == self.tolerance_mm.is_some() {

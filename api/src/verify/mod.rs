@@ -102,7 +102,12 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
     let job = Job {
         kind,
         inputs: vec![Input { name, model }],
-        params: Params { tolerance_mm: manifest.tolerance_mm.unwrap_or(f64::NAN), radius_mm: manifest.radius_mm, normals: false },
+        params: Params {
+            tolerance_mm: manifest.tolerance_mm.unwrap_or(f64::NAN),
+            radius_mm: manifest.radius_mm,
+            normals: false,
+            stability: manifest.stability,
+        },
         outputs: Vec::new(),
         limits: Limits::default(),
     };

@@ -93,7 +93,7 @@ mod tests {
     fn done(name: &str, kind: JobKind, tolerance_mm: f64) -> Outcome {
         let model = read_model(find(name).unwrap().document.as_bytes(), &DocumentLimits::default()).unwrap();
         let inputs = vec![Input { name: name.to_owned(), model }];
-        let params = Params { tolerance_mm, radius_mm: None, normals: false };
+        let params = Params { tolerance_mm, radius_mm: None, normals: false, stability: false };
         let job = Job { kind, inputs, params, outputs: Vec::new(), limits: Limits::default() };
         run(&job, &Budget::default()).unwrap_or_else(|error| panic!("{name}: {error}"))
     }

@@ -1,7 +1,7 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
-use lacuna_kernel::dilation::Dilation;
+use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
 use lacuna_kernel::measure::AxisBox;
 use lacuna_kernel::measure::mass::{area, dilated_area, dilated_volume, mesh_measures, volume};
 use lacuna_kernel::tessellation::Tessellation;
@@ -99,6 +99,9 @@ pub struct Certificate {
     /// `true`, `false` or `"not_checked"`: the same topology at radius r - bound and r + bound.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::flag_schema))]
     pub topology_stable: Checked<bool>,
+    /// At which radii the topology changes: when the job asks.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub stability: Option<StabilityStatement>,
     /// `[[x, y, z] of the lower corner, [x, y, z] of the upper corner]`, each number an interval
     /// that contains the exact shape's.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::box_schema))]
@@ -128,6 +131,95 @@ pub struct Certificate {
     pub output_digests: std::collections::BTreeMap<String, String>,
     /// What the user should know, in words.
     pub warnings: Vec<String>,
+}
+
+/// What happens to the topology when the radius grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum TopologyChange {
+    /// Parts join, or a tunnel forms.
+    Joins,
+    /// A tunnel closes, or a cavity is sealed.
+    Closes,
+    /// A cavity fills.
+    Fills,
+    /// Not told.
+    Unclear,
+}
+
+/// Radii where the topology changes, or may.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct CriticalRadiusStatement {
+    /// The radii, in mm.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub radius_mm: Interval,
+    /// What happens there.
+    pub change: TopologyChange,
+    /// At how many places.
+    pub places: u64,
+    /// Whether it is proven that it happens; else it may.
+    pub proven: bool,
+    /// What it adds to the Euler number of the solid (half of its boundary's), where that is proven.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub euler: Option<i64>,
+}
+
+/// How the topology depends on the radius. Between the radii listed it is proven to stay the same.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct StabilityStatement {
+    /// All radii between these where the topology may change are listed, in mm.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub examined_mm: Interval,
+    /// The smallest radius from which on the shape is one piece lies between these, in mm.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub one_piece_mm: Interval,
+    /// The last radius where the topology may change before those within the bound, in mm.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub below: Option<CriticalRadiusStatement>,
+    /// The next one beyond them.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub above: Option<CriticalRadiusStatement>,
+    /// All of them, in ascending order.
+    pub critical: Vec<CriticalRadiusStatement>,
+}
+
+impl From<&CriticalRadius> for CriticalRadiusStatement {
+    fn from(critical: &CriticalRadius) -> Self {
+        let change = match critical.change {
+            Change::Joins => TopologyChange::Joins,
+            Change::Closes => TopologyChange::Closes,
+            Change::Fills => TopologyChange::Fills,
+            Change::Unclear => TopologyChange::Unclear,
+        };
+        let CriticalRadius { radius_mm, places, proven, euler, .. } = *critical;
+        Self { radius_mm, change, places, proven, euler }
+    }
+}
+
+impl Certificate {
+    /// Adds what was found of the topology at radii nearby, `reached` around the radius.
+    pub(crate) fn state_stability(&mut self, found: &Stability, radius: Radius, reached: Tolerance) {
+        self.topology_stable = match found.verdict {
+            Verdict::Stable => Checked::Found(true),
+            Verdict::Unstable => Checked::Found(false),
+            Verdict::Unresolved => Checked::NotChecked,
+        };
+        if found.verdict == Verdict::Unresolved {
+            let [low, high] = [radius.mm() - reached.mm(), radius.mm() + reached.mm()];
+            self.warnings.push(format!(
+                "the topology may change between radii of {low:.6} mm and {high:.6} mm, which is neither proven nor excluded; another radius or a smaller tolerance may tell"
+            ));
+        }
+        let [below, above] = found.neighbours(radius, reached).map(|critical| critical.map(CriticalRadiusStatement::from));
+        let critical = found.critical.iter().map(CriticalRadiusStatement::from).collect();
+        self.stability =
+            Some(StabilityStatement { examined_mm: found.examined_mm, one_piece_mm: found.one_piece_mm, below, above, critical });
+    }
 }
 
 fn corners(bounds: &AxisBox) -> [[Interval; 3]; 2] {

@@ -26,6 +26,8 @@ pub struct Params {
     pub radius_mm: Option<f64>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
     pub normals: bool,
+    /// Whether the topology of a solid is examined at radii nearby.
+    pub stability: bool,
 }
 
 /// A model with the name that the job gives it.

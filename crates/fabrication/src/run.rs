@@ -2,7 +2,7 @@
 
 use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refine_with_normals, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
-use lacuna_kernel::dilation::{DilationError, dilate, predict};
+use lacuna_kernel::dilation::{DilationError, dilate, predict, stability};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::{Finding, Lowered, Model};
@@ -172,7 +172,13 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         (JobKind::Evaluate, _) => evaluate(attractor, tolerance, job.params.normals, budget),
         (JobKind::Solidify, Some(radius)) => {
             let dilation = dilate(attractor, radius, tolerance, budget)?;
-            let certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+            let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+            if job.params.stability {
+                // Critical radii from half to twice the radius, and whether there are any within the bound that was reached.
+                let reached = Tolerance::new(certificate.achieved_bound_mm)?;
+                let found = stability(attractor, radius, reached, [0.5 * radius.mm(), 2.0 * radius.mm()], budget)?;
+                certificate.state_stability(&found, radius, reached);
+            }
             Ok(Outcome { geometry: Geometry::Solid(dilation.solid), certificate })
         }
         (JobKind::Solidify, None) => {

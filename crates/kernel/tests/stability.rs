@@ -1,6 +1,8 @@
 //! Critical radii against closed forms, an alpha complex by brute force, and Euler numbers of dilated meshes.
 #![allow(clippy::unwrap_used)]
 
+// Its other half is for certificates.
+#[allow(dead_code)]
 mod oracle;
 
 use glam::{DMat3, DQuat, DVec3};
@@ -224,7 +226,7 @@ fn critical_values(list: &[DVec3]) -> Vec<(f64, usize)> {
 }
 
 fn sign(index: usize) -> i64 {
-    if index % 2 == 0 { 1 } else { -1 }
+    if index.is_multiple_of(2) { 1 } else { -1 }
 }
 
 #[test]

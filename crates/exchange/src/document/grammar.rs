@@ -948,6 +948,11 @@ pub(super) const JOB_PARAMS: Object = Object {
             "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",
             flag,
         ),
+        optional(
+            "stability",
+            "Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent.",
+            flag,
+        ),
     ],
 };
 

@@ -278,7 +278,17 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(place) => walker.flag(place)?,
         None => false,
     };
-    Some(Params { tolerance_mm: tolerance?, radius_mm, normals })
+    if let (Some(JobKind::Evaluate | JobKind::Measure), Some(place)) = (kind, members.get("stability")) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "only solidify takes \"stability\"; remove it, or ask for the kind \"solidify\"".to_owned()
+        });
+        return None;
+    }
+    let stability = match members.get("stability") {
+        Some(place) => walker.flag(place)?,
+        None => false,
+    };
+    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, stability })
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {

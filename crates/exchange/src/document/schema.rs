@@ -155,8 +155,17 @@ fn job() -> Value {
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
         kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"], "not": { "required": ["normals"] } } } })),
-        kind("evaluate", json!({ "properties": { "params": { "not": { "required": ["radius_mm"] } } } })),
-        kind("measure", json!({ "properties": { "outputs": { "maxItems": 0 }, "params": { "not": { "required": ["normals"] } } } })),
+        kind(
+            "evaluate",
+            json!({ "properties": { "params": { "not": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["stability"] }] } } } })
+        ),
+        kind(
+            "measure",
+            json!({ "properties": {
+                "outputs": { "maxItems": 0 },
+                "params": { "not": { "anyOf": [{ "required": ["normals"] }, { "required": ["stability"] }] } },
+            } }),
+        ),
     ]);
     schema
 }

@@ -257,7 +257,8 @@ object! {
     lacuna_fabrication::job::Params: |params, members| members
         .put("tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
-        .put_if(params.normals, "normals", &true)?;
+        .put_if(params.normals, "normals", &true)?
+        .put_if(params.stability, "stability", &true)?;
     Limits: |limits, members| members
         .put("seconds", &Number(limits.seconds))?
         .put("triangles", &limits.triangles)?

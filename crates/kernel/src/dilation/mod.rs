@@ -34,10 +34,10 @@ use crate::solid::{Solid, SolidError};
 use crate::tolerance::{Radius, Tolerance};
 use lattice::{ENCLOSING, Lattice};
 use octree::Pass;
+pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use tree::Candidates;
-pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
 
 /// A dilated shape with what is proven of it. Lengths in mm.
 #[derive(Clone, Debug)]

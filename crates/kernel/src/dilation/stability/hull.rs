@@ -77,7 +77,7 @@ pub(super) fn critical_simplices(x: &Point, near: &[Near], h: f64) -> Option<Vec
         // How far errors move the centre, and its weights.
         let moved = GROWTH * error * (1.0 + radius / shortest);
         let shifted = moved / shortest;
-        if !(moved <= 1e-3 * h) {
+        if moved.is_nan() || moved > 1e-3 * h {
             return None;
         }
         if distance_squared(&centre, x).sqrt() > h * 1.001 || weights.iter().any(|&weight| weight < -shifted) {
