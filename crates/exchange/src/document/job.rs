@@ -268,27 +268,27 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(radius) => Some(radius?),
         None => None,
     };
-    if let (Some(JobKind::Solidify | JobKind::Measure), Some(normals)) = (kind, members.get("normals")) {
-        walker.fault(&normals, code::CONFLICTING_MEMBERS, || {
-            "only evaluate takes \"normals\"; remove it, or ask for the kind \"evaluate\"".into()
-        });
-        return None;
-    }
-    let normals = match members.get("normals") {
-        Some(place) => walker.flag(place)?,
-        None => false,
-    };
-    if let (Some(JobKind::Evaluate | JobKind::Measure), Some(place)) = (kind, members.get("stability")) {
-        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-            "only solidify takes \"stability\"; remove it, or ask for the kind \"solidify\"".to_owned()
-        });
-        return None;
-    }
-    let stability = match members.get("stability") {
-        Some(place) => walker.flag(place)?,
-        None => false,
-    };
+    let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"))?;
+    let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"))?;
     Some(Params { tolerance_mm: tolerance?, radius_mm, normals, stability })
+}
+
+/// A flag that one kind of job takes, and what that kind is called; false when absent.
+fn flag_of(
+    walker: &mut Walker<'_>,
+    members: &Members<'_>,
+    kind: Option<JobKind>,
+    name: &str,
+    (owner, word): (JobKind, &str),
+) -> Option<bool> {
+    let Some(place) = members.get(name) else { return Some(false) };
+    if kind.is_some_and(|kind| kind != owner) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            format!("only {word} takes \"{name}\"; remove it, or ask for the kind \"{word}\"")
+        });
+        return None;
+    }
+    walker.flag(place)
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {
