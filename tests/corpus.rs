@@ -127,6 +127,7 @@ fn every_expectation_has_a_source() {
         assert!(expected.about.len() > 10, "{}", case.name);
         let sound = |point: &cases::Point| point.relative >= 0.0 && point.relative < 1e-6 && point.value.iter().all(|x| x.is_finite());
         assert!(expected.point.values().all(sound), "{}", case.name);
+        assert!(!expected.stability || expected.kind == "solidify", "{}: only solidify examines the stability", case.name);
         let sources = expected.scalar.values().flat_map(|s| [&s.source, &s.reason]);
         let sources = sources.chain(expected.exact_box.iter().flat_map(|b| [&b.source, &b.reason]));
         let sources =

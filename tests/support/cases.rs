@@ -98,6 +98,9 @@ pub struct Expected {
     pub tolerance_mm: f64,
     /// The radius.
     pub radius_mm: Option<f64>,
+    /// Whether the stability of the topology is examined.
+    #[serde(default)]
+    pub stability: bool,
     /// Exact members of the certificate, and their source.
     #[serde(default)]
     pub exact: BTreeMap<String, toml::Value>,

@@ -6,6 +6,7 @@ pub mod automaton;
 pub mod budget;
 pub mod dilation;
 pub mod error;
+mod groups;
 pub mod measure;
 pub mod model;
 pub mod solid;

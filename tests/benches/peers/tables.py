@@ -55,7 +55,7 @@ def comparison(rows, truth, divisor):
                 lines.append(f"| {name} | {row['program']} | | | | | | no result: {row['failed']} | | |")
                 continue
             error = number(row["error_over_tolerance"], 4) + ("" if passes(row) else ", **fails**") + (" (sampled)" if "sampled_triangles" in row else "")
-            if "claimed_inner" in row and any(row[k] > row["claimed_" + k] * (1 + 1e-9) for k in ("inner", "outer")):
+            if "claimed_inner" in row and any(row.get(k, 0) > row["claimed_" + k] * (1 + 1e-9) for k in ("inner", "outer")):
                 error += ", **beyond its claim**"
             if row.get("solid") is False:
                 error += ", **not the solid**"

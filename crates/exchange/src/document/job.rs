@@ -268,33 +268,29 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(radius) => Some(radius?),
         None => None,
     };
-    if let (Some(JobKind::Solidify | JobKind::Measure), Some(normals)) = (kind, members.get("normals")) {
-        walker.fault(&normals, code::CONFLICTING_MEMBERS, || {
-            "only evaluate takes \"normals\"; remove it, or ask for the kind \"evaluate\"".into()
+    let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
+    let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
+    let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
+    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, simplify, stability })
+}
+
+/// A flag that one kind of job takes, what that kind is called, and what the flag is when absent.
+fn flag_of(
+    walker: &mut Walker<'_>,
+    members: &Members<'_>,
+    kind: Option<JobKind>,
+    name: &str,
+    (owner, word): (JobKind, &str),
+    absent: bool,
+) -> Option<bool> {
+    let Some(place) = members.get(name) else { return Some(absent) };
+    if kind.is_some_and(|kind| kind != owner) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            format!("only {word} takes \"{name}\"; remove it, or ask for the kind \"{word}\"")
         });
         return None;
     }
-    let normals = match members.get("normals") {
-        Some(place) => walker.flag(place)?,
-        None => false,
-    };
-    for name in ["simplify", "stability"] {
-        if let (Some(JobKind::Evaluate | JobKind::Measure), Some(place)) = (kind, members.get(name)) {
-            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-                format!("only solidify takes \"{name}\"; remove it, or ask for the kind \"solidify\"")
-            });
-            return None;
-        }
-    }
-    let simplify = match members.get("simplify") {
-        Some(place) => walker.flag(place)?,
-        None => true,
-    };
-    let stability = match members.get("stability") {
-        Some(place) => walker.flag(place)?,
-        None => false,
-    };
-    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, simplify, stability })
+    walker.flag(place)
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {

@@ -14,6 +14,7 @@
 use super::StateBound;
 use super::cell::Point;
 use crate::automaton::{Automaton, Contraction, State, StateId, SubdivisionOperator};
+use crate::groups::Groups;
 use std::collections::BTreeMap;
 
 /// Children of a state beyond which nothing is proven.
@@ -127,7 +128,7 @@ fn gap(automaton: &Automaton, bounds: &[StateBound], contraction: &Contraction, 
     }
     let size = reach.as_flattened().iter().fold(0.0_f64, |a, x| a.max(x.abs()));
     let same = SAME_POINT * size;
-    let mut group: Vec<usize> = (0..state.transitions.len()).collect();
+    let mut groups = Groups::new(state.transitions.len());
     let mut met: BTreeMap<[i64; 3], (usize, Point)> = BTreeMap::new();
     let mut widest = 0.0_f64;
     for (child, transition) in state.transitions.iter().enumerate() {
@@ -137,26 +138,17 @@ fn gap(automaton: &Automaton, bounds: &[StateBound], contraction: &Contraction, 
             for corner in 0..8 {
                 let key = std::array::from_fn(|axis| ((point[axis] / same + f64::from(corner >> axis & 1) - 0.5) * 0.5).floor() as i64);
                 let (other, there) = *met.entry(key).or_insert((child, point));
-                if find(&group, other) == find(&group, child) {
+                if groups.of(other) == groups.of(child) {
                     continue;
                 }
                 let apart = contraction.distance(StateId::new(index), &barycentric(&there), &barycentric(&point));
                 if (0..3).all(|axis| (there[axis] - point[axis]).abs() <= same) {
-                    let (from, to) = (find(&group, other), find(&group, child));
-                    group[from] = to;
+                    groups.join(other, child);
                     widest = widest.max(apart);
                 }
             }
         }
     }
-    let first = find(&group, 0);
     // Points themselves are known up to rounding.
-    (0..group.len()).all(|child| find(&group, child) == first).then_some(widest + 1e-12 * size)
-}
-
-fn find(group: &[usize], mut node: usize) -> usize {
-    while group[node] != node {
-        node = group[node];
-    }
-    node
+    groups.all().into_iter().all(|group| group == 0).then_some(widest + 1e-12 * size)
 }

@@ -2,6 +2,7 @@
 
 use super::{SolidError, TriMesh};
 use crate::budget::Budget;
+use crate::groups::Groups;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -128,17 +129,17 @@ impl Topology {
 
     /// Shells by union-find over vertices; the sign of each shell's volume tells cavities.
     fn count_shells(&mut self, mesh: &TriMesh) {
-        let mut parent: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+        let mut groups = Groups::new(mesh.vertices.len());
         for &[a, b, c] in &mesh.triangles {
-            union(&mut parent, a, b);
-            union(&mut parent, b, c);
+            groups.join(a as usize, b as usize);
+            groups.join(b as usize, c as usize);
         }
         let mut volumes: Vec<f64> = Vec::new();
         // The root's entry in `number` names its shell.
         let mut number = vec![u32::MAX; mesh.vertices.len()];
         let mut origins: Vec<DVec3> = Vec::new();
         for &[a, b, c] in &mesh.triangles {
-            let root = find(&mut parent, a) as usize;
+            let root = groups.of(a as usize) as usize;
             if number[root] == u32::MAX {
                 number[root] = volumes.len() as u32;
                 volumes.push(0.0);
@@ -151,22 +152,6 @@ impl Topology {
         self.shells = volumes.len() as u64;
         self.cavities = volumes.iter().filter(|&&volume| volume < 0.0).count() as u64;
         self.components = self.shells - self.cavities;
-    }
-}
-
-fn find(parent: &mut [u32], mut vertex: u32) -> u32 {
-    while parent[vertex as usize] != vertex {
-        let above = parent[parent[vertex as usize] as usize];
-        parent[vertex as usize] = above;
-        vertex = above;
-    }
-    vertex
-}
-
-fn union(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(parent, a), find(parent, b));
-    if a != b {
-        parent[a.max(b) as usize] = a.min(b);
     }
 }
 

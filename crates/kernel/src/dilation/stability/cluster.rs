@@ -75,8 +75,7 @@ fn touching(cubes: &[Cube]) -> Vec<Vec<usize>> {
         let mut next = 0;
         while let Some(&index) = list.get(next) {
             next += 1;
-            for code in 0..27 {
-                let at = std::array::from_fn(|axis| cubes[index].at[axis] + code / [1, 3, 9][axis] % 3 - 1);
+            for at in around(cubes[index].at) {
                 if let Some(&other) = places.get(&at)
                     && !std::mem::replace(&mut seen[other], true)
                 {
@@ -88,6 +87,11 @@ fn touching(cubes: &[Cube]) -> Vec<Vec<usize>> {
         lists.push(list);
     }
     lists
+}
+
+/// A place and the 26 that touch it.
+fn around(at: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
+    (0..27).map(move |code| std::array::from_fn(|axis| at[axis] + code / [1, 3, 9][axis] % 3 - 1))
 }
 
 fn cluster(cells: &Cells<'_>, grid: &Grid, cubes: Vec<Cube>) -> Cluster {
@@ -123,11 +127,7 @@ fn only_simplex(cells: &Cells<'_>, grid: &Grid, cubes: &[Cube]) -> Option<usize>
 /// The cubes and all that touch them: clusters do not touch, so no other cluster's are among them.
 fn grown(cells: &Cells<'_>, grid: &Grid, cubes: &[Cube]) -> Option<Vec<Cube>> {
     let own: BTreeSet<[i64; 3]> = cubes.iter().map(|cube| cube.at).collect();
-    let around = |cube: &Cube| {
-        let at = cube.at;
-        (0..27).map(move |code| std::array::from_fn(|axis: usize| at[axis] + code / [1, 3, 9][axis] % 3 - 1))
-    };
-    let all: BTreeSet<[i64; 3]> = cubes.iter().flat_map(around).collect();
+    let all: BTreeSet<[i64; 3]> = cubes.iter().flat_map(|cube| around(cube.at)).collect();
     if all.len() > MOST_GROWN {
         return None;
     }

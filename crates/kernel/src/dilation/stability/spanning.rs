@@ -2,6 +2,7 @@
 
 use crate::attractor::cell::{Point, Site, closest_on_segment, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
+use crate::groups::Groups;
 use rayon::prelude::*;
 
 /// A site with an error and the label of those it is joined to.
@@ -54,34 +55,6 @@ impl Item {
         let low = std::array::from_fn(|axis| corners.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
         let high = std::array::from_fn(|axis| corners.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
         Self { site, error, label, low, high }
-    }
-}
-
-/// Groups that are joined in turn.
-struct Groups(Vec<u32>);
-
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn of(&mut self, mut item: usize) -> u32 {
-        while self.0[item] as usize != item {
-            self.0[item] = self.0[self.0[item] as usize];
-            item = self.0[item] as usize;
-        }
-        item as u32
-    }
-
-    /// Whether they were apart.
-    fn join(&mut self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.of(a), self.of(b));
-        self.0[a.max(b) as usize] = a.min(b);
-        a != b
-    }
-
-    fn all(&mut self) -> Vec<u32> {
-        (0..self.0.len()).map(|item| self.of(item)).collect()
     }
 }
 
