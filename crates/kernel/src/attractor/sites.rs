@@ -31,7 +31,7 @@ impl SiteError {
 enum Choice {
     /// The centre of the ball.
     Centre,
-    /// What the model draws.
+    /// What the model draws, or the centre of the ball where that is closer.
     Drawn,
     /// The points of the state's cover.
     Cover,
@@ -70,7 +70,12 @@ impl<'a> SiteRule<'a> {
 
     /// The share of r^2 - (r - e)^2 that is the lattice's: all of it where sites are cells themselves, without error.
     pub(crate) fn lattice_share(&self) -> f64 {
-        if self.used.iter().all(|&index| self.is_simplex(index)) { 1.0 } else { 1.0 - SITE_SHARE }
+        if self.is_exact() { 1.0 } else { 1.0 - SITE_SHARE }
+    }
+
+    /// Whether sites are the attractor itself.
+    pub(crate) fn is_exact(&self) -> bool {
+        self.used.iter().all(|&index| self.is_simplex(index))
     }
 
     /// How far sites may be from the attractor.
@@ -88,7 +93,7 @@ impl<'a> SiteRule<'a> {
     pub(crate) fn leaf(&self, cell: &Cell, points: &[ControlPoint]) -> Option<SiteError> {
         let error = match self.choices[cell.state.index()] {
             Choice::Centre => both(cell.ball.radius),
-            Choice::Drawn => both(self.attractor.leaf_error(cell, points)),
+            Choice::Drawn => both(self.attractor.leaf_error(cell, points).min(cell.ball.radius)),
             Choice::Cover => {
                 let cover = self.attractor.cover(cell.state)?;
                 let columns = frame_columns(points);
@@ -107,8 +112,8 @@ impl<'a> SiteRule<'a> {
     #[inline]
     pub(crate) fn emit(&self, cell: &Cell, points: &[ControlPoint], sink: &mut impl FnMut(Site)) {
         match self.choices[cell.state.index()] {
-            Choice::Centre => sink(Site::Point(cell.ball.centre)),
-            Choice::Drawn => self.attractor.emit(cell, points, sink),
+            Choice::Drawn if self.attractor.leaf_error(cell, points) <= cell.ball.radius => self.attractor.emit(cell, points, sink),
+            Choice::Centre | Choice::Drawn => sink(Site::Point(cell.ball.centre)),
             Choice::Cover => {
                 let Some(cover) = self.attractor.cover(cell.state) else { return };
                 let columns = frame_columns(points);
@@ -138,12 +143,11 @@ fn both(error: f64) -> SiteError {
 }
 
 /// Chooses for every state that a root of affine maps reaches the kind of site with the least expected work; all states
-/// of such a root have the same kind. Other states are drawn where their drawing is close, and else stand as points.
+/// of such a root have the same kind. Other states are drawn.
 fn choose(rule: &mut SiteRule<'_>) {
     let attractor = rule.attractor;
     let states = attractor.automaton().states();
-    let close = |leaf: &LeafPrimitive| matches!(leaf, LeafPrimitive::Chord(_) | LeafPrimitive::Simplex);
-    rule.choices = states.iter().map(|state| if close(&state.leaf) { Choice::Drawn } else { Choice::Centre }).collect();
+    rule.choices = vec![Choice::Drawn; states.len()];
     let mut decided = vec![false; states.len()];
     for (index, root) in attractor.roots().iter().enumerate() {
         if !states[root.state.index()].frame || decided[root.state.index()] {

@@ -144,7 +144,7 @@ impl View {
     }
 }
 
-/// The views from a vertex, the nearest first.
+/// The views from a vertex, the nearest [`MOST_COVERING`] first and in order.
 #[derive(Clone, Copy, Debug, Default)]
 struct Range {
     first: u32,
@@ -192,14 +192,20 @@ impl Nearby {
         self.ranges.len() as u32 - 1
     }
 
-    /// Forgets what is seen from a vertex, which moves.
-    pub(super) fn forget(&mut self, vertex: u32) {
-        self.ranges[vertex as usize] = Range::default();
+    /// Begins with another place to try, and forgets what was seen from the last one.
+    pub(super) fn try_another(&mut self) {
+        let trial = self.trial() as usize;
+        let range = std::mem::take(&mut self.ranges[trial]);
+        // Else others were looked for since.
+        if range.count > 0 && (range.first + range.count) as usize == self.views.len() {
+            self.views.truncate(range.first as usize);
+        }
     }
 
     /// Gives a vertex the views of the place that is tried.
     pub(super) fn accept(&mut self, vertex: u32) {
-        self.ranges[vertex as usize] = self.ranges[self.trial() as usize];
+        let trial = self.trial() as usize;
+        self.ranges[vertex as usize] = std::mem::take(&mut self.ranges[trial]);
     }
 
     /// Sees to it that all sites within a squared distance of a vertex at x are known.
@@ -223,8 +229,15 @@ impl Nearby {
         for view in &mut views[first..] {
             view.highest = highest(&tree.site(view.site), &view.normal);
         }
-        views[first..].sort_unstable_by(|a, b| a.square.total_cmp(&b.square));
-        self.ranges[vertex as usize] = Range { first: first as u32, count: (views.len() - first) as u32, square };
+        let views = &mut views[first..];
+        let nearer = |a: &View, b: &View| a.square.total_cmp(&b.square).then_with(|| a.site.cmp(&b.site));
+        // Only the nearest may tell coverage.
+        if views.len() > MOST_COVERING {
+            views.select_nth_unstable_by(MOST_COVERING, nearer);
+        }
+        let sorted = views.len().min(MOST_COVERING);
+        views[..sorted].sort_unstable_by(nearer);
+        self.ranges[vertex as usize] = Range { first: first as u32, count: views.len() as u32, square };
     }
 
     #[inline]
@@ -248,7 +261,7 @@ impl Nearby {
         self.see(tree, places, vertex, &at, self.square);
         let range = self.ranges[vertex as usize];
         let mut mask = 0;
-        for view in &self.views[range.first as usize..(range.first + range.count) as usize] {
+        for view in self.views[range.first as usize..(range.first + range.count) as usize].iter().take(MOST_COVERING) {
             if view.square > self.square {
                 break;
             }
@@ -276,7 +289,7 @@ impl Nearby {
     pub(super) fn foot(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point) -> Option<Point> {
         self.see(tree, places, vertex, x, self.square);
         let mut foot: Option<Point> = None;
-        for view in self.views(vertex).iter().take_while(|view| view.square <= self.square) {
+        for view in self.views(vertex).iter().filter(|view| view.square <= self.square) {
             let length = view.square.sqrt();
             let closest = std::array::from_fn(|axis| x[axis] - length * view.normal[axis]);
             if foot.is_some_and(|known| distance_squared(&known, &closest) > 1e-12 * self.square) {
@@ -411,8 +424,8 @@ impl Nearby {
         cleared.clear();
         directions.clear();
         for corner in corners {
-            for view in views(corner).iter().take_while(|view| view.square < enough) {
-                if view.parts(triangle, least) || cleared.contains(&view.site) {
+            for view in views(corner) {
+                if view.square >= enough || view.parts(triangle, least) || cleared.contains(&view.site) {
                     continue;
                 }
                 let site = tree.site(view.site);

@@ -50,6 +50,8 @@ pub(crate) struct Setting {
     pub(super) slack: f64,
     /// How far a position moves when it becomes a single-precision number.
     pub(super) rounding: f64,
+    /// Whether sites are the attractor itself, so that critical points of their distance are those of its own.
+    pub(super) exact: bool,
     /// Whether simplification only removes what cannot be a solid.
     pub(super) clean_only: bool,
     /// What was asked.
@@ -99,6 +101,7 @@ impl Setting {
             most: integer(largest),
             slack: 1e-13 * extent,
             rounding: rounding(self::extent(bounds, 3.0 * radius)),
+            exact: false,
             clean_only: false,
             tolerance,
             cells,
@@ -194,6 +197,7 @@ impl<'a> Plan<'a> {
         // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
         Setting {
+            exact: self.rule.is_exact(),
             clean_only: self.clean_only,
             ..Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds)
         }

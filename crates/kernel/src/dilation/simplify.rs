@@ -294,7 +294,7 @@ impl<'a> Simplifier<'a> {
             return false;
         }
         let trial = self.nearby.trial();
-        self.nearby.forget(trial);
+        self.nearby.try_another();
         let corners = self.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
         self.nearby.begin(&mut self.tree, &mut self.places, corners);
         self.nearby.mark(&mut self.tree, &mut self.places, trial, to);

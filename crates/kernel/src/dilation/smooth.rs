@@ -44,7 +44,11 @@ pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
                 })
         })
     };
+    let near = |site: usize| (0..4).any(|v| covered(v) && squares[site][v] <= square);
     let mut result = known;
+    if frame.covered != 0 && !(0..squares.len()).any(near) {
+        return result;
+    }
     for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
         let serves = |site: usize| serves(s, site) && is_steep(setting, frame, &squares[site], s);

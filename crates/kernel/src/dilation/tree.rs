@@ -63,7 +63,7 @@ struct Node {
 }
 
 /// A site of the tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum SiteId {
     /// An entry of the list of points.
     Point(u32),
