@@ -74,8 +74,21 @@ impl<'a> SiteRule<'a> {
     }
 
     /// Whether sites are the attractor itself.
-    pub(crate) fn is_exact(&self) -> bool {
+    fn is_exact(&self) -> bool {
         self.used.iter().all(|&index| self.is_simplex(index))
+    }
+
+    /// Whether some sites are points that stand for cells: there are many of them then, close to each other.
+    pub(crate) fn is_dense(&self) -> bool {
+        let states = self.attractor.automaton().states();
+        self.used.iter().any(|&index| {
+            let sparse = match states[index].leaf {
+                LeafPrimitive::Simplex | LeafPrimitive::Chord(_) | LeafPrimitive::Drawn(_) => true,
+                LeafPrimitive::Polygon(_) => self.attractor.precision(StateId::new(index)).is_some(),
+                LeafPrimitive::Centre | LeafPrimitive::Star(_) => false,
+            };
+            self.choices[index] != Choice::Drawn || !sparse
+        })
     }
 
     /// How far sites may be from the attractor.
@@ -183,8 +196,11 @@ const PATHS: u32 = 64;
 /// Longest of them.
 const LONGEST_PATH: u32 = 200;
 
+/// Larger children are followed more often: as if the dimension were this.
+const LIKELY_DIMENSION: f64 = 1.5;
+
 /// The number of sites below a root, estimated from leaves of a few paths spread over the addresses, each of which stands
-/// for as many leaves as the product of the numbers of children on the way (Knuth, "Estimating the efficiency of backtrack
+/// for as many leaves as its probability has in one (Knuth, "Estimating the efficiency of backtrack
 /// programs", Math. Comp. 29, 1975). Nothing but time depends on it.
 fn expected_sites(rule: &SiteRule<'_>, root: usize) -> f64 {
     let attractor = rule.attractor;
@@ -199,12 +215,26 @@ fn expected_sites(rule: &SiteRule<'_>, root: usize) -> f64 {
             if transitions.is_empty() || depth == LONGEST_PATH {
                 return f64::INFINITY;
             }
-            let scaled = address * transitions.len() as f64;
-            let index = (scaled as usize).min(transitions.len() - 1);
-            (address, weight, depth) = (scaled.fract(), weight * transitions.len() as f64, depth + 1);
-            let mut child = vec![[0.0; 4]; transitions[index].operator.columns()];
-            child_points(&points, &transitions[index].operator, &mut child);
-            (cell, points) = (attractor.child_cell(&cell, index, &child), child);
+            let children: Vec<(Cell, Vec<ControlPoint>)> = transitions
+                .iter()
+                .enumerate()
+                .map(|(index, transition)| {
+                    let mut child = vec![[0.0; 4]; transition.operator.columns()];
+                    child_points(&points, &transition.operator, &mut child);
+                    (attractor.child_cell(&cell, index, &child), child)
+                })
+                .collect();
+            let shares: Vec<f64> = children.iter().map(|(child, _)| child.ball.radius.max(0.01 * cell.ball.radius).powf(LIKELY_DIMENSION)).collect();
+            let total: f64 = shares.iter().sum();
+            let mut rest = address * total;
+            let mut chosen = 0;
+            while chosen + 1 < shares.len() && rest >= shares[chosen] {
+                rest -= shares[chosen];
+                chosen += 1;
+            }
+            let share = if total > 0.0 { shares[chosen] / total } else { 1.0 / shares.len() as f64 };
+            (address, weight, depth) = ((rest / shares[chosen]).clamp(0.0, 0.999_999_999), weight / share, depth + 1);
+            (cell, points) = children.into_iter().nth(chosen).expect("one of the children was chosen");
         }
         let mut sites = 0.0;
         // Points are cheaper than segments, and those than triangles.

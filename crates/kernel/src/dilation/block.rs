@@ -104,6 +104,21 @@ pub(super) struct Frame {
 }
 
 impl Frame {
+    /// Whether a covered vertex is so near to all the others that the whole tetrahedron is within `outer`: there the distance is at most r plus the longest edge.
+    fn is_close(&self, setting: &Setting) -> bool {
+        let longest = (0..4).flat_map(|p| (0..p).map(move |q| (p, q))).map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q])).fold(0.0, f64::max);
+        longest.sqrt() + setting.slack < setting.close
+    }
+
+    /// The cubes around it that are not subdivided and larger than the finest.
+    fn cubes(&self) -> impl Iterator<Item = Cube> {
+        let edge = UNITS >> self.level;
+        self.numbers.into_iter().filter(move |number| number.iter().all(|&x| i64::from(x).rem_euclid(edge) == edge / 2)).map(move |number| Cube {
+            level: self.level,
+            index: number.map(|x| i64::from(x).div_euclid(edge)),
+        })
+    }
+
     /// The values of V of a simplex.
     pub(super) fn values_of(&self, simplex: u8) -> [i64; 4] {
         std::array::from_fn(|k| if simplex >> k & 1 == 1 { self.values[k].least } else { self.values[k].far })
@@ -384,6 +399,9 @@ impl<'a> Workshop<'a> {
     /// Emits the surface in a tetrahedron; notes the cubes to subdivide if a critical point of the distance may be on the wrong side.
     fn tetrahedron(&mut self, setting: &Setting, numbers: [Number; 4], level: u32, surface: &mut BlockSurface) {
         let Some(mut frame) = self.frame(setting, numbers, level, surface) else { return };
+        if setting.dense {
+            return self.dense_tetrahedron(setting, frame, surface);
+        }
         let theta = setting.reach * setting.reach;
         let squares = smooth::squares(&self.tree, &frame);
         if frame.covered == WHOLE && squares.iter().any(|squares| squares.iter().all(|&square| square < theta)) {
@@ -407,11 +425,9 @@ impl<'a> Workshop<'a> {
             // The solid's other parts lie in what sites cover.
             return;
         }
-        if setting.exact || std::env::var_os("SEARCH").is_some() {
-            let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
-            if !self.has_witness(setting, &frame, &rest) {
-                self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
-            }
+        let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
+        if !self.has_witness(setting, &frame, &rest) {
+            self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
         }
         if frame.covered == 0 {
             return;
@@ -430,6 +446,34 @@ impl<'a> Workshop<'a> {
             }
         }
         self.emit(&frame, surface);
+    }
+
+    /// The tetrahedron among sites that are too many to be told apart: marched as a whole, and its cubes to be subdivided unless what this fills is near a site.
+    fn dense_tetrahedron(&mut self, setting: &Setting, mut frame: Frame, surface: &mut BlockSurface) {
+        if frame.covered == 0 {
+            return;
+        }
+        if !frame.is_close(setting) {
+            self.witnesses(setting, surface, &mut frame);
+            let squares = smooth::squares(&self.tree, &frame);
+            let mut served = smooth::served(setting, &frame, &squares, smooth::PARTS);
+            if served >> WHOLE & 1 == 0 {
+                // The site nearest to the middle of what is filled.
+                let weights = frame.values.map(|value| if value.least < 0 { 1.0 } else { 0.5 });
+                let total: f64 = weights.iter().sum();
+                let middle = place(&frame.positions, &weights.map(|weight| weight / total));
+                if let Some(hit) = self.tree.nearest(&middle, &self.near, Some(frame.values[0].node), setting.outer, 0.0) {
+                    let site = self.tree.site(hit.site);
+                    let squares = frame.positions.map(|x| site.distance_squared(&x));
+                    served = smooth::served(setting, &frame, &[squares], served);
+                }
+            }
+            if served >> WHOLE & 1 == 0 {
+                surface.critical.extend(frame.cubes());
+                return;
+            }
+        }
+        self.march(&frame, surface);
     }
 
     /// Whether a point tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron.
@@ -556,7 +600,6 @@ impl<'a> Workshop<'a> {
         found.clear();
         self.tree.collect(&centre, &self.near, setting.outer + radius, &mut found);
         let mut cut = Cut::Changed;
-        // The sooner the nearest have cut, the less is left for the others.
         for &site in &found {
             if self.nearby[..first].iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
                 cut = Cut::Empty;

@@ -122,6 +122,8 @@ impl Places {
 struct Marked {
     at: Point,
     mask: u64,
+    /// An upper bound of the distance from all sites.
+    distance: f64,
 }
 
 /// A site seen from a vertex.
@@ -162,6 +164,8 @@ pub(super) struct Nearby {
     square: f64,
     first_square: f64,
     reach: f64,
+    /// How far the surface may be from the sites.
+    outer: f64,
     /// Sites with a bit, and what bit a site has in the star of that number.
     sites: Vec<SiteId>,
     bits: Vec<(u32, u32)>,
@@ -176,8 +180,9 @@ pub(super) struct Nearby {
 }
 
 impl Nearby {
-    /// Forgets all; sites cover within `reach` and are looked for up to the root of `first_square` at first.
-    pub(super) fn reset(&mut self, vertices: usize, reach: f64, first_square: f64) {
+    /// Forgets all; sites cover within `reach`, and all sites within `outer`; they are looked for up to the root of `first_square` at first.
+    pub(super) fn reset(&mut self, vertices: usize, reach: f64, outer: f64, first_square: f64) {
+        self.outer = outer;
         self.ranges.clear();
         // One more for a place that is tried.
         self.ranges.resize(vertices + 1, Range::default());
@@ -282,7 +287,8 @@ impl Nearby {
             }
             mask |= 1 << *bit;
         }
-        self.marked.push(Marked { at, mask });
+        let distance = self.views(vertex).first().map_or(f64::INFINITY, |view| view.square.sqrt());
+        self.marked.push(Marked { at, mask, distance });
     }
 
     /// The point of the sites that is closest to a vertex at x, if all sites within reach have the same: there the distance is smooth.
@@ -304,7 +310,7 @@ impl Nearby {
     /// are equally far, until one does.
     pub(super) fn cover(&mut self, tree: &Tree<'_>, corners: [usize; 4]) -> bool {
         let whole = corners.map(|corner| self.marked[corner]);
-        if whole[0].mask & whole[1].mask & whole[2].mask & whole[3].mask != 0 {
+        if whole[0].mask & whole[1].mask & whole[2].mask & whole[3].mask != 0 || self.is_near(&whole) {
             return true;
         }
         if whole.iter().any(|corner| corner.mask == 0) {
@@ -314,7 +320,7 @@ impl Nearby {
         self.pieces.push(whole);
         let mut made = 1;
         while let Some(piece) = self.pieces.pop() {
-            if piece[0].mask & piece[1].mask & piece[2].mask & piece[3].mask != 0 {
+            if piece[0].mask & piece[1].mask & piece[2].mask & piece[3].mask != 0 || self.is_near(&piece) {
                 continue;
             }
             if made >= MOST_PIECES {
@@ -330,6 +336,14 @@ impl Nearby {
             made += 1;
         }
         true
+    }
+
+    /// Whether a corner is so near to the sites and to the other corners that all points between are within `outer`: the distance grows by no more than the way.
+    fn is_near(&self, piece: &[Marked; 4]) -> bool {
+        piece.iter().any(|corner| {
+            let left = self.outer - corner.distance;
+            left > 0.0 && piece.iter().all(|other| distance_squared(&corner.at, &other.at) < left * left)
+        })
     }
 
     /// Where to cut a piece: two corners and a covered point between them.
@@ -366,7 +380,8 @@ impl Nearby {
                 mask |= 1 << bit;
             }
         }
-        (mask != 0).then_some((p, q, Marked { at, mask }))
+        let distance = (a.distance + distance_squared(&at, &a.at).sqrt()).min(b.distance + distance_squared(&at, &b.at).sqrt());
+        (mask != 0).then_some((p, q, Marked { at, mask, distance }))
     }
 
     /// Whether a site covers three of the corners, and another what the first leaves at the fourth. The square of the distance is convex: with D at the
@@ -421,6 +436,9 @@ impl Nearby {
             let range = ranges[corner as usize];
             &views[range.first as usize..(range.first + range.count) as usize]
         };
+        if corners.iter().all(|&corner| views(corner).first().is_none_or(|view| view.square >= enough)) {
+            return true;
+        }
         cleared.clear();
         directions.clear();
         for corner in corners {

@@ -38,6 +38,8 @@ pub(crate) struct Setting {
     pub(super) least: f64,
     /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
     pub(super) outer: f64,
+    /// V fills what is nearer than this: outer, but among dense sites not much more than r.
+    pub(super) filled: f64,
     /// outer^2 + R^2 less theta by level, as an integer.
     pub(super) bands: [i64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
@@ -50,8 +52,10 @@ pub(crate) struct Setting {
     pub(super) slack: f64,
     /// How far a position moves when it becomes a single-precision number.
     pub(super) rounding: f64,
-    /// Whether sites are the attractor itself, so that critical points of their distance are those of its own.
-    pub(super) exact: bool,
+    /// Whether sites are too many to be told apart: the lattice is refined where none nearly serves, see `smooth`.
+    pub(super) dense: bool,
+    /// Lattice vertices as near to each other as this are so near that the distance hardly changes between them: outer - r.
+    pub(super) close: f64,
     /// Whether simplification only removes what cannot be a solid.
     pub(super) clean_only: bool,
     /// What was asked.
@@ -62,6 +66,8 @@ pub(crate) struct Setting {
 
 /// A pitch above this share of r would not see the shape.
 const COARSEST: f64 = 1.0;
+/// Among dense sites valleys are filled up to this share of r: there nothing tells how the distance grows along them.
+const MOST_FILLED: f64 = 1.15;
 /// A pitch finer than this many roundings of single precision cannot be carried.
 const LEAST_ROUNDINGS: f64 = 64.0;
 /// Cubes that are refined to settle the topology, besides an eighth of the triangles: where more would be, it stays open.
@@ -95,13 +101,15 @@ impl Setting {
             far: integer((radius + 1.001 * pitch).powi(2) - theta),
             least: (theta - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
             outer,
+            filled: outer,
             bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing * 0.25_f64.powi(level as i32))),
             deep: (radius - pitch * 1.000_1).max(0.0),
             inverse_unit,
             most: integer(largest),
             slack: 1e-13 * extent,
             rounding: rounding(self::extent(bounds, 3.0 * radius)),
-            exact: false,
+            dense: false,
+            close: outer - radius,
             clean_only: false,
             tolerance,
             cells,
@@ -126,6 +134,13 @@ fn extent(bounds: &AxisBox, margin: f64) -> f64 {
 /// Half a unit in the last place of single precision, times sqrt(3), at coordinates up to `extent`.
 fn rounding(extent: f64) -> f64 {
     extent * f64::from(f32::EPSILON) * 0.5 * 3.0_f64.sqrt()
+}
+
+/// A pitch of which some level is just below a length, if one not much smaller is.
+fn whole_steps(pitch: f64, length: f64) -> f64 {
+    let level = (pitch / length).log2().floor().min(f64::from(LEVELS));
+    let stepped = 0.999 * length * level.exp2();
+    if stepped > 0.7 * pitch || level == f64::from(LEVELS) { stepped.min(pitch) } else { pitch }
 }
 
 /// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
@@ -177,6 +192,7 @@ impl<'a> Plan<'a> {
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
+        let pitch = if rule.is_dense() { whole_steps(pitch, aimed - extra - rule.outer_reserve()) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
@@ -196,11 +212,10 @@ impl<'a> Plan<'a> {
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
         // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
-        Setting {
-            exact: self.rule.is_exact(),
-            clean_only: self.clean_only,
-            ..Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds)
-        }
+        let setting = Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds);
+        let dense = self.rule.is_dense();
+        let filled = if dense { setting.outer.min(MOST_FILLED * self.radius) } else { setting.outer };
+        Setting { dense, filled, clean_only: self.clean_only, ..setting }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
@@ -234,16 +249,18 @@ impl<'a> Plan<'a> {
         let mut blocks: BTreeMap<[i64; 3], BlockSurface> = made.into_iter().map(|surface| (surface.first_cube, surface)).collect();
         let mut refined = 0;
         let mut uncertain;
+        eprintln!("DENSE {} {} raw {}", setting.dense, setting.close, blocks.values().map(|s| s.triangles.len()).sum::<usize>());
         loop {
             let critical: BTreeSet<Cube> = blocks.values_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect();
             uncertain = blocks.values().flat_map(|surface| &surface.uncertain).collect::<BTreeSet<_>>().len();
             let mut new = Vec::new();
             critical.iter().for_each(|&cube| grading.subdivide(cube, &mut new));
             refined += new.len();
-            if new.is_empty() || refined > allowed {
+            if new.is_empty() || (refined > allowed && !setting.dense) {
                 uncertain += critical.len();
                 break;
             }
+            eprintln!("NEW {} of {}", new.len(), blocks.len());
             let affected = blocks_around(&new);
             affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
             let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;

@@ -172,7 +172,7 @@ impl<'a> Simplifier<'a> {
         self.places.reset(core.low, edge, top, starts);
         let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
         let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
-        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
+        self.nearby.reset(mesh.points.len(), setting.filled + setting.rounding, setting.outer + setting.rounding, first_square);
         self.stamps.clear();
         self.stamps.resize(mesh.points.len(), 0);
         self.stamp = 0;

@@ -30,7 +30,7 @@ pub(super) const WHOLE: u8 = 0b1111;
 pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], known: u16) -> u16 {
     let covered = |v: usize| frame.covered >> v & 1 == 1;
     let shares: [f64; 4] = std::array::from_fn(|v| share(frame.values[v].least, frame.values[v].far));
-    let outer = setting.outer * (1.0 - 1e-9) - setting.slack;
+    let outer = setting.filled * (1.0 - 1e-9) - setting.slack;
     let square = outer * outer;
     let serves = |s: u8, site: usize| {
         (0..4).filter(|v| s >> v & 1 == 1 && covered(*v)).all(|v| {
@@ -51,8 +51,10 @@ pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
     }
     for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
-        let serves = |site: usize| serves(s, site) && is_steep(setting, frame, &squares[site], s);
-        result |= u16::from(nothing || (is_long(&frame.numbers, s) && (0..squares.len()).any(serves))) << s;
+        // In fine cubes little is filled.
+        let is_steep = |site: usize| (setting.dense && frame.level >= std::env::var("STEEP").map_or(STEEP_LEVELS, |x| x.parse().unwrap())) || is_steep(setting, frame, &squares[site], s);
+        let may_be = setting.dense || is_long(&frame.numbers, s);
+        result |= u16::from(nothing || (may_be && (0..squares.len()).any(|site| serves(s, site) && is_steep(site)))) << s;
     }
     result
 }
@@ -86,10 +88,15 @@ fn is_steep(setting: &Setting, frame: &Frame, squares: &[f64; 4], s: u8) -> bool
         let (y, square) = frame.witnesses[v];
         rest[..count].iter().all(|x| {
             let way = distance_squared(x, &y);
-            square > setting.outer * setting.outer + way + 2.0 * LEAST_RATE * setting.outer * way.sqrt()
+            square > setting.filled * setting.filled + way + 2.0 * LEAST_RATE * setting.filled * way.sqrt()
         })
     })
 }
+
+/// Among dense sites valleys may be filled from this level on.
+const STEEP_LEVELS: u32 = 2;
+/// Knows all simplices but the whole tetrahedron to be served.
+pub(super) const PARTS: u16 = !(1 << WHOLE);
 
 /// See [`is_steep`].
 const LEAST_RATE: f64 = 0.15;
