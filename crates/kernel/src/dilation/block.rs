@@ -16,7 +16,7 @@ use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::Setting;
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::tree::{Candidates, NodeId, SiteId, Tree};
+use super::tree::{Candidates, Hit, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::{SiteError, SiteRule};
@@ -349,7 +349,10 @@ impl<'a> Workshop<'a> {
         };
         self.seed = Some(hit.node);
         let square = if hit.distance_squared < setting.deep * setting.deep { DEEP } else { hit.distance_squared };
-        let least = setting.integer(hit.distance_squared) - 1 - noise;
+        let mut least = setting.integer(hit.distance_squared) - 1 - noise;
+        if setting.dense && least > 0 && self.in_gap(setting, &x, &hit) {
+            least = setting.filled_value - noise;
+        }
         Value { square, site: hit.site, closest: hit.closest, node: hit.node, least: if least == 0 { -1 } else { least }, far, witness: UNKNOWN }
     }
 
@@ -448,13 +451,44 @@ impl<'a> Workshop<'a> {
         self.emit(&frame, surface);
     }
 
+    /// Whether a vertex lies outside D(r) but in its closing by a ball of radius `gap`: no such ball outside D(r) was found that contains it.
+    ///
+    /// Where two walls of a crease come closer than a lattice edge, edges from wall to wall close the gap with no
+    /// vertex in it, and a vertex left open deeper in the gap would be the inside of a false tunnel. Closing
+    /// fills such gaps as a whole and leaves an outside as smooth as the lattice can follow.
+    ///
+    /// The ball's centre is sought by walking away from the nearest site, as far as the vertex allows. In a crease the walk leads out of the
+    /// gap and is held by the vertex; where it comes to rest before, it is in a neck between two parts of the
+    /// outside, which stays open if it is wide enough for the lattice.
+    fn in_gap(&mut self, setting: &Setting, x: &Point, hit: &Hit) -> bool {
+        let free = setting.reach + setting.gap;
+        if hit.distance_squared > free * free {
+            return false;
+        }
+        let (mut y, mut nearest) = (*x, hit.closest);
+        let (mut clearance, mut held) = (0.0, false);
+        for _ in 0..WALK {
+            let away = subtract(&y, &nearest);
+            let scale = free / dot(&away, &away).sqrt();
+            let target: Point = std::array::from_fn(|axis| nearest[axis] + scale * away[axis]);
+            let offset = subtract(&target, x);
+            let length = dot(&offset, &offset).sqrt();
+            let share = if length > setting.gap { setting.gap / length } else { 1.0 };
+            y = std::array::from_fn(|axis| x[axis] + share * offset[axis]);
+            let Some(hit) = self.tree.nearest(&y, &self.near, Some(hit.node), free * (1.0 - 1e-3), 0.0) else { return false };
+            nearest = hit.closest;
+            clearance = hit.distance_squared.sqrt() - setting.reach;
+            held = share < 1.0;
+        }
+        held || clearance < setting.neck
+    }
+
     /// The tetrahedron among sites that are too many to be told apart: marched as a whole, and its cubes to be subdivided unless what this fills is near a site.
-    fn dense_tetrahedron(&mut self, setting: &Setting, mut frame: Frame, surface: &mut BlockSurface) {
+    fn dense_tetrahedron(&mut self, setting: &Setting, frame: Frame, surface: &mut BlockSurface) {
         if frame.covered == 0 {
             return;
         }
         if !frame.is_close(setting) {
-            self.witnesses(setting, surface, &mut frame);
             let squares = smooth::squares(&self.tree, &frame);
             let mut served = smooth::served(setting, &frame, &squares, smooth::PARTS);
             if served >> WHOLE & 1 == 0 {
@@ -740,6 +774,8 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
 }
 
+/// Steps of a walk away from nearest sites.
+const WALK: usize = 12;
 /// How far the witnesses of vertices are from the closest points, in units of r.
 pub(super) const WITNESS: f64 = 1.5;
 /// How far beyond the surface witnesses of tetrahedra are looked for, in units of r.

@@ -40,6 +40,8 @@ pub(crate) struct Setting {
     pub(super) outer: f64,
     /// V fills what is nearer than this: outer, but among dense sites not much more than r.
     pub(super) filled: f64,
+    /// f less theta where a gap was closed: the surface passes near the vertex.
+    pub(super) filled_value: i64,
     /// outer^2 + R^2 less theta by level, as an integer.
     pub(super) bands: [i64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
@@ -54,7 +56,10 @@ pub(crate) struct Setting {
     pub(super) rounding: f64,
     /// Whether sites are too many to be told apart: the lattice is refined where none nearly serves, see `smooth`.
     pub(super) dense: bool,
-    /// Lattice vertices as near to each other as this are so near that the distance hardly changes between them: outer - r.
+    /// Radius of the ball that closes gaps among dense sites, and how wide a neck the lattice sees there.
+    pub(super) gap: f64,
+    pub(super) neck: f64,
+    /// Tetrahedra with edges up to this are within `outer` wherever a vertex is covered: outer - r - gap.
     pub(super) close: f64,
     /// Whether simplification only removes what cannot be a solid.
     pub(super) clean_only: bool,
@@ -66,8 +71,13 @@ pub(crate) struct Setting {
 
 /// A pitch above this share of r would not see the shape.
 const COARSEST: f64 = 1.0;
-/// Among dense sites valleys are filled up to this share of r: there nothing tells how the distance grows along them.
-const MOST_FILLED: f64 = 1.15;
+/// Radius of the closing ball in units of the lattice's edge where it is close. Without closing, Koch curves and Sierpinski tetrahedra come out with
+/// false tunnels at most pitches, with 0.5 at few, with 0.55 and necks of 0.36 at none of sixteen tried. This is measured, not proven.
+const CLOSING: f64 = 0.55;
+/// How far the surface passes from filled vertices, in units of the ball's radius.
+const FILLED_CUT: f64 = 0.25;
+/// See [`Setting`], in the same units.
+const NECK: f64 = 0.36;
 /// A pitch finer than this many roundings of single precision cannot be carried.
 const LEAST_ROUNDINGS: f64 = 64.0;
 /// Cubes that are refined to settle the topology, besides an eighth of the triangles: where more would be, it stays open.
@@ -102,6 +112,7 @@ impl Setting {
             least: (theta - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
             outer,
             filled: outer,
+            filled_value: -1,
             bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing * 0.25_f64.powi(level as i32))),
             deep: (radius - pitch * 1.000_1).max(0.0),
             inverse_unit,
@@ -109,6 +120,8 @@ impl Setting {
             slack: 1e-13 * extent,
             rounding: rounding(self::extent(bounds, 3.0 * radius)),
             dense: false,
+            gap: 0.0,
+            neck: 0.0,
             close: outer - radius,
             clean_only: false,
             tolerance,
@@ -192,7 +205,7 @@ impl<'a> Plan<'a> {
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
-        let pitch = if rule.is_dense() { whole_steps(pitch, aimed - extra - rule.outer_reserve()) } else { pitch };
+        let pitch = if rule.is_dense() { whole_steps(pitch, (aimed - extra - rule.outer_reserve()) / (1.0 + CLOSING)) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
@@ -213,9 +226,14 @@ impl<'a> Plan<'a> {
         // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
         let setting = Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds);
-        let dense = self.rule.is_dense();
-        let filled = if dense { setting.outer.min(MOST_FILLED * self.radius) } else { setting.outer };
-        Setting { dense, filled, clean_only: self.clean_only, ..setting }
+        if !self.rule.is_dense() {
+            return Setting { clean_only: self.clean_only, ..setting };
+        }
+        // The largest edges that are close even where their ends are filled.
+        let share = (1.0 + CLOSING) * pitch / (setting.outer - setting.reach - 2.0 * setting.slack).max(f64::MIN_POSITIVE);
+        let edge = pitch * 0.5_f64.powf(share.log2().ceil().clamp(0.0, f64::from(LEVELS)));
+        let gap = CLOSING * edge;
+        Setting { dense: true, clean_only: self.clean_only, gap, neck: NECK * edge, close: setting.close - gap, filled: setting.reach + gap, filled_value: -setting.integer((setting.reach + FILLED_CUT * gap).powi(2)) - MOST_NOISE, ..setting }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.

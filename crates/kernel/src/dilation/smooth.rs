@@ -32,7 +32,10 @@ pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
     let shares: [f64; 4] = std::array::from_fn(|v| share(frame.values[v].least, frame.values[v].far));
     let outer = setting.filled * (1.0 - 1e-9) - setting.slack;
     let square = outer * outer;
+    let theta = setting.reach * setting.reach;
     let serves = |s: u8, site: usize| {
+        // What is covered at all vertices must be covered by the site alone: else V would be a bridge over a valley that others leave open.
+        let square = if s & !frame.covered == 0 && !setting.dense { theta } else { square };
         (0..4).filter(|v| s >> v & 1 == 1 && covered(*v)).all(|v| {
             let own = squares[site][v];
             let leaves = s == WHOLE || own.sqrt() + shares[v] * setting.lattice.pitch <= outer;
@@ -51,8 +54,7 @@ pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], kno
     }
     for s in SIMPLICES.into_iter().filter(|s| known >> s & 1 == 0) {
         let nothing = (0..4).all(|v| s >> v & 1 == 0 || !covered(v));
-        // In fine cubes little is filled.
-        let is_steep = |site: usize| (setting.dense && frame.level >= std::env::var("STEEP").map_or(STEEP_LEVELS, |x| x.parse().unwrap())) || is_steep(setting, frame, &squares[site], s);
+        let is_steep = |site: usize| setting.dense || is_steep(setting, frame, &squares[site], s);
         let may_be = setting.dense || is_long(&frame.numbers, s);
         result |= u16::from(nothing || (may_be && (0..squares.len()).any(|site| serves(s, site) && is_steep(site)))) << s;
     }
@@ -93,8 +95,6 @@ fn is_steep(setting: &Setting, frame: &Frame, squares: &[f64; 4], s: u8) -> bool
     })
 }
 
-/// Among dense sites valleys may be filled from this level on.
-const STEEP_LEVELS: u32 = 2;
 /// Knows all simplices but the whole tetrahedron to be served.
 pub(super) const PARTS: u16 = !(1 << WHOLE);
 
