@@ -63,9 +63,12 @@ pub(super) struct BlockSurface {
 /// What a vertex on an edge or a face of the lattice is called by every tetrahedron there.
 pub(super) type VertexName = u128;
 
-/// Names are mixed already.
-#[derive(Default)]
+/// Mixes names, and coordinates of vertices and cubes, which nobody can choose to collide.
+#[derive(Clone, Debug, Default)]
 pub(super) struct NameHasher(u64);
+
+/// A hash map by names or coordinates.
+pub(super) type NameMap<K, V> = HashMap<K, V, BuildHasherDefault<NameHasher>>;
 
 impl Hasher for NameHasher {
     fn finish(&self) -> u64 {
@@ -78,6 +81,21 @@ impl Hasher for NameHasher {
     }
     fn write_u128(&mut self, name: u128) {
         self.0 = mix(self.0 ^ name as u64 ^ mix((name >> 64) as u64));
+    }
+    fn write_u64(&mut self, part: u64) {
+        self.0 = mix(self.0.rotate_left(21) ^ part);
+    }
+    fn write_i64(&mut self, part: i64) {
+        self.write_u64(part as u64);
+    }
+    fn write_u32(&mut self, part: u32) {
+        self.write_u64(u64::from(part));
+    }
+    fn write_i32(&mut self, part: i32) {
+        self.write_u64(u64::from(part as u32));
+    }
+    fn write_usize(&mut self, length: usize) {
+        self.write_u64(length as u64);
     }
 }
 
@@ -139,7 +157,7 @@ pub(super) struct Workshop<'a> {
     /// Squared distances at the vertices of level 0, corners and centres, and their nearest sites.
     values: [Vec<Value>; 2],
     /// Those of other vertices.
-    fine: HashMap<Number, Value>,
+    fine: NameMap<Number, Value>,
     near: Vec<NodeId>,
     /// Starts of every solid's own triangles among the near nodes.
     solid_nodes: Vec<(u32, Vec<NodeId>)>,
@@ -154,7 +172,7 @@ pub(super) struct Workshop<'a> {
     /// Middle of the sub-block, and how far around it all sites are known.
     known: (Point, f64),
     leaves: Vec<Cube>,
-    names: HashMap<VertexName, u32, BuildHasherDefault<NameHasher>>,
+    names: NameMap<VertexName, u32>,
 }
 
 /// What is known of a vertex.
@@ -182,7 +200,7 @@ impl<'a> Workshop<'a> {
             attractor: rule.attractor(),
             tree: Tree::new(rule, setting.slack, 4 * setting.cells),
             values: [vec![NOTHING; VERTICES], vec![NOTHING; VERTICES]],
-            fine: HashMap::new(),
+            fine: NameMap::default(),
             near: Vec::new(),
             solid_nodes: Vec::new(),
             seed: None,
@@ -195,7 +213,7 @@ impl<'a> Workshop<'a> {
             critical: Critical::default(),
             known: ([0.0; 3], 0.0),
             leaves: Vec::new(),
-            names: HashMap::default(),
+            names: NameMap::default(),
         }
     }
 

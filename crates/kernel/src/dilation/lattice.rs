@@ -8,7 +8,9 @@
 //! at most.
 
 use crate::attractor::cell::Point;
+use super::block::NameHasher;
 use std::collections::HashSet;
+use std::hash::BuildHasherDefault;
 
 /// Radius of a tetrahedron's smallest enclosing ball, in units of the larger leaf's edge.
 pub const ENCLOSING: f64 = 0.559_016_994_374_947_5;
@@ -74,7 +76,7 @@ impl Cube {
 /// The cubes that are subdivided.
 #[derive(Clone, Debug, Default)]
 pub struct Grading {
-    subdivided: HashSet<Cube>,
+    subdivided: HashSet<Cube, BuildHasherDefault<NameHasher>>,
 }
 
 impl Grading {

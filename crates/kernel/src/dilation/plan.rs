@@ -34,7 +34,7 @@ pub(crate) struct Setting {
     pub(super) sight: f64,
     /// (r + a)^2 less theta as an integer, rounded up.
     pub(super) far: i64,
-    /// The surface is nowhere nearer to a site than this: sqrt(theta - R^2).
+    /// The surface is nowhere nearer to a site than this: sqrt(theta - R^2) or less, what simplification may use of the tolerance.
     pub(super) least: f64,
     /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
     pub(super) outer: f64,
@@ -74,6 +74,8 @@ const COARSEST: f64 = 1.0;
 /// Radius of the closing ball in units of the lattice's edge where it is close. Without closing, Koch curves and Sierpinski tetrahedra come out with
 /// false tunnels at most pitches, with 0.5 at few, with 0.55 and necks of 0.36 at none of sixteen tried. This is measured, not proven.
 const CLOSING: f64 = 0.55;
+/// Levels between the coarsest edges among dense sites and those that are close: more are subdivided nearly everywhere.
+const MOST_STEPS: f64 = 2.0;
 /// How far the surface passes from filled vertices, in units of the ball's radius.
 const FILLED_CUT: f64 = 0.25;
 /// See [`Setting`], in the same units.
@@ -149,13 +151,6 @@ fn rounding(extent: f64) -> f64 {
     extent * f64::from(f32::EPSILON) * 0.5 * 3.0_f64.sqrt()
 }
 
-/// A pitch of which some level is just below a length, if one not much smaller is.
-fn whole_steps(pitch: f64, length: f64) -> f64 {
-    let level = (pitch / length).log2().floor().min(f64::from(LEVELS));
-    let stepped = 0.999 * length * level.exp2();
-    if stepped > 0.7 * pitch || level == f64::from(LEVELS) { stepped.min(pitch) } else { pitch }
-}
-
 /// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
 /// shrinks by the automaton's rate (its proven lower bound) at every step.
 fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: &Budget) -> Result<(), DilationError> {
@@ -179,6 +174,8 @@ pub(super) struct Plan<'a> {
     /// The tolerance that is aimed at: smaller than asked when the radius is.
     tolerance: f64,
     pitch: f64,
+    /// How near to a site the surface may be.
+    least: f64,
     /// Lengths beyond the lattice's own bounds: rounding to single precision, the unit of values and double precision.
     extra: f64,
     bounds: AxisBox,
@@ -205,13 +202,15 @@ impl<'a> Plan<'a> {
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
-        let pitch = if rule.is_dense() { whole_steps(pitch, (aimed - extra - rule.outer_reserve()) / (1.0 + CLOSING)) } else { pitch };
+        let close = (aimed - extra - rule.outer_reserve()) / (1.0 + CLOSING);
+        let least = (radius * radius - (ENCLOSING * pitch).powi(2)).max(0.0).sqrt() * (1.0 - 1e-12);
+        let pitch = if rule.is_dense() { pitch.min(MOST_STEPS.exp2() * 0.999 * close) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { radius, tolerance: aimed, pitch, extra, bounds, rule, clean_only: !simplify })
+        Ok(Self { radius, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -226,6 +225,7 @@ impl<'a> Plan<'a> {
         // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
         let setting = Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds);
+        let setting = Setting { least: setting.least.min(self.least), ..setting };
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
@@ -267,7 +267,6 @@ impl<'a> Plan<'a> {
         let mut blocks: BTreeMap<[i64; 3], BlockSurface> = made.into_iter().map(|surface| (surface.first_cube, surface)).collect();
         let mut refined = 0;
         let mut uncertain;
-        eprintln!("DENSE {} {} raw {}", setting.dense, setting.close, blocks.values().map(|s| s.triangles.len()).sum::<usize>());
         loop {
             let critical: BTreeSet<Cube> = blocks.values_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect();
             uncertain = blocks.values().flat_map(|surface| &surface.uncertain).collect::<BTreeSet<_>>().len();
@@ -278,7 +277,6 @@ impl<'a> Plan<'a> {
                 uncertain += critical.len();
                 break;
             }
-            eprintln!("NEW {} of {}", new.len(), blocks.len());
             let affected = blocks_around(&new);
             affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
             let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;
