@@ -224,7 +224,8 @@ fn expected_sites(rule: &SiteRule<'_>, root: usize) -> f64 {
                     (attractor.child_cell(&cell, index, &child), child)
                 })
                 .collect();
-            let shares: Vec<f64> = children.iter().map(|(child, _)| child.ball.radius.max(0.01 * cell.ball.radius).powf(LIKELY_DIMENSION)).collect();
+            let shares: Vec<f64> =
+                children.iter().map(|(child, _)| child.ball.radius.max(0.01 * cell.ball.radius).powf(LIKELY_DIMENSION)).collect();
             let total: f64 = shares.iter().sum();
             let mut rest = address * total;
             let mut chosen = 0;

@@ -124,17 +124,20 @@ pub(super) struct Frame {
 impl Frame {
     /// Whether a covered vertex is so near to all the others that the whole tetrahedron is within `outer`: there the distance is at most r plus the longest edge.
     fn is_close(&self, setting: &Setting) -> bool {
-        let longest = (0..4).flat_map(|p| (0..p).map(move |q| (p, q))).map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q])).fold(0.0, f64::max);
+        let longest = (0..4)
+            .flat_map(|p| (0..p).map(move |q| (p, q)))
+            .map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q]))
+            .fold(0.0, f64::max);
         longest.sqrt() + setting.slack < setting.close
     }
 
     /// The cubes around it that are not subdivided and larger than the finest.
     fn cubes(&self) -> impl Iterator<Item = Cube> {
         let edge = UNITS >> self.level;
-        self.numbers.into_iter().filter(move |number| number.iter().all(|&x| i64::from(x).rem_euclid(edge) == edge / 2)).map(move |number| Cube {
-            level: self.level,
-            index: number.map(|x| i64::from(x).div_euclid(edge)),
-        })
+        self.numbers
+            .into_iter()
+            .filter(move |number| number.iter().all(|&x| i64::from(x).rem_euclid(edge) == edge / 2))
+            .map(move |number| Cube { level: self.level, index: number.map(|x| i64::from(x).div_euclid(edge)) })
     }
 
     /// The values of V of a simplex.
@@ -371,7 +374,15 @@ impl<'a> Workshop<'a> {
         if setting.dense && least > 0 && self.in_gap(setting, &x, &hit) {
             least = setting.filled_value - noise;
         }
-        Value { square, site: hit.site, closest: hit.closest, node: hit.node, least: if least == 0 { -1 } else { least }, far, witness: UNKNOWN }
+        Value {
+            square,
+            site: hit.site,
+            closest: hit.closest,
+            node: hit.node,
+            least: if least == 0 { -1 } else { least },
+            far,
+            witness: UNKNOWN,
+        }
     }
 
     /// Whether a point lies in a solid: the sign of its offset from the nearest point of the surface along

@@ -7,8 +7,8 @@
 //! Shewchuk, "Isosurface stuffing", 2007). The smallest ball around each of these tetrahedra has radius sqrt(5)/4 of the larger leaf's edge
 //! at most.
 
-use crate::attractor::cell::Point;
 use super::block::NameHasher;
+use crate::attractor::cell::Point;
 use std::collections::HashSet;
 use std::hash::BuildHasherDefault;
 

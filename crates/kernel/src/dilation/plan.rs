@@ -6,6 +6,7 @@ use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Node, Pass};
 use super::outside::MOST;
+use super::simplify::Simplifier;
 use super::smooth::MOST_NOISE;
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
@@ -233,7 +234,16 @@ impl<'a> Plan<'a> {
         let share = (1.0 + CLOSING) * pitch / (setting.outer - setting.reach - 2.0 * setting.slack).max(f64::MIN_POSITIVE);
         let edge = pitch * 0.5_f64.powf(share.log2().ceil().clamp(0.0, f64::from(LEVELS)));
         let gap = CLOSING * edge;
-        Setting { dense: true, clean_only: self.clean_only, gap, neck: NECK * edge, close: setting.close - gap, filled: setting.reach + gap, filled_value: -setting.integer((setting.reach + FILLED_CUT * gap).powi(2)) - MOST_NOISE, ..setting }
+        Setting {
+            dense: true,
+            clean_only: self.clean_only,
+            gap,
+            neck: NECK * edge,
+            close: setting.close - gap,
+            filled: setting.reach + gap,
+            filled_value: -setting.integer((setting.reach + FILLED_CUT * gap).powi(2)) - MOST_NOISE,
+            ..setting
+        }
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
@@ -284,6 +294,7 @@ impl<'a> Plan<'a> {
         }
         let mut surface = self.assemble(attractor, &setting, &grading, blocks, budget)?;
         dust::remove(&setting, &self.rule, &self.space(attractor, &setting).1, &mut surface);
+        Simplifier::new(&self.rule, &setting).finish(&setting, &mut surface);
         budget.report("dilate", 1.0, surface.triangles.len() as u64);
         self.certify(&setting, surface, uncertain, budget)
     }

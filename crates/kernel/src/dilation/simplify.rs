@@ -178,12 +178,7 @@ impl<'a> Simplifier<'a> {
         self.stamp = 0;
         let inside: Vec<bool> = mesh.points.iter().map(|point| core.contains(point)).collect();
         surface.settled.resize(mesh.points.len(), false);
-        self.merge(&mut mesh, &inside, &surface.settled);
-        for _ in 0..FLIP_ROUNDS {
-            if !self.flip(&mut mesh, &inside, setting.rounding) {
-                break;
-            }
-        }
+        self.clean(setting, &mut mesh, &inside, &surface.settled);
         if self.clean_only {
             self.remove_slivers(setting, &mut mesh, &inside);
             self.write(&mut mesh, &inside, surface);
@@ -319,8 +314,30 @@ impl<'a> Simplifier<'a> {
         true
     }
 
-    /// Makes vertices at the same place one where that keeps the manifold: the surface as a set does not change.
-    fn merge(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) {
+    /// Removes what has no area from a whole surface: what one node leaves may become removable by what others do.
+    pub(super) fn finish(&mut self, setting: &Setting, surface: &mut BlockSurface) {
+        let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
+        let (inside, settled) = (vec![true; mesh.points.len()], vec![false; mesh.points.len()]);
+        self.stamps.clear();
+        self.stamps.resize(mesh.points.len(), 0);
+        self.stamp = 0;
+        self.clean(setting, &mut mesh, &inside, &settled);
+        self.write(&mut mesh, &inside, surface);
+    }
+
+    /// Joins vertices at the same place, and turns edges of triangles without area, while that changes anything.
+    fn clean(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) {
+        for _ in 0..FLIP_ROUNDS {
+            let merged = self.merge(mesh, inside, settled);
+            if !self.flip(mesh, inside, setting.rounding) && !merged {
+                break;
+            }
+        }
+    }
+
+    /// Makes vertices at the same place one where that keeps the manifold: the surface as a set does not change. Whether there were such.
+    fn merge(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) -> bool {
+        let mut merged = false;
         for vertex in 0..mesh.points.len() as u32 {
             if !inside[vertex as usize] || settled[vertex as usize] || !mesh.star(vertex, MOST_AROUND, &mut self.star) {
                 continue;
@@ -329,10 +346,12 @@ impl<'a> Simplifier<'a> {
                 let target = self.star.ring[m];
                 if mesh.points[target as usize] == mesh.points[vertex as usize] && inside[target as usize] && self.keeps_manifold(mesh, m) {
                     mesh.collapse(vertex, &self.star, m);
+                    merged = true;
                     break;
                 }
             }
         }
+        merged
     }
 
     /// Turns the longest edge of triangles without area, when that leaves none: the surface as a set does not change. Whether one was turned.
