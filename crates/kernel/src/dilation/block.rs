@@ -12,9 +12,9 @@
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
 use super::critical::Critical;
-use super::lattice::{Cube, Grading, Number, UNITS, is_mirrored};
+use super::lattice::{Cube, ENCLOSING, Grading, Number, UNITS, is_mirrored};
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
-use super::plan::Setting;
+use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree};
 use crate::attractor::Attractor;
@@ -75,8 +75,10 @@ impl Hasher for NameHasher {
         self.0
     }
     fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.write_u128(u128::from(byte));
+        for part in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..part.len()].copy_from_slice(part);
+            self.write_u64(u64::from_le_bytes(word));
         }
     }
     fn write_u128(&mut self, name: u128) {
@@ -122,13 +124,18 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Whether a covered vertex is so near to all the others that the whole tetrahedron is within `outer`: there the distance is at most r plus the longest edge.
+    /// Whether the tetrahedron is so small that what is filled of it is within `outer`.
+    ///
+    /// Where the interpolant of squares d(v)^2 with weights w is at most s^2, the mean of d(v) is at most s, and that of |x - v| at most R, the radius of a ball around the
+    /// tetrahedron: d(x) <= s + R, the distance growing by no more than the way. s is r, or r + gap where the value of a vertex in a gap was lowered.
     fn is_close(&self, setting: &Setting) -> bool {
-        let longest = (0..4)
-            .flat_map(|p| (0..p).map(move |q| (p, q)))
-            .map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q]))
-            .fold(0.0, f64::max);
-        longest.sqrt() + setting.slack < setting.close
+        let edges = (0..4).flat_map(|p| (0..p).map(move |q| (p, q)));
+        let longest = edges.map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q])).fold(0.0, f64::max).sqrt();
+        let is_filled = |value: &Value| value.least < 0 && value.square > setting.reach * setting.reach;
+        let gap = if self.values.iter().any(is_filled) { setting.gap } else { 0.0 };
+        // At level 0 the lattice's own bound is sharper.
+        let around = (JUNG * longest).min(ENCLOSING * setting.lattice.pitch);
+        around + gap + setting.slack < setting.close
     }
 
     /// The cubes around it that are not subdivided and larger than the finest.
@@ -273,7 +280,7 @@ impl<'a> Workshop<'a> {
         let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
         let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
         // Farther away no vertex is covered, and no critical point has a value below r.
-        let hit = self.tree.nearest(&middle, starts, self.seed, setting.reach + half, setting.reach - half);
+        let hit = self.tree.nearest(&middle, starts, self.seed, setting.reach + setting.gap + half, setting.reach - half);
         let Some(hit) = hit else { return };
         if hit.distance_squared.sqrt() + half < setting.reach {
             // One site covers all.

@@ -148,7 +148,7 @@ impl<'a> Pass<'a> {
             }
         }
         let still_open = open.iter().copied().filter(|&solid| reaches[solid as usize] > f64::NEG_INFINITY).collect();
-        Ok((lowest <= self.setting.reach + half + slack).then_some((kept, still_open)))
+        Ok((lowest <= self.setting.reach + self.setting.gap + half + slack).then_some((kept, still_open)))
     }
 
     /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances.

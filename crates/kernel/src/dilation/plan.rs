@@ -29,7 +29,7 @@ pub(crate) struct Setting {
     pub(super) reach: f64,
     /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(outer^2 + R^2).
     pub(super) near: f64,
-    /// Vertices farther than this from all sites have no covered neighbour: r + a.
+    /// Vertices farther than this from all sites have no covered neighbour: r + a, or r + gap + a.
     pub(super) horizon: f64,
     /// Sites are known this far around places whose distance from the sites is asked.
     pub(super) sight: f64,
@@ -60,7 +60,7 @@ pub(crate) struct Setting {
     /// Radius of the ball that closes gaps among dense sites, and how wide a neck the lattice sees there.
     pub(super) gap: f64,
     pub(super) neck: f64,
-    /// Tetrahedra with edges up to this are within `outer` wherever a vertex is covered: outer - r - gap.
+    /// outer - r.
     pub(super) close: f64,
     /// Whether simplification only removes what cannot be a solid.
     pub(super) clean_only: bool,
@@ -72,13 +72,16 @@ pub(crate) struct Setting {
 
 /// A pitch above this share of r would not see the shape.
 const COARSEST: f64 = 1.0;
-/// Radius of the closing ball in units of the lattice's edge where it is close. Without closing, Koch curves and Sierpinski tetrahedra come out with
+/// Radius of the closing ball in units of the pitch. Without closing, Koch curves and Sierpinski tetrahedra come out with
 /// false tunnels at most pitches, with 0.5 at few, with 0.55 and necks of 0.36 at none of sixteen tried. This is measured, not proven.
 const CLOSING: f64 = 0.55;
-/// Levels between the coarsest edges among dense sites and those that are close: more are subdivided nearly everywhere.
-const MOST_STEPS: f64 = 2.0;
+/// The pitch among dense sites, in units of outer - r: below 1 / 0.559, so that tetrahedra without filled vertices are close, and so far below that all
+/// are at the finest level.
+const CLOSE: f64 = 1.75;
 /// How far the surface passes from filled vertices, in units of the ball's radius.
 const FILLED_CUT: f64 = 0.25;
+/// The ball around a tetrahedron has at most this radius, in units of its longest edge: sqrt(3 / 8) (Jung, 1901).
+pub(super) const JUNG: f64 = 0.612_373;
 /// See [`Setting`], in the same units.
 const NECK: f64 = 0.36;
 /// A pitch finer than this many roundings of single precision cannot be carried.
@@ -203,9 +206,8 @@ impl<'a> Plan<'a> {
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
-        let close = (aimed - extra - rule.outer_reserve()) / (1.0 + CLOSING);
         let least = (radius * radius - (ENCLOSING * pitch).powi(2)).max(0.0).sqrt() * (1.0 - 1e-12);
-        let pitch = if rule.is_dense() { pitch.min(MOST_STEPS.exp2() * 0.999 * close) } else { pitch };
+        let pitch = if rule.is_dense() { pitch.min(CLOSE * (aimed - extra - rule.outer_reserve())) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
@@ -230,17 +232,14 @@ impl<'a> Plan<'a> {
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
-        // The largest edges that are close even where their ends are filled.
-        let share = (1.0 + CLOSING) * pitch / (setting.outer - setting.reach - 2.0 * setting.slack).max(f64::MIN_POSITIVE);
-        let edge = pitch * 0.5_f64.powf(share.log2().ceil().clamp(0.0, f64::from(LEVELS)));
+        let edge = pitch.min(CLOSE * setting.close);
         let gap = CLOSING * edge;
         Setting {
             dense: true,
             clean_only: self.clean_only,
             gap,
+            horizon: setting.horizon + gap,
             neck: NECK * edge,
-            close: setting.close - gap,
-            filled: setting.reach + gap,
             filled_value: -setting.integer((setting.reach + FILLED_CUT * gap).powi(2)) - MOST_NOISE,
             ..setting
         }
