@@ -278,6 +278,11 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
     }
+    if dilation.crossings > 0 {
+        certificate
+            .warnings
+            .push(format!("{} pairs of triangles cross: ask for another tolerance, or for no simplification", dilation.crossings));
+    }
     if dilation.uncertain > 0 {
         let remark =
             "places where the radius is so close to a critical one that the topology there is not certain; another radius would do";

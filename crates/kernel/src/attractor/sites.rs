@@ -14,6 +14,8 @@ pub(crate) struct SiteError {
     pub(crate) inner: f64,
     /// See above: how far sites may be from the cell.
     pub(crate) outer: f64,
+    /// d(x, S)^2 where d(x, A) = r - e, at most: (r - e + inner)^2 + inner_square, which the largest of either alone may exceed.
+    pub(crate) square: f64,
 }
 
 impl SiteError {
@@ -23,6 +25,7 @@ impl SiteError {
             inner_square: self.inner_square.max(other.inner_square),
             inner: self.inner.max(other.inner),
             outer: self.outer.max(other.outer),
+            square: self.square.max(other.square),
         }
     }
 }
@@ -112,13 +115,13 @@ impl<'a> SiteRule<'a> {
                 let columns = frame_columns(points);
                 let from_centre = |point: &Point| times(&columns, &subtract(point, &cover.centre));
                 let square = cover.points.iter().map(from_centre).map(|x| dot(&x, &x)).fold(0.0, f64::max);
-                SiteError { inner_square: square, inner: cover.halo.image(&columns).radius(), outer: 0.0 }
+                SiteError { inner_square: square, inner: cover.halo.image(&columns).radius(), ..SiteError::default() }
             }
         };
         let least = self.radius - self.tolerance;
-        let taken = (least + error.inner).powi(2) + error.inner_square - least * least;
-        let allowed = SITE_SHARE * (self.radius * self.radius - least * least);
-        (taken <= allowed && error.outer <= OUTER_SHARE * self.tolerance).then_some(error)
+        let square = (least + error.inner).powi(2) + error.inner_square;
+        let allowed = least * least + SITE_SHARE * (self.radius * self.radius - least * least);
+        (square <= allowed && error.outer <= OUTER_SHARE * self.tolerance).then_some(SiteError { square, ..error })
     }
 
     /// Emits the sites of a leaf.
@@ -152,7 +155,7 @@ impl<'a> SiteRule<'a> {
 }
 
 fn both(error: f64) -> SiteError {
-    SiteError { inner_square: 0.0, inner: error, outer: error }
+    SiteError { inner: error, outer: error, ..SiteError::default() }
 }
 
 /// Chooses for every state that a root of affine maps reaches the kind of site with the least expected work; all states

@@ -8,7 +8,11 @@
 //! Where the solid leaves out a critical point of the distance below r, the lattice is refined until it does not: by Morse
 //! theory the solid then has all of D(r)'s topology (see `block`). Where no level is fine enough, that is counted as uncertain.
 //!
-//! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`.
+//! Where points stand for cells, as in most fractals, there are too many of them to be told apart. There the least squared distance at the lattice's vertices alone decides
+//! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
+//! Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
+//!
+//! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`. Triangles are then saved within the same bounds (`simplify`).
 
 mod assemble;
 mod block;
@@ -53,7 +57,8 @@ pub struct Dilation {
     pub crossings: u64,
     /// The box of the attractor, not dilated.
     pub bounds: AxisBox,
-    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain.
+    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain. Not counted where points stand for
+    /// cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
 }
 

@@ -6,7 +6,7 @@ use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Node, Pass};
 use super::outside::MOST;
-use super::simplify::Simplifier;
+use super::simplify::{NUDGE, Simplifier};
 use super::smooth::MOST_NOISE;
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
@@ -202,7 +202,7 @@ impl<'a> Plan<'a> {
         let rounding = rounding(extent(&bounds, 3.0 * radius));
         check_depth(attractor, aimed, tolerance, budget)?;
         // The unit of values is below 8 r^2 / MOST, and noise of 32 units moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^16.
-        let extra = rounding + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
+        let extra = (1.0 + NUDGE) * rounding + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
@@ -371,10 +371,14 @@ impl<'a> Plan<'a> {
 
     fn certify(&self, setting: &Setting, surface: BlockSurface, uncertain: usize, budget: &Budget) -> Result<Dilation, DilationError> {
         let site = surface.site_error;
-        // x is in the solid if d(x, S) <= least, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
-        let inside = (setting.least.powi(2) - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
+        // x is in the solid if d(x, S) <= least, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square, or at most `square` where d(x, A) <= r - e.
+        let squares = setting.least.powi(2);
+        let inside = (squares - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
         let outside = setting.outer + site.outer + self.extra;
-        let (inner, outer) = (self.radius - inside, outside - self.radius);
+        let (mut inner, outer) = (self.radius - inside, outside - self.radius);
+        if site.square <= squares {
+            inner = inner.min(self.tolerance);
+        }
         let leaf_cells = surface.leaves;
         let mesh = TriMesh { vertices: surface.vertices.into_iter().map(DVec3::from_array).collect(), triangles: surface.triangles };
         // Signs from pseudo-normals are right for embedded surfaces only; elsewhere they tear the result.

@@ -22,6 +22,7 @@ use crate::attractor::cell::{Point, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::contact;
+use std::collections::BTreeSet;
 
 /// Where a node's surface is its own.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +38,8 @@ impl Core {
     }
 }
 
+/// How far vertices without which a triangle has no area are moved, in units of rounding: one step of single precision along each axis.
+pub(super) const NUDGE: f64 = 2.0;
 /// Triangles around a vertex that may be removed, at most.
 const MOST_AROUND: usize = 24;
 /// Triangles around a vertex afterwards.
@@ -322,7 +325,43 @@ impl<'a> Simplifier<'a> {
         self.stamps.resize(mesh.points.len(), 0);
         self.stamp = 0;
         self.clean(setting, &mut mesh, &inside, &settled);
+        self.nudge(&mut mesh);
         self.write(&mut mesh, &inside, surface);
+    }
+
+    /// Gives what is left of triangles without area some, by moving corners by single steps of single precision, each at most once.
+    fn nudge(&mut self, mesh: &mut HalfEdges) {
+        let is_flat = |mesh: &HalfEdges, triangle: u32| {
+            mesh.triangle(triangle).is_some_and(|t| has_no_area(&t.map(|corner| mesh.points[corner as usize])))
+        };
+        let mut moved = BTreeSet::new();
+        for triangle in 0..mesh.triangles() {
+            if !is_flat(mesh, triangle) {
+                continue;
+            }
+            'corners: for corner in mesh.triangle(triangle).into_iter().flatten() {
+                if moved.contains(&corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
+                    continue;
+                }
+                let from = mesh.points[corner as usize];
+                for code in 1..27 {
+                    let step = |axis: usize| {
+                        let x = from[axis] as f32;
+                        f64::from(match code / [1, 3, 9][axis] % 3 {
+                            0 => x,
+                            1 => x.next_up(),
+                            _ => x.next_down(),
+                        })
+                    };
+                    mesh.points[corner as usize] = std::array::from_fn(step);
+                    if !self.star.halves.iter().any(|&half| is_flat(mesh, half / 3)) {
+                        moved.insert(corner);
+                        break 'corners;
+                    }
+                }
+                mesh.points[corner as usize] = from;
+            }
+        }
     }
 
     /// Joins vertices at the same place, and turns edges of triangles without area, while that changes anything.
@@ -632,4 +671,10 @@ fn kept(m: usize, count: usize) -> impl Iterator<Item = usize> {
 #[inline]
 fn cross(a: &Point, b: &Point) -> Point {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// As the solid's topology counts it.
+fn has_no_area(&[a, b, c]: &[Point; 3]) -> bool {
+    let normal = cross(&subtract(&b, &a), &subtract(&c, &a));
+    dot(&normal, &normal) <= 0.0
 }
