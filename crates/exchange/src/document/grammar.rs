@@ -948,11 +948,7 @@ pub(super) const JOB_PARAMS: Object = Object {
             "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",
             flag,
         ),
-        optional(
-            "simplify",
-            "Whether a solid has no more triangles than its bound needs, else all of the lattice: for solidify alone; true when absent.",
-            flag,
-        ),
+        optional("simplify", "Whether triangles are saved within the bound: for solidify alone; true when absent.", flag),
         optional(
             "stability",
             "Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent.",
