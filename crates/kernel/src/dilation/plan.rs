@@ -12,12 +12,13 @@ use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
 use crate::attractor::Attractor;
 use crate::attractor::sites::{SiteError, SiteRule};
+use crate::automaton::LeafPrimitive;
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::{Crossings, Solid, SolidError, TriMesh};
 use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
@@ -361,9 +362,15 @@ impl<'a> Plan<'a> {
             .fold(0.0, f64::max);
         let blocks = (size / (setting.lattice.pitch * block::SIDE as f64)).ceil().max(1.0) as u64;
         let mut candidates = Candidates::default();
+        let mut met: HashSet<Vec<u64>> = HashSet::new();
         for (index, root) in attractor.roots().iter().enumerate() {
             let cell = attractor.root_cell(index);
             let leaf = self.rule.leaf(&cell, &root.points).is_some();
+            // Points, segments and triangles that are stated again add nothing; triangles of a solid tell its sides.
+            let is_stated = leaf && root.solid.is_none() && attractor.state_of(&cell).leaf == LeafPrimitive::Simplex;
+            if is_stated && !met.insert(root.points.iter().flatten().map(|x| x.to_bits()).collect()) {
+                continue;
+            }
             candidates.push(cell, &root.points, leaf);
         }
         (blocks.next_power_of_two() as i64, candidates)
