@@ -91,6 +91,11 @@ pub(crate) fn dot(a: &Point, b: &Point) -> f64 {
 }
 
 #[inline]
+pub(crate) fn cross(a: &Point, b: &Point) -> Point {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline]
 pub(crate) fn distance_squared(a: &Point, b: &Point) -> f64 {
     let difference = subtract(a, b);
     dot(&difference, &difference)

@@ -19,7 +19,7 @@
 //! anywhere.
 
 use super::Attractor;
-use super::cell::{ControlPoint, Point, dot};
+use super::cell::{ControlPoint, Point, cross, dot};
 use super::invariant::dominant;
 use crate::automaton::topology::{Source, Topology};
 use crate::automaton::{Automaton, LeafPrimitive, StateId, SubdivisionOperator};
@@ -196,10 +196,10 @@ fn normal(masks: &Masks, points: &[ControlPoint], rational: bool, at: &Point) ->
         let weight = if rational { sum[3] } else { 0.0 };
         [sum[0] - at[0] * weight, sum[1] - at[1] * weight, sum[2] - at[2] * weight]
     });
-    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let length = dot(&cross, &cross).sqrt();
+    let normal = cross(&a, &b);
+    let length = dot(&normal, &normal).sqrt();
     // Masks are orthonormal but for the way to the cycle; parallel tangents give what rounding leaves.
-    if length > 1e-9 * (dot(&a, &a) * dot(&b, &b)).sqrt() { cross.map(|x| x / length) } else { [0.0; 3] }
+    if length > 1e-9 * (dot(&a, &a) * dot(&b, &b)).sqrt() { normal.map(|x| x / length) } else { [0.0; 3] }
 }
 
 /// Corners of a face's outline, as cells of its closure.

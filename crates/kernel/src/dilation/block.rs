@@ -54,7 +54,7 @@ pub(super) struct BlockSurface {
     pub(super) leaves: u64,
     /// Largest errors of leaves met.
     pub(super) site_error: SiteError,
-    /// Cubes to subdivide: the distance may have a critical point below r there that the solid leaves out.
+    /// Cubes to subdivide: the distance may have a critical point on the wrong side there, or, among dense sites, what would be filled is not near a site.
     pub(super) critical: Vec<Cube>,
     /// Places where no level tells it.
     pub(super) uncertain: Vec<Cube>,
@@ -138,7 +138,7 @@ impl Frame {
         around + gap + setting.slack < setting.close
     }
 
-    /// The cubes around it that are not subdivided and larger than the finest.
+    /// The cubes of its level that have their centres among its vertices.
     fn cubes(&self) -> impl Iterator<Item = Cube> {
         let edge = UNITS >> self.level;
         self.numbers
@@ -439,7 +439,7 @@ impl<'a> Workshop<'a> {
     fn tetrahedron(&mut self, setting: &Setting, numbers: [Number; 4], level: u32, surface: &mut BlockSurface) {
         let Some(mut frame) = self.frame(setting, numbers, level, surface) else { return };
         if setting.dense {
-            return self.dense_tetrahedron(setting, frame, surface);
+            return self.dense_tetrahedron(setting, &frame, surface);
         }
         let theta = setting.reach * setting.reach;
         let squares = smooth::squares(&self.tree, &frame);
@@ -520,30 +520,31 @@ impl<'a> Workshop<'a> {
     }
 
     /// The tetrahedron among sites that are too many to be told apart: marched as a whole, and its cubes to be subdivided unless what this fills is near a site.
-    fn dense_tetrahedron(&mut self, setting: &Setting, frame: Frame, surface: &mut BlockSurface) {
+    fn dense_tetrahedron(&mut self, setting: &Setting, frame: &Frame, surface: &mut BlockSurface) {
         if frame.covered == 0 {
             return;
         }
-        if !frame.is_close(setting) {
-            let squares = smooth::squares(&self.tree, &frame);
-            let mut served = smooth::served(setting, &frame, &squares, smooth::PARTS);
-            if served >> WHOLE & 1 == 0 {
-                // The site nearest to the middle of what is filled.
-                let weights = frame.values.map(|value| if value.least < 0 { 1.0 } else { 0.5 });
-                let total: f64 = weights.iter().sum();
-                let middle = place(&frame.positions, &weights.map(|weight| weight / total));
-                if let Some(hit) = self.tree.nearest(&middle, &self.near, Some(frame.values[0].node), setting.outer, 0.0) {
-                    let site = self.tree.site(hit.site);
-                    let squares = frame.positions.map(|x| site.distance_squared(&x));
-                    served = smooth::served(setting, &frame, &[squares], served);
-                }
-            }
-            if served >> WHOLE & 1 == 0 {
-                surface.critical.extend(frame.cubes());
-                return;
-            }
+        if frame.is_close(setting) || self.is_served(setting, frame) {
+            self.march(frame, surface);
+        } else {
+            surface.critical.extend(frame.cubes());
         }
-        self.march(&frame, surface);
+    }
+
+    /// Whether a site serves the whole tetrahedron: the nearest to a vertex, or to the middle of what is filled.
+    fn is_served(&mut self, setting: &Setting, frame: &Frame) -> bool {
+        let serves = |squares: &[[f64; 4]]| smooth::served(setting, frame, squares, smooth::PARTS) >> WHOLE & 1 == 1;
+        if serves(&smooth::squares(&self.tree, frame)) {
+            return true;
+        }
+        let weights = frame.values.map(|value| if value.least < 0 { 1.0 } else { 0.5 });
+        let total: f64 = weights.iter().sum();
+        let middle = place(&frame.positions, &weights.map(|weight| weight / total));
+        let hit = self.tree.nearest(&middle, &self.near, Some(frame.values[0].node), setting.outer, 0.0);
+        hit.is_some_and(|hit| {
+            let site = self.tree.site(hit.site);
+            serves(&[frame.positions.map(|x| site.distance_squared(&x))])
+        })
     }
 
     /// Whether a point tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron.

@@ -164,8 +164,6 @@ pub(super) struct Nearby {
     square: f64,
     first_square: f64,
     reach: f64,
-    /// How far the surface may be from the sites.
-    outer: f64,
     /// Sites with a bit, and what bit a site has in the star of that number.
     sites: Vec<SiteId>,
     bits: Vec<(u32, u32)>,
@@ -180,9 +178,8 @@ pub(super) struct Nearby {
 }
 
 impl Nearby {
-    /// Forgets all; sites cover within `reach`, and all sites within `outer`; they are looked for up to the root of `first_square` at first.
-    pub(super) fn reset(&mut self, vertices: usize, reach: f64, outer: f64, first_square: f64) {
-        self.outer = outer;
+    /// Forgets all; sites cover within `reach` and are looked for up to the root of `first_square` at first.
+    pub(super) fn reset(&mut self, vertices: usize, reach: f64, first_square: f64) {
         self.ranges.clear();
         // One more for a place that is tried.
         self.ranges.resize(vertices + 1, Range::default());
@@ -338,10 +335,10 @@ impl Nearby {
         true
     }
 
-    /// Whether a corner is so near to the sites and to the other corners that all points between are within `outer`: the distance grows by no more than the way.
+    /// Whether a corner is so near to the sites and to the other corners that all points between are within reach: the distance grows by no more than the way.
     fn is_near(&self, piece: &[Marked; 4]) -> bool {
         piece.iter().any(|corner| {
-            let left = self.outer - corner.distance;
+            let left = self.reach - corner.distance;
             left > 0.0 && piece.iter().all(|other| distance_squared(&corner.at, &other.at) < left * left)
         })
     }

@@ -11,7 +11,7 @@ use super::outside::Corner;
 use super::plan::Setting;
 use super::smooth;
 use super::tree::Tree;
-use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
 use crate::measure::triangle::{Feature, closest_feature};
 
 /// Boxes that the search in a tetrahedron may look at.
@@ -252,8 +252,4 @@ fn are_parted(points: &[Point], others: &[Point]) -> bool {
         }
     }
     false
-}
-
-fn cross(a: &Point, b: &Point) -> Point {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

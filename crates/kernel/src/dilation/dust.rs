@@ -7,7 +7,7 @@
 use super::block::BlockSurface;
 use super::plan::Setting;
 use super::tree::{Candidates, Tree};
-use crate::attractor::cell::{Point, distance_squared, dot};
+use crate::attractor::cell::{Point, cross, distance_squared, dot};
 use crate::attractor::sites::SiteRule;
 
 /// A shell of the surface.
@@ -36,7 +36,7 @@ pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candid
     for (triangle, &number) in surface.triangles.iter().zip(&numbers) {
         let shell = &mut shells[number as usize];
         let [a, b, c] = triangle.map(|corner| std::array::from_fn(|axis| surface.vertices[corner as usize][axis] - shell.low[axis]));
-        shell.volume += dot(&a, &[b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]]);
+        shell.volume += dot(&a, &cross(&b, &c));
     }
     let mut tree = None;
     let gone: Vec<bool> = shells.iter().map(|shell| is_dust(setting, rule, candidates, shell, &mut tree)).collect();

@@ -73,6 +73,11 @@ impl Cube {
     }
 }
 
+/// A place and the 26 that touch it.
+pub(super) fn around(at: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
+    (0..27).map(move |code| std::array::from_fn(|axis| at[axis] + code / [1, 3, 9][axis] % 3 - 1))
+}
+
 /// The cubes that are subdivided.
 #[derive(Clone, Debug, Default)]
 pub struct Grading {
@@ -89,9 +94,7 @@ impl Grading {
                 continue;
             }
             new.push(cube);
-            for offset in (0..27).map(|code: i64| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1]) {
-                open.extend(cube.moved(offset).parent());
-            }
+            open.extend(around(cube.index).filter_map(|index| Cube { index, ..cube }.parent()));
         }
     }
 

@@ -89,9 +89,9 @@ pub fn dilate_unsimplified(
 
 fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
     let Some(Resolved { attractor: resolved, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
-        return Plan::new(attractor, radius, tolerance, simplify, budget)?.run(attractor, budget);
+        return Plan::new(attractor, radius, tolerance, simplify, budget)?.run(budget);
     };
-    let dilation = Plan::new(&resolved, radius, rest, simplify, budget)?.run(&resolved, budget)?;
+    let dilation = Plan::new(&resolved, radius, rest, simplify, budget)?.run(budget)?;
     Ok(Dilation {
         inner_mm: dilation.inner_mm + deviation_mm,
         outer_mm: dilation.outer_mm + deviation_mm,
@@ -146,5 +146,5 @@ pub struct Prediction {
 pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Prediction, DilationError> {
     let resolved = resolve(attractor, radius, tolerance, budget)?;
     let (attractor, tolerance) = resolved.as_ref().map_or((attractor, tolerance), |resolved| (&resolved.attractor, resolved.rest));
-    Plan::new(attractor, radius, tolerance, true, budget)?.predict(attractor, budget)
+    Plan::new(attractor, radius, tolerance, true, budget)?.predict(budget)
 }

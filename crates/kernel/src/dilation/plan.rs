@@ -3,7 +3,7 @@
 use super::assemble::{Assembly, Blocks};
 use super::block::{self, BlockSurface, WITNESS};
 use super::dust;
-use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
+use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice, around};
 use super::octree::{Node, Pass};
 use super::outside::MOST;
 use super::simplify::{NUDGE, Simplifier};
@@ -40,8 +40,6 @@ pub(crate) struct Setting {
     pub(super) least: f64,
     /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
     pub(super) outer: f64,
-    /// V fills what is nearer than this: outer, but among dense sites not much more than r.
-    pub(super) filled: f64,
     /// f less theta where a gap was closed: the surface passes near the vertex.
     pub(super) filled_value: i64,
     /// outer^2 + R^2 less theta by level, as an integer.
@@ -56,7 +54,7 @@ pub(crate) struct Setting {
     pub(super) slack: f64,
     /// How far a position moves when it becomes a single-precision number.
     pub(super) rounding: f64,
-    /// Whether sites are too many to be told apart: the lattice is refined where none nearly serves, see `smooth`.
+    /// Whether sites are too many to be told apart: all tetrahedra are marched, and refined where what that fills is not near a site, see `block`.
     pub(super) dense: bool,
     /// Radius of the ball that closes gaps among dense sites, and how wide a neck the lattice sees there.
     pub(super) gap: f64,
@@ -116,9 +114,8 @@ impl Setting {
             horizon,
             sight: (2.0 * WITNESS * radius).max(horizon + radius) * 1.001,
             far: integer((radius + 1.001 * pitch).powi(2) - theta),
-            least: (theta - enclosing).max(0.0).sqrt() * (1.0 - 1e-12),
+            least: least(radius, pitch),
             outer,
-            filled: outer,
             filled_value: -1,
             bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing * 0.25_f64.powi(level as i32))),
             deep: (radius - pitch * 1.000_1).max(0.0),
@@ -146,6 +143,11 @@ impl Setting {
     }
 }
 
+/// sqrt(theta - R^2), rounded down.
+fn least(radius: f64, pitch: f64) -> f64 {
+    (radius * radius - (ENCLOSING * pitch).powi(2)).max(0.0).sqrt() * (1.0 - 1e-12)
+}
+
 /// Largest coordinate of the box grown by `margin`.
 fn extent(bounds: &AxisBox, margin: f64) -> f64 {
     (0..3).map(|axis| bounds.low[axis].low.abs().max(bounds.high[axis].high.abs()) + margin).fold(0.0, f64::max)
@@ -171,6 +173,12 @@ fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: 
         return Err(DilationError::Depth { allowed, tolerance_mm: tolerance.mm(), needed_mm, reached_mm });
     }
     Ok(())
+}
+
+/// The cube of space to refine, from block 0 on: blocks along its side, a power of two, and the roots as its candidates.
+struct Space {
+    blocks: i64,
+    candidates: Candidates,
 }
 
 /// Pitch and bounds of a dilation before it begins.
@@ -207,11 +215,11 @@ impl<'a> Plan<'a> {
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
-        let least = (radius * radius - (ENCLOSING * pitch).powi(2)).max(0.0).sqrt() * (1.0 - 1e-12);
+        let least = least(radius, pitch);
         let pitch = if rule.is_dense() { pitch.min(CLOSE * (aimed - extra - rule.outer_reserve())) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
-            let least = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
-            let reachable_mm = 1.01 * (2.0 * extra).max(least + extra);
+            let share = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
+            let reachable_mm = 1.01 * (2.0 * extra).max(share + extra);
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
         Ok(Self { radius, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
@@ -247,7 +255,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
-    pub(super) fn predict(&self, attractor: &Attractor, budget: &Budget) -> Result<Prediction, DilationError> {
+    pub(super) fn predict(&self, budget: &Budget) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
             limits: crate::budget::Limits { triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
             progress: None,
@@ -257,7 +265,8 @@ impl<'a> Plan<'a> {
         let coarsest = (COARSEST * self.radius).max(self.pitch);
         let mut pitch = coarsest;
         loop {
-            let surfaces = self.surfaces(attractor, &self.setting(pitch, &unlimited), &Grading::default(), None, &unlimited)?;
+            let setting = self.setting(pitch, &unlimited);
+            let surfaces = self.surfaces(&setting, &self.space(&setting), &Grading::default(), None, &unlimited)?;
             let made = surfaces.iter().map(|surface| surface.triangles.len() as f64).sum::<f64>();
             let expected = |finer: f64| made * (pitch / finer).powi(2);
             if pitch <= self.pitch || expected((0.5 * pitch).max(self.pitch)) > PREDICTION_WORK {
@@ -269,10 +278,11 @@ impl<'a> Plan<'a> {
 
     /// The dilation. Where the distance may have critical points with values that the lattice does not tell from r, it is
     /// refined until it does.
-    pub(super) fn run(&self, attractor: &Attractor, budget: &Budget) -> Result<Dilation, DilationError> {
+    pub(super) fn run(&self, budget: &Budget) -> Result<Dilation, DilationError> {
         let setting = self.setting(self.pitch, budget);
+        let space = self.space(&setting);
         let mut grading = Grading::default();
-        let made = self.surfaces(attractor, &setting, &grading, None, budget)?;
+        let made = self.surfaces(&setting, &space, &grading, None, budget)?;
         let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
         let mut blocks: BTreeMap<[i64; 3], BlockSurface> = made.into_iter().map(|surface| (surface.first_cube, surface)).collect();
         let mut refined = 0;
@@ -289,11 +299,11 @@ impl<'a> Plan<'a> {
             }
             let affected = blocks_around(&new);
             affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
-            let remade = self.surfaces(attractor, &setting, &grading, Some(&affected), budget)?;
+            let remade = self.surfaces(&setting, &space, &grading, Some(&affected), budget)?;
             blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
         }
-        let mut surface = self.assemble(attractor, &setting, &grading, blocks, budget)?;
-        dust::remove(&setting, &self.rule, &self.space(attractor, &setting).1, &mut surface);
+        let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
+        dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
         Simplifier::new(&self.rule, &setting).finish(&setting, &mut surface);
         budget.report("dilate", 1.0, surface.triangles.len() as u64);
         self.certify(&setting, surface, uncertain, budget)
@@ -301,19 +311,17 @@ impl<'a> Plan<'a> {
 
     fn surfaces(
         &self,
-        attractor: &Attractor,
         setting: &Setting,
+        space: &Space,
         grading: &Grading,
         only: Option<&BTreeSet<[i64; 3]>>,
         budget: &Budget,
     ) -> Result<Vec<BlockSurface>, DilationError> {
-        let (blocks, candidates) = self.space(attractor, setting);
-        self.pass(attractor, setting, grading, only, budget, blocks).run([0; 3], blocks, &candidates)
+        self.pass(setting, grading, only, budget, space.blocks).run([0; 3], space.blocks, &space.candidates)
     }
 
     fn pass<'b>(
         &'b self,
-        attractor: &'b Attractor,
         setting: &'b Setting,
         grading: &'b Grading,
         only: Option<&'b BTreeSet<[i64; 3]>>,
@@ -321,7 +329,7 @@ impl<'a> Plan<'a> {
         blocks: i64,
     ) -> Pass<'b> {
         Pass {
-            attractor,
+            attractor: self.rule.attractor(),
             rule: &self.rule,
             setting,
             grading,
@@ -337,26 +345,26 @@ impl<'a> Plan<'a> {
     /// One surface from those of all blocks, with as few triangles as the promise allows.
     fn assemble(
         &self,
-        attractor: &Attractor,
         setting: &Setting,
+        space: &Space,
         grading: &Grading,
         made: BTreeMap<[i64; 3], BlockSurface>,
         budget: &Budget,
     ) -> Result<BlockSurface, DilationError> {
-        let (blocks, candidates) = self.space(attractor, setting);
-        let pass = self.pass(attractor, setting, grading, None, budget, blocks);
+        let pass = self.pass(setting, grading, None, budget, space.blocks);
         let site_error = made.values().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
         let leaves = made.values().map(|surface| surface.leaves).sum();
         let block = |(cube, surface): ([i64; 3], BlockSurface)| (cube.map(|x| x / block::SIDE as i64), Mutex::new(surface));
         let surfaces: Blocks = made.into_iter().map(block).collect();
-        let solids: Vec<u32> = (0..attractor.solids().len() as u32).collect();
+        let solids: Vec<u32> = (0..self.rule.attractor().solids().len() as u32).collect();
         let assembly = Assembly { pass: &pass, blocks: &surfaces, idle: Mutex::new(Vec::new()) };
-        let root = assembly.node(Node { first_block: [0; 3], blocks }, &candidates, &solids)?.unwrap_or_default();
+        let root = assembly.node(Node { first_block: [0; 3], blocks: space.blocks }, &space.candidates, &solids)?.unwrap_or_default();
         Ok(BlockSurface { leaves, site_error: root.site_error.max(site_error), ..root })
     }
 
-    /// The cube of space to refine, and the roots as its candidates.
-    fn space(&self, attractor: &Attractor, setting: &Setting) -> (i64, Candidates) {
+    /// The space of a lattice.
+    fn space(&self, setting: &Setting) -> Space {
+        let attractor = self.rule.attractor();
         let size = (0..3)
             .map(|axis| self.bounds.high[axis].high + setting.reach + 1.5 * setting.lattice.pitch - setting.lattice.origin[axis])
             .fold(0.0, f64::max);
@@ -373,7 +381,7 @@ impl<'a> Plan<'a> {
             }
             candidates.push(cell, &root.points, leaf);
         }
-        (blocks.next_power_of_two() as i64, candidates)
+        Space { blocks: blocks.next_power_of_two() as i64, candidates }
     }
 
     fn certify(&self, setting: &Setting, surface: BlockSurface, uncertain: usize, budget: &Budget) -> Result<Dilation, DilationError> {
@@ -411,11 +419,5 @@ impl<'a> Plan<'a> {
 /// The blocks whose tetrahedra change with these cubes: those that hold one or a neighbour.
 fn blocks_around(cubes: &[Cube]) -> BTreeSet<[i64; 3]> {
     let side = block::SIDE as i64;
-    let around = |cube: &Cube| {
-        let base = cube.base();
-        (0..27)
-            .map(move |code: i64| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1])
-            .map(move |offset| std::array::from_fn(|axis: usize| (base[axis] + offset[axis]).div_euclid(side)))
-    };
-    cubes.iter().flat_map(around).collect()
+    cubes.iter().flat_map(|cube| around(cube.base())).map(|base| base.map(|x| x.div_euclid(side))).collect()
 }

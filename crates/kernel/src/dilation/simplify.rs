@@ -18,10 +18,12 @@ use super::certificate::{Nearby, Places};
 use super::half_edges::{HalfEdges, NONE, Star, next};
 use super::plan::Setting;
 use super::tree::{Candidates, Tree};
-use crate::attractor::cell::{Point, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::contact;
+use crate::solid::topology::has_no_area;
+use glam::DVec3;
 use std::collections::BTreeSet;
 
 /// Where a node's surface is its own.
@@ -175,7 +177,7 @@ impl<'a> Simplifier<'a> {
         self.places.reset(core.low, edge, top, starts);
         let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
         let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
-        self.nearby.reset(mesh.points.len(), setting.filled + setting.rounding, setting.outer + setting.rounding, first_square);
+        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
         self.stamps.clear();
         self.stamps.resize(mesh.points.len(), 0);
         self.stamp = 0;
@@ -332,7 +334,7 @@ impl<'a> Simplifier<'a> {
     /// Gives what is left of triangles without area some, by moving corners by single steps of single precision, each at most once.
     fn nudge(&mut self, mesh: &mut HalfEdges) {
         let is_flat = |mesh: &HalfEdges, triangle: u32| {
-            mesh.triangle(triangle).is_some_and(|t| has_no_area(&t.map(|corner| mesh.points[corner as usize])))
+            mesh.triangle(triangle).is_some_and(|t| has_no_area(t.map(|corner| DVec3::from_array(mesh.points[corner as usize]))))
         };
         let mut moved = BTreeSet::new();
         for triangle in 0..mesh.triangles() {
@@ -666,15 +668,4 @@ fn is_sliver(points: &[Point; 3], least: f64) -> bool {
 /// The triangles of a star of `count` that are kept when its vertex moves to ring m.
 fn kept(m: usize, count: usize) -> impl Iterator<Item = usize> {
     (0..count).filter(move |&k| k != m && (k + 1) % count != m)
-}
-
-#[inline]
-fn cross(a: &Point, b: &Point) -> Point {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// As the solid's topology counts it.
-fn has_no_area(&[a, b, c]: &[Point; 3]) -> bool {
-    let normal = cross(&subtract(&b, &a), &subtract(&c, &a));
-    dot(&normal, &normal) <= 0.0
 }

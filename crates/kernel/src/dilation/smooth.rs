@@ -30,7 +30,7 @@ pub(super) const WHOLE: u8 = 0b1111;
 pub(super) fn served(setting: &Setting, frame: &Frame, squares: &[[f64; 4]], known: u16) -> u16 {
     let covered = |v: usize| frame.covered >> v & 1 == 1;
     let shares: [f64; 4] = std::array::from_fn(|v| share(frame.values[v].least, frame.values[v].far));
-    let outer = setting.filled * (1.0 - 1e-9) - setting.slack;
+    let outer = setting.outer * (1.0 - 1e-9) - setting.slack;
     let square = outer * outer;
     let theta = setting.reach * setting.reach;
     let serves = |s: u8, site: usize| {
@@ -90,13 +90,10 @@ fn is_steep(setting: &Setting, frame: &Frame, squares: &[f64; 4], s: u8) -> bool
         let (y, square) = frame.witnesses[v];
         rest[..count].iter().all(|x| {
             let way = distance_squared(x, &y);
-            square > setting.filled * setting.filled + way + 2.0 * LEAST_RATE * setting.filled * way.sqrt()
+            square > setting.outer * setting.outer + way + 2.0 * LEAST_RATE * setting.outer * way.sqrt()
         })
     })
 }
-
-/// Knows all simplices but the whole tetrahedron to be served.
-pub(super) const PARTS: u16 = !(1 << WHOLE);
 
 /// See [`is_steep`].
 const LEAST_RATE: f64 = 0.15;
@@ -106,6 +103,9 @@ pub(super) fn largest(smooth: u16, covered: u8) -> impl Iterator<Item = u8> {
     let is_smooth = move |s: u8| smooth >> s & 1 == 1;
     (1..=WHOLE).filter(move |&s| s & covered != 0 && is_smooth(s) && (0..4).all(|v| s >> v & 1 == 1 || !is_smooth(s | 1 << v)))
 }
+
+/// All simplices but the whole tetrahedron, where only that one is asked for.
+pub(super) const PARTS: u16 = !(1 << WHOLE);
 
 /// The vertices, which are smooth.
 pub(super) const VERTICES: u16 = 1 << 0b0001 | 1 << 0b0010 | 1 << 0b0100 | 1 << 0b1000;

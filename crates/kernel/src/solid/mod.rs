@@ -3,7 +3,7 @@
 pub(crate) mod box_tree;
 pub(crate) mod contact;
 mod crossings;
-mod topology;
+pub(crate) mod topology;
 
 use crate::budget::{Budget, Stopped};
 use crate::measure::mass::volume;

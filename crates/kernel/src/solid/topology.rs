@@ -156,8 +156,12 @@ impl Topology {
 }
 
 fn is_degenerate(mesh: &TriMesh, &[a, b, c]: &[u32; 3]) -> bool {
-    let corner = |index: u32| mesh.vertices[index as usize];
-    a == b || b == c || c == a || (corner(b) - corner(a)).cross(corner(c) - corner(a)).length_squared() <= 0.0
+    a == b || b == c || c == a || has_no_area([a, b, c].map(|corner| mesh.vertices[corner as usize]))
+}
+
+/// Whether the area of a triangle vanishes in double precision: such triangles are counted as degenerate.
+pub(crate) fn has_no_area([a, b, c]: [DVec3; 3]) -> bool {
+    (b - a).cross(c - a).length_squared() <= 0.0
 }
 
 /// Whether the pairs (b, c) are the steps of one cycle: a closed, oriented, manifold fan.

@@ -12,8 +12,9 @@
 use super::cells::{Cells, Near};
 use super::hull::{Simplex, critical_simplices, enclosing_centre, reaches, separation};
 use super::search::{Cube, Found, Grid};
-use crate::attractor::cell::{Point, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::lattice::around;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -87,11 +88,6 @@ fn touching(cubes: &[Cube]) -> Vec<Vec<usize>> {
         lists.push(list);
     }
     lists
-}
-
-/// A place and the 26 that touch it.
-fn around(at: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
-    (0..27).map(move |code| std::array::from_fn(|axis| at[axis] + code / [1, 3, 9][axis] % 3 - 1))
 }
 
 fn cluster(cells: &Cells<'_>, grid: &Grid, cubes: Vec<Cube>) -> Cluster {
@@ -262,6 +258,5 @@ impl Boundary<'_, '_> {
 
 /// The signed solid angle of a triangle of unit vectors in an open half-space (van Oosterom and Strackee, 1983).
 pub(super) fn solid_angle(a: &Point, b: &Point, c: &Point) -> f64 {
-    let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-    2.0 * dot(a, &cross).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
+    2.0 * dot(a, &cross(b, c)).atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
 }

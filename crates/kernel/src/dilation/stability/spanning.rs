@@ -1,6 +1,6 @@
 //! Minimum spanning trees of convex sites, by Boruvka's rounds over a tree of boxes.
 
-use crate::attractor::cell::{Point, Site, closest_on_segment, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::groups::Groups;
 use rayon::prelude::*;
@@ -241,7 +241,7 @@ fn to_triangle(ends: &[Point; 2], corners: &[Point; 3]) -> f64 {
         return 0.0;
     }
     let (u, v) = (subtract(&corners[1], &corners[0]), subtract(&corners[2], &corners[0]));
-    let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let normal = cross(&u, &v);
     let heights = ends.map(|end| dot(&subtract(&end, &corners[0]), &normal));
     if heights[0] * heights[1] >= 0.0 {
         return least;
