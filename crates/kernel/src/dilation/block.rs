@@ -12,7 +12,7 @@
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
 use super::critical::Critical;
-use super::lattice::{Cube, ENCLOSING, Grading, Number, UNITS, is_mirrored};
+use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored};
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
@@ -36,6 +36,10 @@ const UNKNOWN: f64 = f64::NAN;
 const DEEP: f64 = f64::NEG_INFINITY;
 /// Value of a vertex that no site covers.
 const FAR: f64 = f64::INFINITY;
+
+/// On which side of the surface a vertex is; both where a gap was closed there.
+const OPEN: u8 = 1;
+const COVERED: u8 = 2;
 
 /// The surface in one block, ready to be joined with its neighbours.
 #[derive(Debug, Default)]
@@ -293,11 +297,17 @@ impl<'a> Workshop<'a> {
         self.known = (middle, setting.sight + half);
         self.gather_solids(starts, open, &middle, half);
         let mut leaves = std::mem::take(&mut self.leaves);
+        let plain = if setting.dense { grading.plain(first, SUB) } else { Plain::default() };
         for k in 0..SUB as i64 {
             for j in 0..SUB as i64 {
                 for i in 0..SUB as i64 {
+                    let cube = Cube { level: 0, index: [first[0] + i, first[1] + j, first[2] + k] };
+                    if plain.contains([i, j, k]) {
+                        self.plain_cube(setting, cube, surface);
+                        continue;
+                    }
                     leaves.clear();
-                    grading.leaves(Cube { level: 0, index: [first[0] + i, first[1] + j, first[2] + k] }, &mut leaves);
+                    grading.leaves(cube, &mut leaves);
                     for &leaf in &leaves {
                         grading.tetrahedra(leaf, &mut |numbers| self.tetrahedron(setting, numbers, leaf.level, surface));
                     }
@@ -305,6 +315,46 @@ impl<'a> Workshop<'a> {
             }
         }
         self.leaves = leaves;
+    }
+
+    /// The tetrahedra of a cube among others of its size where points stand for cells, in the order of [`Grading::tetrahedra`]: most have all vertices
+    /// on one side, and are not looked at.
+    fn plain_cube(&mut self, setting: &Setting, cube: Cube, surface: &mut BlockSurface) {
+        let theta = setting.reach * setting.reach;
+        let mut side = |number: Number| {
+            let value = self.value(setting, surface, number);
+            match value.least < 0 {
+                false => OPEN,
+                true if value.square > theta => OPEN | COVERED,
+                true => COVERED,
+            }
+        };
+        let is_mixed = |sides: u8| sides == OPEN | COVERED;
+        let mut corners = [([0; 3], 0); 8];
+        for (code, corner) in corners.iter_mut().enumerate().skip(1) {
+            let number = cube.corner(std::array::from_fn(|axis| (code >> axis & 1) as i64));
+            *corner = (number, side(number));
+        }
+        let mut centres = [([0; 3], 0); 4];
+        for (axis, centre) in centres.iter_mut().enumerate() {
+            let number = cube.moved(std::array::from_fn(|other| i64::from(axis == other))).centre();
+            *centre = (number, side(number));
+        }
+        let own = centres[3];
+        for (axis, other) in centres.into_iter().enumerate().take(3) {
+            let (u, v) = (1 << (axis + 1) % 3, 1 << (axis + 2) % 3);
+            let face = [0, u, u | v, v].map(|offset| corners[1 << axis | offset]);
+            let between = own.1 | other.1;
+            if !is_mixed(face.iter().fold(between, |sides, corner| sides | corner.1)) {
+                continue;
+            }
+            for step in 0..4 {
+                let (p, q) = (face[step], face[(step + 1) % 4]);
+                if is_mixed(between | p.1 | q.1) {
+                    self.tetrahedron(setting, [own.0, other.0, p.0, q.0], 0, surface);
+                }
+            }
+        }
     }
 
     /// For every solid whose surface is among the candidates: its nodes near the sub-block.

@@ -37,15 +37,17 @@ impl Cube {
         UNITS >> self.level
     }
 
-    fn corner(self, offset: [i64; 3]) -> Number {
+    /// Its corner, moved by an offset in units of its edge.
+    pub(super) fn corner(self, offset: [i64; 3]) -> Number {
         std::array::from_fn(|axis| ((self.index[axis] + offset[axis]) * self.edge()) as i32)
     }
 
-    fn centre(self) -> Number {
+    pub(super) fn centre(self) -> Number {
         self.index.map(|x| (x * self.edge() + self.edge() / 2) as i32)
     }
 
-    fn moved(self, offset: [i64; 3]) -> Self {
+    /// The cube of its size at an offset in units of its edge.
+    pub(super) fn moved(self, offset: [i64; 3]) -> Self {
         Self { level: self.level, index: std::array::from_fn(|axis| self.index[axis] + offset[axis]) }
     }
 
@@ -78,6 +80,26 @@ pub(super) fn around(at: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
     (0..27).map(move |code| std::array::from_fn(|axis| at[axis] + code / [1, 3, 9][axis] % 3 - 1))
 }
 
+/// See [`Grading::plain`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plain {
+    side: usize,
+    /// Whether a cube is none of them; empty when all are.
+    touched: Vec<bool>,
+}
+
+impl Plain {
+    fn place(&self, local: [i64; 3]) -> usize {
+        local.iter().rev().fold(0, |place, &x| place * self.side + x as usize)
+    }
+
+    /// Whether a cube is one of them, by its offset from the first.
+    #[inline]
+    pub(super) fn contains(&self, local: [i64; 3]) -> bool {
+        self.side > 0 && (self.touched.is_empty() || !self.touched[self.place(local)])
+    }
+}
+
 /// The cubes that are subdivided.
 #[derive(Clone, Debug, Default)]
 pub struct Grading {
@@ -102,6 +124,27 @@ impl Grading {
     #[inline]
     pub fn is_subdivided(&self, cube: Cube) -> bool {
         !self.subdivided.is_empty() && self.subdivided.contains(&cube)
+    }
+
+    /// The cubes of level 0, `side` along each axis from `first` on, that are leaves and touch leaves of their size only.
+    pub(super) fn plain(&self, first: [i64; 3], side: usize) -> Plain {
+        let mut plain = Plain { side, touched: Vec::new() };
+        if self.subdivided.is_empty() {
+            return plain;
+        }
+        let grown = side as i64 + 2;
+        for code in 0..grown.pow(3) {
+            let local = [code % grown - 1, code / grown % grown - 1, code / grown / grown - 1];
+            let index = std::array::from_fn(|axis| first[axis] + local[axis]);
+            if self.subdivided.contains(&Cube { level: 0, index }) {
+                plain.touched.resize(side.pow(3), false);
+                for near in around(local).filter(|near| near.iter().all(|&x| 0 <= x && x < side as i64)) {
+                    let place = plain.place(near);
+                    plain.touched[place] = true;
+                }
+            }
+        }
+        plain
     }
 
     /// The leaves of a cube.

@@ -15,7 +15,7 @@ use crate::attractor::sites::{SiteError, SiteRule};
 use crate::automaton::LeafPrimitive;
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
-use crate::solid::{Crossings, Solid, SolidError, TriMesh};
+use crate::solid::{Solid, SolidError, TriMesh};
 use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -304,9 +304,9 @@ impl<'a> Plan<'a> {
         }
         let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
         dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
-        Simplifier::new(&self.rule, &setting).finish(&setting, &mut surface);
+        let crossings = Simplifier::new(&self.rule, &setting).finish(&setting, &mut surface, budget)?;
         budget.report("dilate", 1.0, surface.triangles.len() as u64);
-        self.certify(&setting, surface, uncertain, budget)
+        self.certify(&setting, surface, crossings, uncertain as u64, budget)
     }
 
     fn surfaces(
@@ -384,7 +384,14 @@ impl<'a> Plan<'a> {
         Space { blocks: blocks.next_power_of_two() as i64, candidates }
     }
 
-    fn certify(&self, setting: &Setting, surface: BlockSurface, uncertain: usize, budget: &Budget) -> Result<Dilation, DilationError> {
+    fn certify(
+        &self,
+        setting: &Setting,
+        surface: BlockSurface,
+        crossings: u64,
+        uncertain: u64,
+        budget: &Budget,
+    ) -> Result<Dilation, DilationError> {
         let site = surface.site_error;
         // x is in the solid if d(x, S) <= least, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square, or at most `square` where d(x, A) <= r - e.
         let squares = setting.least.powi(2);
@@ -402,7 +409,6 @@ impl<'a> Plan<'a> {
             SolidError::NotManifold(_) if has_solids => DilationError::Inside,
             other => other.into(),
         })?;
-        let crossings = Crossings::of(solid.mesh(), budget)?.count;
         Ok(Dilation {
             solid,
             crossings,
@@ -411,7 +417,7 @@ impl<'a> Plan<'a> {
             pitch_mm: setting.lattice.pitch,
             leaf_cells,
             bounds: self.bounds,
-            uncertain: uncertain as u64,
+            uncertain,
         })
     }
 }

@@ -20,9 +20,11 @@ use super::plan::Setting;
 use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
+use crate::budget::{Budget, Stopped};
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::contact;
 use crate::solid::topology::has_no_area;
+use crate::solid::{Crossings, TriMesh};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
@@ -40,8 +42,9 @@ impl Core {
     }
 }
 
-/// How far vertices without which a triangle has no area are moved, in units of rounding: one step of single precision along each axis.
-pub(super) const NUDGE: f64 = 2.0;
+/// How far vertices are moved that leave a triangle without area, or triangles that cross, in units of rounding: [`MOST_STEPS`] of single precision along each axis.
+pub(super) const NUDGE: f64 = 2.0 * MOST_STEPS as f64;
+const MOST_STEPS: u32 = 4;
 /// Triangles around a vertex that may be removed, at most.
 const MOST_AROUND: usize = 24;
 /// Triangles around a vertex afterwards.
@@ -64,6 +67,8 @@ const LEAST_LIFT: f64 = 0.05;
 const LEAST_TURN: f64 = 0.7;
 /// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
 const FIRST_LOOK: f64 = 0.6;
+/// Pairs of crossing triangles that are looked at.
+const MOST_PARTED: usize = 10_000;
 /// Sweeps that turn edges, at most.
 const FLIP_ROUNDS: usize = 8;
 
@@ -311,32 +316,35 @@ impl<'a> Simplifier<'a> {
         }
         mesh.points[vertex as usize] = to;
         self.nearby.accept(vertex);
-        for &half in &self.star.halves {
-            if let Some(corners) = mesh.triangle(half / 3) {
-                self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
-            }
-        }
+        self.place(mesh);
         true
     }
 
-    /// Removes what has no area from a whole surface: what one node leaves may become removable by what others do.
-    pub(super) fn finish(&mut self, setting: &Setting, surface: &mut BlockSurface) {
+    /// Removes what has no area from a whole surface, and crossings: what one node leaves may become removable by what others do.
+    pub(super) fn finish(&mut self, setting: &Setting, surface: &mut BlockSurface, budget: &Budget) -> Result<u64, Stopped> {
         let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
         let (inside, settled) = (vec![true; mesh.points.len()], vec![false; mesh.points.len()]);
         self.stamps.clear();
         self.stamps.resize(mesh.points.len(), 0);
         self.stamp = 0;
         self.clean(setting, &mut mesh, &inside, &settled);
-        self.nudge(&mut mesh);
+        let mut moved = BTreeSet::new();
+        self.nudge(&mut mesh, &mut moved);
+        let crossings = crossings(&mesh, budget)?;
+        let mut left = crossings.count;
+        if left > 0 {
+            self.part(&mut mesh, &crossings.first, &mut moved);
+            left = self::crossings(&mesh, budget)?.count;
+        }
         self.write(&mut mesh, &inside, surface);
+        Ok(left)
     }
 
     /// Gives what is left of triangles without area some, by moving corners by single steps of single precision, each at most once.
-    fn nudge(&mut self, mesh: &mut HalfEdges) {
+    fn nudge(&mut self, mesh: &mut HalfEdges, moved: &mut BTreeSet<u32>) {
         let is_flat = |mesh: &HalfEdges, triangle: u32| {
             mesh.triangle(triangle).is_some_and(|t| has_no_area(t.map(|corner| DVec3::from_array(mesh.points[corner as usize]))))
         };
-        let mut moved = BTreeSet::new();
         for triangle in 0..mesh.triangles() {
             if !is_flat(mesh, triangle) {
                 continue;
@@ -347,21 +355,50 @@ impl<'a> Simplifier<'a> {
                 }
                 let from = mesh.points[corner as usize];
                 for code in 1..27 {
-                    let step = |axis: usize| {
-                        let x = from[axis] as f32;
-                        f64::from(match code / [1, 3, 9][axis] % 3 {
-                            0 => x,
-                            1 => x.next_up(),
-                            _ => x.next_down(),
-                        })
-                    };
-                    mesh.points[corner as usize] = std::array::from_fn(step);
+                    mesh.points[corner as usize] = stepped(&from, code, 1);
                     if !self.star.halves.iter().any(|&half| is_flat(mesh, half / 3)) {
                         moved.insert(corner);
                         break 'corners;
                     }
                 }
                 mesh.points[corner as usize] = from;
+            }
+        }
+    }
+
+    /// Parts triangles that cross by moving corners by a few steps of single precision, each at most once: slivers that rounding folds over their neighbours.
+    fn part(&mut self, mesh: &mut HalfEdges, pairs: &[[u32; 2]], moved: &mut BTreeSet<u32>) {
+        self.index(mesh);
+        for corner in pairs.iter().flatten().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<BTreeSet<u32>>() {
+            if moved.contains(&corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
+                continue;
+            }
+            let mut least = self.meetings(mesh, corner, None, None, usize::MAX);
+            let from = mesh.points[corner as usize];
+            let mut best = from;
+            for (steps, code) in (0..MOST_STEPS.ilog2() + 1).flat_map(|power| (1..27).map(move |code| (1 << power, code))) {
+                if least == 0 {
+                    break;
+                }
+                let to = stepped(&from, code, steps);
+                let met = self.meetings(mesh, corner, None, Some(to), least - 1);
+                if met < least {
+                    (least, best) = (met, to);
+                }
+            }
+            if best != from {
+                moved.insert(corner);
+                mesh.points[corner as usize] = best;
+                self.place(mesh);
+            }
+        }
+    }
+
+    /// Gives the triangles of the star the boxes of where they are now.
+    fn place(&mut self, mesh: &HalfEdges) {
+        for &half in &self.star.halves {
+            if let Some(corners) = mesh.triangle(half / 3) {
+                self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
             }
         }
     }
@@ -475,11 +512,7 @@ impl<'a> Simplifier<'a> {
             }
             if self.is_certified(setting, mesh, m) && !self.tree.exhausted && self.is_free(setting, mesh, vertex, m) {
                 mesh.collapse(vertex, &self.star, m);
-                for &half in &self.star.halves {
-                    if let Some(corners) = mesh.triangle(half / 3) {
-                        self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
-                    }
-                }
+                self.place(mesh);
                 return true;
             }
         }
@@ -656,6 +689,24 @@ impl<'a> Simplifier<'a> {
         }
         found
     }
+}
+
+/// Crossings of what is left of a mesh, in its own numbers of triangles.
+fn crossings(mesh: &HalfEdges, budget: &Budget) -> Result<Crossings, Stopped> {
+    let kept: Vec<u32> = (0..mesh.triangles()).filter(|&triangle| mesh.triangle(triangle).is_some()).collect();
+    let triangles = kept.iter().filter_map(|&triangle| mesh.triangle(triangle)).collect();
+    let mesh = TriMesh { vertices: mesh.points.iter().copied().map(DVec3::from_array).collect(), triangles };
+    let mut crossings = Crossings::among(&mesh, MOST_PARTED, budget)?;
+    crossings.first.iter_mut().flatten().for_each(|triangle| *triangle = kept[*triangle as usize]);
+    Ok(crossings)
+}
+
+/// A point moved by some steps of single precision along the axes that a code of three digits names.
+fn stepped(from: &Point, code: usize, steps: u32) -> Point {
+    std::array::from_fn(|axis| {
+        let step = [|x: f32| x, f32::next_up, f32::next_down][code / [1, 3, 9][axis] % 3];
+        f64::from((0..steps).fold(from[axis] as f32, |x, _| step(x)))
+    })
 }
 
 /// Whether a triangle's least height is below `least`.
