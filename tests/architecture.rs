@@ -12,7 +12,7 @@ use serde_json::Value;
 const EDGES: [(&str, &[&str]); 6] = [
     ("lacuna-kernel", &[]),
     ("lacuna-boolean", &["lacuna-kernel"]),
-    ("lacuna-fabrication", &["lacuna-kernel"]),
+    ("lacuna-fabrication", &["lacuna-kernel", "lacuna-boolean"]),
     ("lacuna-exchange", &["lacuna-kernel", "lacuna-fabrication"]),
     ("lacuna-api", &["lacuna-kernel", "lacuna-boolean", "lacuna-fabrication", "lacuna-exchange"]),
     ("lacuna-tests", &["lacuna-kernel", "lacuna-boolean", "lacuna-fabrication", "lacuna-exchange", "lacuna-api"]),

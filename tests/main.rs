@@ -2,6 +2,7 @@
 //!
 //! | module | asks |
 //! |---|---|
+//! | `booleans` | do combined solids hold what their certificates say? |
 //! | `corpus` | does every case of `fixtures/` hold, through the real command? |
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
@@ -14,6 +15,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod architecture;
+mod booleans;
 mod container;
 mod contract;
 mod corpus;

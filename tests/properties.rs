@@ -9,6 +9,7 @@ use lacuna_fabrication::{Certificate, Geometry, Input, Job, JobKind, Outcome, Pa
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::solid::TriMesh;
+use lacuna_tests::support::inside::contains;
 use lacuna_tests::support::random::{Pieces, Random};
 
 /// Rounding of the brute-force distance itself, at coordinates of tens of mm.
@@ -31,8 +32,8 @@ fn shape(pieces: &Pieces) -> Shape {
 fn job(shape: Shape, kind: JobKind, tolerance_mm: f64, radius_mm: Option<f64>) -> Job {
     Job {
         kind,
-        inputs: vec![Input { name: "shape".into(), model: Model { name: None, shape } }],
-        params: Params { tolerance_mm, radius_mm, normals: false, simplify: true, stability: false },
+        inputs: vec![Input { name: "shape".into(), model: Model { name: None, shape }, radius_mm: None }],
+        params: Params { radius_mm, ..Params::new(tolerance_mm) },
         outputs: Vec::new(),
         limits: Limits::default(),
     }
@@ -62,17 +63,6 @@ fn corners(mesh: &TriMesh, triangle: &[u32; 3]) -> [DVec3; 3] {
 /// Signed volume, from the mesh alone.
 fn volume(mesh: &TriMesh) -> f64 {
     mesh.triangles.iter().map(|t| corners(mesh, t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
-}
-
-/// Whether a point lies inside: the sum of the solid angles of the triangles is 4 pi there and 0 outside.
-fn contains(mesh: &TriMesh, p: DVec3) -> bool {
-    let solid_angle = |t: &[u32; 3]| {
-        let [a, b, c] = corners(mesh, t).map(|q| q - p);
-        let (la, lb, lc) = (a.length(), b.length(), c.length());
-        let scale = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * a.dot(b.cross(c)).atan2(scale)
-    };
-    mesh.triangles.iter().map(solid_angle).sum::<f64>() > std::f64::consts::TAU
 }
 
 /// The sandwich, on the mesh's surface and around it.

@@ -80,6 +80,7 @@ pub fn kind_word(kind: JobKind) -> &'static str {
         JobKind::Evaluate => "evaluate",
         JobKind::Solidify => "solidify",
         JobKind::Measure => "measure",
+        JobKind::Intersect => "intersect",
     }
 }
 
@@ -203,7 +204,7 @@ impl SolveReport {
 /// What a job makes when it asks for no format: what printers read, and what carries wires.
 fn default_outputs(kind: JobKind) -> &'static [&'static str] {
     match kind {
-        JobKind::Solidify => &["3mf"],
+        JobKind::Solidify | JobKind::Intersect => &["3mf"],
         JobKind::Evaluate => &["obj"],
         JobKind::Measure => &[],
     }

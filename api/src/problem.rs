@@ -324,10 +324,11 @@ impl From<Kind> for ProblemKind {
 }
 
 impl From<JobError> for Problem {
-    /// Pointers become relative to the model document.
+    /// Pointers become relative to the model document, or to the job where it has several.
     fn from(error: JobError) -> Self {
+        let model = error.input.map(|index| format!("/inputs/{index}/model")).unwrap_or_default();
         let findings = error.diagnostics.into_iter().map(|d| Finding {
-            pointer: format!("/shape{}", d.pointer),
+            pointer: format!("{model}/shape{}", d.pointer),
             code: d.code.to_owned(),
             message: d.message,
             line: None,

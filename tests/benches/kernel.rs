@@ -38,8 +38,8 @@ fn tetrahedron() -> Shape {
 fn job(shape: Shape, kind: JobKind, tolerance_mm: f64, radius_mm: Option<f64>) -> Job {
     Job {
         kind,
-        inputs: vec![Input { name: "shape".into(), model: Model { name: None, shape } }],
-        params: Params { tolerance_mm, radius_mm, normals: false, simplify: true, stability: false },
+        inputs: vec![Input { name: "shape".into(), model: Model { name: None, shape }, radius_mm: None }],
+        params: Params { radius_mm, ..Params::new(tolerance_mm) },
         outputs: Vec::new(),
         limits: Limits { memory_bytes: 16 << 30, ..Limits::default() },
     }

@@ -29,8 +29,9 @@ fn main() {
         inputs: vec![Input {
             name: "shape".into(),
             model: Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) },
+            radius_mm: None,
         }],
-        params: Params { tolerance_mm, radius_mm: Some(0.4), normals: false, simplify: true, stability: false },
+        params: Params { radius_mm: Some(0.4), ..Params::new(tolerance_mm) },
         outputs: Vec::new(),
         limits,
     };

@@ -4,6 +4,7 @@
 
 pub mod binary;
 pub mod cases;
+pub mod inside;
 pub mod python;
 pub mod random;
 pub mod scratch;

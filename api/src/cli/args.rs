@@ -56,6 +56,8 @@ pub(super) enum Command {
     Evaluate(EvaluateArgs),
     /// Measure box, area and volume as intervals; JSON on stdout.
     Measure(MeasureArgs),
+    /// Combine solids: what lies in any of them, in all, or in the first alone.
+    Intersect(IntersectArgs),
     /// Say what is wrong with a model; JSON on stdout, exit code 3 when it is invalid.
     Validate {
         /// The model document.
@@ -188,6 +190,38 @@ pub(super) struct MeasureArgs {
     /// Radius of the ball, in mm: measure the solid instead of the shape itself.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: Option<f64>,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
+}
+
+/// An operation on solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum OperationName {
+    /// What lies in any input.
+    Union,
+    /// What lies in all inputs.
+    Intersection,
+    /// What lies in the first input and in none of the others.
+    Difference,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct IntersectArgs {
+    /// Model documents, or STL, 3MF, OBJ, PLY, OFF or VRML files: two or more.
+    #[arg(required = true, num_args = 2.., value_name = "MODEL")]
+    pub(super) models: Vec<PathBuf>,
+    /// What to leave of them.
+    #[arg(long, value_enum)]
+    pub(super) operation: OperationName,
+    /// Hausdorff bound on every solid, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: f64,
+    /// Radius of the ball that dilates the inputs, in mm: once for all, or once for each in their order. 0, or none, takes closed surfaces as
+    /// the solids that they bound.
+    #[arg(long, value_name = "MM", value_parser = distance)]
+    pub(super) radius: Vec<f64>,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
 }

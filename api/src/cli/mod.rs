@@ -43,6 +43,7 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Solidify(args) => work::solidify(&args, manner),
         Command::Evaluate(args) => work::evaluate(&args, manner),
         Command::Measure(args) => work::measure(&args, manner),
+        Command::Intersect(args) => work::intersect(&args, manner),
         Command::Run(args) => work::run(&args, manner),
         Command::Validate { model, draw } => study::validate(&model, draw.as_deref()),
         Command::Solve(args) => study::solve(&args, cli.quiet),

@@ -2,15 +2,18 @@
 
 use std::path::Path;
 
-use lacuna_fabrication::{Input, Job, JobKind, Outcome, Params};
+use lacuna_exchange::format::{self, ReadLimits};
+use lacuna_fabrication::{Input, Job, JobKind, Operation, Outcome, Params};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
+use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 
-use super::args::{EvaluateArgs, LimitArgs, MeasureArgs, OutputArgs, ProgressMode, RunArgs, SolidifyArgs};
+use super::args::{EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SolidifyArgs};
 use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
 use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
+use crate::production::format_problem;
 use crate::{documents, files, production};
 
 /// How a command behaves towards its user.
@@ -22,28 +25,46 @@ pub(super) struct Manner {
 
 /// `lacuna solidify`.
 pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params {
-        tolerance_mm: args.tolerance,
-        radius_mm: Some(args.radius),
-        normals: false,
-        simplify: !args.no_simplify,
-        stability: args.stability,
-    };
-    make(JobKind::Solidify, &args.model, params, &args.output, &args.limits, manner)
+    let params =
+        Params { radius_mm: Some(args.radius), simplify: !args.no_simplify, stability: args.stability, ..Params::new(args.tolerance) };
+    make(JobKind::Solidify, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna evaluate`.
 pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: None, normals: args.normals, simplify: true, stability: false };
-    make(JobKind::Evaluate, &args.model, params, &args.output, &args.limits, manner)
+    let params = Params { normals: args.normals, ..Params::new(args.tolerance) };
+    make(JobKind::Evaluate, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { tolerance_mm: args.tolerance, radius_mm: args.radius, normals: false, simplify: true, stability: false };
-    let job = job_of(JobKind::Measure, &args.model, params, &[], &args.limits)?;
+    let params = Params { radius_mm: args.radius, ..Params::new(args.tolerance) };
+    let job = job_with(JobKind::Measure, vec![input_of(&args.model)?], params, &[], &args.limits);
     let (outcome, _) = perform(&job, &args.limits, manner, |_, _| Ok(Vec::new()))?;
     print_json(&outcome.certificate)
+}
+
+/// `lacuna intersect`.
+pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Problem> {
+    let operation = match args.operation {
+        OperationName::Union => Operation::Union,
+        OperationName::Intersection => Operation::Intersection,
+        OperationName::Difference => Operation::Difference,
+    };
+    let mut inputs: Vec<Input> = args.models.iter().map(|path| input_of(path)).collect::<Result<_, _>>()?;
+    match args.radius.as_slice() {
+        [] => {}
+        [one] => inputs.iter_mut().for_each(|input| input.radius_mm = Some(*one)),
+        each if each.len() == inputs.len() => {
+            inputs.iter_mut().zip(each).for_each(|(input, radius)| input.radius_mm = Some(*radius));
+        }
+        each => {
+            let detail = format!("{} radii are given for {} models; give one for all, or one for each", each.len(), inputs.len());
+            return Err(Problem::new(ProblemKind::Usage, detail));
+        }
+    }
+    let params = Params { operation: Some(operation), ..Params::new(args.tolerance) };
+    make(JobKind::Intersect, inputs, params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna run`.
@@ -61,11 +82,18 @@ pub(super) fn run(args: &RunArgs, manner: Manner) -> Result<(), Problem> {
     let (targets, certificate) = (targets?, args.folder.join("certificate.json"));
     let done =
         perform(&job, &args.limits, manner, |outcome, budget| deliver(outcome, title.as_deref(), &targets, Some(&certificate), budget));
-    let (outcome, written) = done.map_err(|problem| problem.under("/model"))?;
+    let (outcome, written) = done.map_err(|problem| problem.under_model())?;
     print_json(&serde_json::json!({ "outputs": written, "certificate": outcome.certificate }))
 }
 
-fn make(kind: JobKind, model: &Path, params: Params, output: &OutputArgs, limit_args: &LimitArgs, manner: Manner) -> Result<(), Problem> {
+fn make(
+    kind: JobKind,
+    inputs: Vec<Input>,
+    params: Params,
+    output: &OutputArgs,
+    limit_args: &LimitArgs,
+    manner: Manner,
+) -> Result<(), Problem> {
     let mut targets: Vec<Target> = output
         .outputs
         .iter()
@@ -73,7 +101,7 @@ fn make(kind: JobKind, model: &Path, params: Params, output: &OutputArgs, limit_
         .collect::<Result<_, _>>()?;
     check_distinct(&targets, output)?;
     let names: Vec<&str> = targets.iter().filter_map(|target| target.name).collect();
-    let job = job_of(kind, model, params, &names, limit_args)?;
+    let job = job_with(kind, inputs, params, &names, limit_args);
     if let Some(path) = &output.preview {
         targets.push(Target { name: None, ..target(path, Some("png"))? });
     }
@@ -103,16 +131,29 @@ fn check_distinct(targets: &[Target], output: &OutputArgs) -> Result<(), Problem
     }
 }
 
-fn job_of(kind: JobKind, model: &Path, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Result<Job, Problem> {
-    let model = documents::read_model_in(&read_input(model, DOCUMENT_BYTES)?, folder_of(model))?;
-    let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
+fn job_with(kind: JobKind, inputs: Vec<Input>, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Job {
     let mut names: Vec<String> = Vec::new();
     for output in outputs {
         if !names.iter().any(|name| name == output) {
             names.push((*output).to_owned());
         }
     }
-    Ok(Job { kind, inputs: vec![Input { name, model }], params, outputs: names, limits: limits(Limits::default(), limit_args) })
+    Job { kind, inputs, params, outputs: names, limits: limits(Limits::default(), limit_args) }
+}
+
+/// An argument as an input: a model document, or a mesh file, which is called by its name.
+fn input_of(path: &Path) -> Result<Input, Problem> {
+    let reading = ReadLimits::default();
+    let bytes = read_input(path, DOCUMENT_BYTES.max(reading.file_bytes))?;
+    let is_document = bytes.iter().find(|byte| !byte.is_ascii_whitespace()).is_none_or(|&byte| byte == b'{');
+    if is_document || format::detect(&bytes).is_none() {
+        let model = documents::read_model_in(&bytes, folder_of(path))?;
+        return Ok(Input { name: model.name.clone().unwrap_or_else(|| "shape".to_owned()), model, radius_mm: None });
+    }
+    let file = production::guarded(|| format::read(&bytes, None, &reading))?.map_err(|error| format_problem(&error))?;
+    let name = path.file_stem().map_or_else(|| "mesh".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let shape = Shape::Mesh(PolygonMesh { faces: file.faces(), vertices: file.mesh.vertices, interior: Interior::Auto });
+    Ok(Input { model: Model { name: Some(name.clone()), shape }, name, radius_mm: None })
 }
 
 fn limits(asked: Limits, args: &LimitArgs) -> Limits {

@@ -75,7 +75,7 @@ fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Re
     let budget = budget(job, order.limits);
     let _watchdog =
         Watchdog::start(&job.cancel, order.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
-    let made = (engine.compute)(&order, &budget).map_err(|problem| problem.under("/model")).and_then(|mut outcome| {
+    let made = (engine.compute)(&order, &budget).map_err(|problem| problem.under_model()).and_then(|mut outcome| {
         outcome.certificate.input_digest = input;
         keep_files(desk, &order, outcome, &budget)
     });

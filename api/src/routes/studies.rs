@@ -143,5 +143,5 @@ pub fn watched<T, E: From<Problem>>(time: Duration, work: impl FnOnce(&Budget) -
 pub fn predict(engine: Engine, job: &lacuna_fabrication::Job, time: Duration) -> Result<Plan, Problem> {
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
     let _watchdog = Watchdog::start(&budget.cancel, time.as_secs_f64()).map_err(|error| Problem::io("no thread", &error))?;
-    (engine.plan)(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under("/model")))
+    (engine.plan)(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under_model()))
 }

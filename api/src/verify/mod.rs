@@ -101,13 +101,11 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
     let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
     let job = Job {
         kind,
-        inputs: vec![Input { name, model }],
+        inputs: vec![Input { name, model, radius_mm: None }],
         params: Params {
-            tolerance_mm: manifest.tolerance_mm.unwrap_or(f64::NAN),
             radius_mm: manifest.radius_mm,
-            normals: false,
-            simplify: true,
             stability: manifest.stability,
+            ..Params::new(manifest.tolerance_mm.unwrap_or(f64::NAN))
         },
         outputs: Vec::new(),
         limits: Limits::default(),

@@ -92,8 +92,8 @@ mod tests {
 
     fn done(name: &str, kind: JobKind, tolerance_mm: f64) -> Outcome {
         let model = read_model(find(name).unwrap().document.as_bytes(), &DocumentLimits::default()).unwrap();
-        let inputs = vec![Input { name: name.to_owned(), model }];
-        let params = Params { tolerance_mm, radius_mm: None, normals: false, simplify: true, stability: false };
+        let inputs = vec![Input { name: name.to_owned(), model, radius_mm: None }];
+        let params = Params::new(tolerance_mm);
         let job = Job { kind, inputs, params, outputs: Vec::new(), limits: Limits::default() };
         run(&job, &Budget::default()).unwrap_or_else(|error| panic!("{name}: {error}"))
     }

@@ -4,8 +4,12 @@ use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
 use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
 use lacuna_kernel::measure::AxisBox;
 use lacuna_kernel::measure::mass::{area, dilated_area, dilated_volume, mesh_measures, volume};
+use lacuna_kernel::solid::{Rounded, Solid, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
+
+use crate::Operation;
+use crate::boolean::Operand;
 
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -99,6 +103,9 @@ pub struct Certificate {
     /// `true`, `false` or `"not_checked"`: the same topology at radius r - bound and r + bound.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::flag_schema))]
     pub topology_stable: Checked<bool>,
+    /// How the result was combined, when it was: the bounds are then those of a sandwich.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub operation: Option<OperationStatement>,
     /// At which radii the topology changes: when the job asks.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub stability: Option<StabilityStatement>,
@@ -131,6 +138,40 @@ pub struct Certificate {
     pub output_digests: std::collections::BTreeMap<String, String>,
     /// What the user should know, in words.
     pub warnings: Vec<String>,
+}
+
+/// A solid that was combined from several. `inner_bound_mm` and `outer_bound_mm` say how far inputs are eroded or dilated in the two solids that the result lies
+/// between: it contains the operation of the inputs at radius r - inner, and lies in that at radius r + outer, where inputs that are taken away are at
+/// r + inner and r - outer. The engine is trusted to combine meshes as it says; that the result is a closed solid is counted.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct OperationStatement {
+    /// What was done.
+    pub operation: Operation,
+    /// By which engine.
+    pub engine: String,
+    /// The inputs.
+    pub operands: Vec<OperandStatement>,
+}
+
+/// One input of an operation.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct OperandStatement {
+    /// Its name.
+    pub name: String,
+    /// The radius r of its ball; 0 for the solid itself.
+    pub radius_mm: f64,
+    /// Its mesh contains D(r - inner).
+    pub inner_bound_mm: f64,
+    /// Its mesh lies in D(r + outer).
+    pub outer_bound_mm: f64,
+    /// Triangles of its mesh.
+    pub triangles: u64,
+    /// Volume that its mesh encloses: the sum over its closed surfaces.
+    pub mesh_volume_mm3: f64,
 }
 
 /// What happens to the topology when the radius grows.
@@ -235,19 +276,10 @@ fn start(attractor: &Attractor, tolerance: Tolerance) -> Certificate {
     }
 }
 
-/// What is proven of a dilated shape.
-pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Radius, tolerance: Tolerance) -> Certificate {
-    let mesh = dilation.solid.mesh();
-    let topology = dilation.solid.topology();
-    let mesh_volume = volume(mesh);
-    let exact = dilated_volume(mesh_volume, radius.mm(), dilation.inner_mm, dilation.outer_mm);
-    let exact_area = dilated_area(exact, radius.mm());
+/// What is counted on a solid.
+fn of_solid(solid: &Solid, crossings: u64) -> Certificate {
+    let topology = solid.topology();
     let mut certificate = Certificate {
-        achieved_bound_mm: dilation.inner_mm.max(dilation.outer_mm),
-        inner_bound_mm: Some(dilation.inner_mm),
-        outer_bound_mm: Some(dilation.outer_mm),
-        thickness_min_mm: Some((2.0 * (radius.mm() - dilation.inner_mm)).max(0.0)),
-        leaf_cells: dilation.leaf_cells,
         vertices: topology.vertices,
         edges: topology.edges,
         triangles: topology.triangles,
@@ -262,36 +294,139 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         flipped_pairs: Some(topology.flipped_pairs),
         degenerate_triangles: Some(topology.degenerate_triangles),
         // Counted exactly on the mesh as it is written.
-        self_intersections: Checked::Found(match dilation.crossings {
+        self_intersections: Checked::Found(match crossings {
             0 => SelfIntersections::None,
             count => SelfIntersections::Count(count),
         }),
-        topology_stable: Checked::NotChecked,
-        bbox_mm: corners(&dilation.bounds.grown(radius.mm())),
-        volume_mm3: Some([exact.low, exact.high]),
-        area_mm2: Some([exact_area.low, exact_area.high]),
-        mesh_volume_mm3: Some(mesh_volume),
-        mesh_area_mm2: Some(area(mesh)),
-        lattice_pitch_mm: Some(dilation.pitch_mm),
-        ..start(attractor, tolerance)
+        mesh_volume_mm3: Some(volume(solid.mesh())),
+        mesh_area_mm2: Some(area(solid.mesh())),
+        ..Certificate::default()
     };
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
-    }
-    if dilation.crossings > 0 {
-        certificate
-            .warnings
-            .push(format!("{} pairs of triangles cross: ask for another tolerance, or for no simplification", dilation.crossings));
-    }
-    if dilation.uncertain > 0 {
-        let remark =
-            "places where the radius is so close to a critical one that the topology there is not certain; another radius would do";
-        certificate.warnings.push(format!("{} {remark}", dilation.uncertain));
     }
     if topology.components > 1 {
         certificate.warnings.push(format!("{} separate pieces: they will not hold together", topology.components));
     }
     certificate
+}
+
+/// What is proven of a dilated shape.
+pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Radius, tolerance: Tolerance) -> Certificate {
+    let counted = of_solid(&dilation.solid, dilation.crossings);
+    let exact = dilated_volume(volume(dilation.solid.mesh()), radius.mm(), dilation.inner_mm, dilation.outer_mm);
+    let exact_area = dilated_area(exact, radius.mm());
+    let mut warnings = attractor.warnings().to_vec();
+    warnings.extend(counted.warnings.clone());
+    if dilation.crossings > 0 {
+        warnings.push(format!("{} pairs of triangles cross: ask for another tolerance, or for no simplification", dilation.crossings));
+    }
+    if dilation.uncertain > 0 {
+        let remark =
+            "places where the radius is so close to a critical one that the topology there is not certain; another radius would do";
+        warnings.push(format!("{} {remark}", dilation.uncertain));
+    }
+    Certificate {
+        requested_tolerance_mm: tolerance.mm(),
+        kernel_version: env!("CARGO_PKG_VERSION").into(),
+        achieved_bound_mm: dilation.inner_mm.max(dilation.outer_mm),
+        inner_bound_mm: Some(dilation.inner_mm),
+        outer_bound_mm: Some(dilation.outer_mm),
+        thickness_min_mm: Some((2.0 * (radius.mm() - dilation.inner_mm)).max(0.0)),
+        leaf_cells: dilation.leaf_cells,
+        bbox_mm: corners(&dilation.bounds.grown(radius.mm())),
+        volume_mm3: Some([exact.low, exact.high]),
+        area_mm2: Some([exact_area.low, exact_area.high]),
+        lattice_pitch_mm: Some(dilation.pitch_mm),
+        warnings,
+        ..counted
+    }
+}
+
+/// What is proven of solids that were combined: see [`OperationStatement`].
+pub(crate) fn of_operation(
+    operation: Operation,
+    engine: &str,
+    operands: &[Operand],
+    rounded: &Rounded,
+    tolerance: Tolerance,
+) -> Certificate {
+    let counted = of_solid(&rounded.solid, rounded.crossings);
+    let taken_away = |index: usize| operation == Operation::Difference && index > 0;
+    let (mut inner, mut outer) = (0.0_f64, 0.0_f64);
+    for (index, Operand { statement, .. }) in operands.iter().enumerate() {
+        let (within, beyond) = (statement.inner_bound_mm, statement.outer_bound_mm);
+        let (within, beyond) = if taken_away(index) { (beyond, within) } else { (within, beyond) };
+        (inner, outer) = (inner.max(within), outer.max(beyond));
+    }
+    let (inner, outer) = (inner + rounded.moved_mm, outer + rounded.moved_mm);
+    // What the operations of two families of sets do not share lies in what the sets do not share.
+    let difference = operands.iter().map(|operand| operand.volume_error).sum::<f64>() + swept(rounded.solid.mesh(), rounded.moved_mm);
+    let enclosed = volume(rounded.solid.mesh());
+    let exact = [(enclosed - difference) * (1.0 - ROUNDING), (enclosed + difference) * (1.0 + ROUNDING)];
+    let mut warnings: Vec<String> = operands.iter().flat_map(|operand| operand.warnings.clone()).collect();
+    warnings.extend(counted.warnings.clone());
+    if rounded.crossings > 0 {
+        warnings.push(format!("{} pairs of triangles cross or touch where they are not joined", rounded.crossings));
+    }
+    Certificate {
+        requested_tolerance_mm: tolerance.mm(),
+        kernel_version: env!("CARGO_PKG_VERSION").into(),
+        achieved_bound_mm: inner.max(outer),
+        inner_bound_mm: Some(inner),
+        outer_bound_mm: Some(outer),
+        leaf_cells: operands.iter().map(|operand| operand.leaf_cells).sum(),
+        bbox_mm: box_of(operation, operands),
+        volume_mm3: exact[1].is_finite().then_some([exact[0].max(0.0), exact[1]]),
+        operation: Some(OperationStatement {
+            operation,
+            engine: engine.to_owned(),
+            operands: operands.iter().map(|operand| operand.statement.clone()).collect(),
+        }),
+        warnings,
+        ..counted
+    }
+}
+
+/// Relative rounding of a volume.
+const ROUNDING: f64 = 1e-10;
+
+/// The volume that a surface sweeps at most when its points move by `length`: a triangle's edges change by 2 length, so on its way it has no more
+/// than this area.
+fn swept(mesh: &TriMesh, length: f64) -> f64 {
+    let corner = |index: u32| mesh.vertices[index as usize];
+    let area = |&[a, b, c]: &[u32; 3]| {
+        let (p, q) = (corner(b) - corner(a), corner(c) - corner(a));
+        0.5 * p.cross(q).length() + length * (p.length() + q.length()) + 2.0 * length * length
+    };
+    length * mesh.triangles.iter().map(area).sum::<f64>()
+}
+
+/// Intervals of the box of what an operation leaves of the exact solids, when it leaves something.
+fn box_of(operation: Operation, operands: &[Operand]) -> [[Interval; 3]; 2] {
+    let boxes = || operands.iter().map(|operand| &operand.bounds);
+    let fold = |end: fn(&AxisBox, usize) -> f64, axis: usize, choose: fn(f64, f64) -> f64| {
+        boxes().map(|b| end(b, axis)).reduce(choose).unwrap_or(0.0)
+    };
+    let axis = |axis: usize| -> [Interval; 2] {
+        match operation {
+            Operation::Union => [
+                [fold(|b, k| b.low[k].low, axis, f64::min), fold(|b, k| b.low[k].high, axis, f64::min)],
+                [fold(|b, k| b.high[k].low, axis, f64::max), fold(|b, k| b.high[k].high, axis, f64::max)],
+            ],
+            Operation::Intersection => {
+                let ends = [fold(|b, k| b.low[k].low, axis, f64::max), fold(|b, k| b.high[k].high, axis, f64::min)];
+                let ends = [ends[0].min(ends[1]), ends[1].max(ends[0])];
+                [ends, ends]
+            }
+            Operation::Difference => {
+                let ends = operands.first().map_or([0.0; 2], |operand| [operand.bounds.low[axis].low, operand.bounds.high[axis].high]);
+                [ends, ends]
+            }
+        }
+    };
+    let ends: [[Interval; 2]; 3] = std::array::from_fn(axis);
+    [ends.map(|ends| ends[0]), ends.map(|ends| ends[1])]
 }
 
 /// What is proven of an evaluation to points that were handed over.

@@ -14,6 +14,21 @@ pub enum JobKind {
     Solidify,
     /// Box, area and volume as intervals.
     Measure,
+    /// A printable solid: what an operation leaves of several.
+    Intersect,
+}
+
+/// How solids are combined. All operations are regularised: a face, an edge or a point that two solids merely share leaves nothing behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum Operation {
+    /// What lies in any input.
+    Union,
+    /// What lies in all inputs.
+    Intersection,
+    /// What lies in the first input and in none of the others.
+    Difference,
 }
 
 /// Settings of a job. What a kind does not use must be absent.
@@ -22,14 +37,24 @@ pub struct Params {
     /// Hausdorff bound on the result, in mm.
     pub tolerance_mm: f64,
     /// Radius of the dilating ball, in mm: required by `solidify`, optional for `measure` (without
-    /// it the shape itself is measured).
+    /// it the shape itself is measured) and for `intersect` (without it the inputs are solids themselves).
     pub radius_mm: Option<f64>,
+    /// What an `intersect` leaves of its inputs.
+    pub operation: Option<Operation>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
     pub normals: bool,
     /// Whether a solid has no more triangles than its bound needs: else it has all of the lattice.
     pub simplify: bool,
     /// Whether the topology of a solid is examined at radii nearby.
     pub stability: bool,
+}
+
+impl Params {
+    /// A tolerance, and everything else as where a document says nothing.
+    #[must_use]
+    pub fn new(tolerance_mm: f64) -> Self {
+        Self { tolerance_mm, radius_mm: None, operation: None, normals: false, simplify: true, stability: false }
+    }
 }
 
 /// A model with the name that the job gives it.
@@ -39,6 +64,8 @@ pub struct Input {
     pub name: String,
     /// The model.
     pub model: Model,
+    /// Radius of this input's ball in mm, where it is not the job's; 0 for the solid itself.
+    pub radius_mm: Option<f64>,
 }
 
 /// A valid order: nothing in it needs to be checked again except what only the kernel can know.
@@ -46,7 +73,7 @@ pub struct Input {
 pub struct Job {
     /// What to do.
     pub kind: JobKind,
-    /// With what: one input today.
+    /// With what: one input, or two or more for `intersect`.
     pub inputs: Vec<Input>,
     /// How.
     pub params: Params,

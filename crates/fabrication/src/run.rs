@@ -11,7 +11,7 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, certificate};
+use crate::{Certificate, Job, JobKind, boolean, certificate};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,6 +95,8 @@ pub struct JobError {
     pub limit: Option<LimitFacts>,
     /// Findings with places, when the model is at fault.
     pub diagnostics: Vec<ModelDiagnostic>,
+    /// Which of several inputs is at fault, by its index.
+    pub input: Option<usize>,
 }
 
 impl From<Finding> for ModelDiagnostic {
@@ -106,7 +108,12 @@ impl From<Finding> for ModelDiagnostic {
 
 impl JobError {
     pub(crate) fn new(kind: Kind, code: &'static str, message: String) -> Self {
-        Self { kind, code, message, limit: None, diagnostics: Vec::new() }
+        Self { kind, code, message, limit: None, diagnostics: Vec::new(), input: None }
+    }
+
+    /// The error of one of several inputs.
+    pub(crate) fn of_input(self, name: &str, index: usize) -> Self {
+        Self { message: format!("input '{name}': {}", self.message), input: Some(index), ..self }
     }
 
     /// The first error speaks for all; every finding is listed.
@@ -165,6 +172,9 @@ fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
+    if job.kind == JobKind::Intersect {
+        return boolean::combine(job, tolerance, budget);
+    }
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let attractor = &lowered.attractor;
@@ -185,11 +195,11 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         (JobKind::Solidify, None) => {
             Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()))
         }
-        (JobKind::Measure, Some(radius)) => {
+        (JobKind::Measure | JobKind::Intersect, Some(radius)) => {
             let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
             Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_dilation(attractor, &dilation, radius, tolerance) })
         }
-        (JobKind::Measure, None) => {
+        (JobKind::Measure | JobKind::Intersect, None) => {
             let bounds = bounding_box(attractor, budget)?;
             Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_shape(attractor, &bounds, tolerance) })
         }
@@ -290,7 +300,7 @@ pub fn stream_points<E>(
 }
 
 /// Bytes of a binary STL file with so many triangles.
-fn stl_bytes(triangles: f64) -> f64 {
+pub(crate) fn stl_bytes(triangles: f64) -> f64 {
     84.0 + 50.0 * triangles
 }
 
@@ -303,6 +313,9 @@ const BYTES_PER_CELL: f64 = 64.0;
 /// As [`run`], for what shows before the work.
 pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
+    if job.kind == JobKind::Intersect {
+        return boolean::plan(job, tolerance, budget);
+    }
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;

@@ -1,10 +1,12 @@
 //! Reads jobs: what to do, with which models, how precisely, and within which limits.
 
-use lacuna_fabrication::job::{Input, Job, JobKind, Params};
+use std::collections::HashSet;
+
+use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::Model;
 
-use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS};
+use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, OPERATIONS};
 use super::model::{model, version};
 use super::node::{Place, quoted};
 use super::walk::{Members, Walker, length, suggestion};
@@ -36,6 +38,8 @@ pub struct InputDocument {
     pub source: ModelSource,
     /// JSON pointer to the model or the reference.
     pub pointer: String,
+    /// Radius of its own ball in mm, if it has one.
+    pub radius_mm: Option<f64>,
 }
 
 /// A model in full, or the id of a stored one.
@@ -135,11 +139,11 @@ impl JobDocument {
     pub fn resolve(self, default: &Limits, most: &Limits, mut find: impl FnMut(&str) -> Option<Model>) -> Result<Job, Vec<Diagnostic>> {
         let mut diagnostics = Vec::new();
         let mut inputs = Vec::with_capacity(self.inputs.len());
-        for InputDocument { name, source, pointer } in self.inputs {
+        for InputDocument { name, source, pointer, radius_mm } in self.inputs {
             let model = fetched(source, pointer, &mut find).map_err(|diagnostic| diagnostics.push(diagnostic)).ok();
             if let Some(model) = model {
                 let name = name.or_else(|| model.name.clone()).unwrap_or_else(|| "shape".into());
-                inputs.push(Input { name, model });
+                inputs.push(Input { name, model, radius_mm });
             }
         }
         match self.limits.resolve(default, most) {
@@ -160,7 +164,7 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
         version(walker, place);
     }
     let kind = members.get("kind").and_then(|place| kind(walker, place));
-    let inputs = inputs(walker, &members);
+    let inputs = inputs(walker, &members, kind);
     let params = members.get("params").and_then(|place| params(walker, place, kind));
     let outputs = members.get("outputs").map_or(Some(Vec::new()), |place| outputs(walker, place, kind));
     let limits = members.get("limits").map_or(Some(RequestedLimits::default()), |place| limits(walker, place));
@@ -168,7 +172,12 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
 }
 
 fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
-    const KINDS: [(&str, JobKind); 3] = [("evaluate", JobKind::Evaluate), ("solidify", JobKind::Solidify), ("measure", JobKind::Measure)];
+    const KINDS: [(&str, JobKind); 4] = [
+        ("evaluate", JobKind::Evaluate),
+        ("solidify", JobKind::Solidify),
+        ("measure", JobKind::Measure),
+        ("intersect", JobKind::Intersect),
+    ];
     let text = walker.text(place, "the name of a kind of job")?;
     if let Some((_, kind)) = KINDS.iter().find(|(word, _)| *word == text) {
         return Some(*kind);
@@ -184,34 +193,53 @@ fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
     None
 }
 
-/// Exactly one of `model`, `model_ref` and `inputs`; every kind of job takes one model today.
-fn inputs(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Vec<InputDocument>> {
+/// Exactly one of `model`, `model_ref` and `inputs`; an operation takes two inputs or more, every other kind one.
+fn inputs(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Vec<InputDocument>> {
     one_of(walker, members, &["model", "model_ref", "inputs"], "a job")?;
     let Some(place) = members.get("inputs") else {
+        if kind == Some(JobKind::Intersect) {
+            walker.fault(&members.place, code::MISSING_MEMBER, || "intersect needs the member \"inputs\": two models or more".into());
+            return None;
+        }
         return Some(vec![InputDocument { name: None, ..source(walker, members)? }]);
     };
-    let mut names: Vec<String> = Vec::new();
+    let mut names: HashSet<String> = HashSet::new();
     let inputs = walker.each_of(place, 1, "an array of inputs", |walker, place| {
         let members = walker.object(place, &JOB_INPUT)?;
         let name = members.get("name").and_then(|place| {
             let name = walker.name(place, "the name of an input")?;
-            if names.contains(&name) {
+            if !names.insert(name.clone()) {
                 walker.fault(&place, code::DUPLICATE_NAME, || format!("another input is called {} already", quoted(&name)));
                 return None;
             }
-            // why: with more inputs than any job takes, a fault is certain and the rest need not be compared
-            if names.len() < 64 {
-                names.push(name.clone());
-            }
             Some(name)
         });
+        let radius = members.get("radius_mm").map(|place| radius(walker, place, kind));
         let source = one_of(walker, &members, &["model", "model_ref"], "an input").and_then(|()| source(walker, &members));
-        Some(InputDocument { name: Some(name?), ..source? })
+        Some(InputDocument { name: Some(name?), radius_mm: stated(radius)?, ..source? })
     });
-    match length(place.node) {
-        Some(found) if found > 1 => walker.wrong_length(&place, found, "one input: evaluate, solidify and measure take one model"),
+    match (length(place.node), kind) {
+        (Some(found), Some(JobKind::Intersect)) if found < 2 => walker.wrong_length(&place, found, "two inputs or more"),
+        (_, Some(JobKind::Intersect)) => inputs,
+        (Some(found), _) if found > 1 => walker.wrong_length(&place, found, "one input: evaluate, solidify and measure take one model"),
         _ => inputs,
     }
+}
+
+/// The radius of an input's own ball; 0 for the solid itself.
+fn radius(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<f64> {
+    if kind.is_some_and(|kind| kind != JobKind::Intersect) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "only inputs of intersect have a radius of their own; give it as \"radius_mm\" of \"params\"".into()
+        });
+        return None;
+    }
+    let radius = walker.number(place)?;
+    if radius < 0.0 {
+        walker.fault(&place, code::NOT_POSITIVE, || format!("is {radius}; expected a radius in mm, or 0 for the solid itself"));
+        return None;
+    }
+    Some(radius)
 }
 
 /// Reports unless exactly one of the members is there.
@@ -238,11 +266,11 @@ pub(super) fn one_of(walker: &mut Walker<'_>, members: &Members<'_>, names: &[&s
 pub(super) fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<InputDocument> {
     if let Some(place) = members.get("model") {
         let source = ModelSource::Inline(Box::new(model(walker, place, true)?));
-        return Some(InputDocument { name: None, source, pointer: place.path.pointer() });
+        return Some(InputDocument { name: None, source, pointer: place.path.pointer(), radius_mm: None });
     }
     let place = members.get("model_ref")?;
     let source = ModelSource::Stored(walker.name(place, "the id of a stored model")?);
-    Some(InputDocument { name: None, source, pointer: place.path.pointer() })
+    Some(InputDocument { name: None, source, pointer: place.path.pointer(), radius_mm: None })
 }
 
 fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Params> {
@@ -268,10 +296,32 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(radius) => Some(radius?),
         None => None,
     };
+    let operation = operation(walker, &members, kind)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
-    Some(Params { tolerance_mm: tolerance?, radius_mm, normals, simplify, stability })
+    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, normals, simplify, stability })
+}
+
+/// The operation, which intersect needs and no other kind takes.
+#[allow(clippy::option_option)]
+fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Option<Operation>> {
+    match (members.get("operation"), kind) {
+        (None, Some(JobKind::Intersect)) => {
+            walker.fault(&members.place, code::MISSING_MEMBER, || {
+                "intersect needs the member \"operation\": union, intersection or difference".into()
+            });
+            None
+        }
+        (None, _) => Some(None),
+        (Some(place), Some(kind)) if kind != JobKind::Intersect => {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+                "only intersect takes \"operation\"; remove it, or ask for the kind \"intersect\"".into()
+            });
+            None
+        }
+        (Some(place), _) => walker.word(place, "an operation", &OPERATIONS).map(Some),
+    }
 }
 
 /// A flag that one kind of job takes, what that kind is called, and what the flag is when absent.

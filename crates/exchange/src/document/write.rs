@@ -253,10 +253,14 @@ object! {
         .put("params", &Wire(&job.params))?
         .put("outputs", &job.outputs)?
         .put("limits", &Wire(&job.limits))?;
-    Input: |input, members| members.put("name", &input.name)?.put("model", &Wire(&input.model))?;
+    Input: |input, members| members
+        .put("name", &input.name)?
+        .put("model", &Wire(&input.model))?
+        .put_some("radius_mm", input.radius_mm.map(Number).as_ref())?;
     lacuna_fabrication::job::Params: |params, members| members
         .put("tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
+        .put_some("operation", params.operation.as_ref())?
         .put_if(params.normals, "normals", &true)?
         .put_if(!params.simplify, "simplify", &false)?
         .put_if(params.stability, "stability", &true)?;

@@ -20,7 +20,6 @@ mod certificate;
 mod critical;
 mod dust;
 mod error;
-mod half_edges;
 mod lattice;
 mod octree;
 mod outside;

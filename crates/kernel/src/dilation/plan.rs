@@ -6,7 +6,6 @@ use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice, around};
 use super::octree::{Node, Pass};
 use super::outside::MOST;
-use super::simplify::{NUDGE, Simplifier};
 use super::smooth::MOST_NOISE;
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
@@ -15,7 +14,8 @@ use crate::attractor::sites::{SiteError, SiteRule};
 use crate::automaton::LeafPrimitive;
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
-use crate::solid::{Solid, SolidError, TriMesh};
+use crate::solid::mend::mend;
+use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
 use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -153,11 +153,6 @@ fn extent(bounds: &AxisBox, margin: f64) -> f64 {
     (0..3).map(|axis| bounds.low[axis].low.abs().max(bounds.high[axis].high.abs()) + margin).fold(0.0, f64::max)
 }
 
-/// Half a unit in the last place of single precision, times sqrt(3), at coordinates up to `extent`.
-fn rounding(extent: f64) -> f64 {
-    extent * f64::from(f32::EPSILON) * 0.5 * 3.0_f64.sqrt()
-}
-
 /// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
 /// shrinks by the automaton's rate (its proven lower bound) at every step.
 fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: &Budget) -> Result<(), DilationError> {
@@ -211,7 +206,7 @@ impl<'a> Plan<'a> {
         let rounding = rounding(extent(&bounds, 3.0 * radius));
         check_depth(attractor, aimed, tolerance, budget)?;
         // The unit of values is below 8 r^2 / MOST, and noise of 32 units moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^16.
-        let extra = (1.0 + NUDGE) * rounding + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
+        let extra = carried(extent(&bounds, 3.0 * radius)) + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
@@ -304,9 +299,10 @@ impl<'a> Plan<'a> {
         }
         let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
         dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
-        let crossings = Simplifier::new(&self.rule, &setting).finish(&setting, &mut surface, budget)?;
-        budget.report("dilate", 1.0, surface.triangles.len() as u64);
-        self.certify(&setting, surface, crossings, uncertain as u64, budget)
+        let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
+        budget.report("dilate", 1.0, mended.triangles.len() as u64);
+        surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
+        self.certify(&setting, surface, mended.crossings, uncertain as u64, budget)
     }
 
     fn surfaces(

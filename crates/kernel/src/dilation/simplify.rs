@@ -15,18 +15,12 @@
 
 use super::block::BlockSurface;
 use super::certificate::{Nearby, Places};
-use super::half_edges::{HalfEdges, NONE, Star, next};
 use super::plan::Setting;
 use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
-use crate::budget::{Budget, Stopped};
-use crate::solid::box_tree::{Box32, BoxTree};
-use crate::solid::contact;
-use crate::solid::topology::has_no_area;
-use crate::solid::{Crossings, TriMesh};
-use glam::DVec3;
-use std::collections::BTreeSet;
+use crate::solid::half_edges::{HalfEdges, NONE};
+use crate::solid::mend::{LEAST_HEIGHT, MOST_AROUND, Mender};
 
 /// Where a node's surface is its own.
 #[derive(Clone, Copy, Debug)]
@@ -42,13 +36,6 @@ impl Core {
     }
 }
 
-/// How far vertices are moved that leave a triangle without area, or triangles that cross, in units of rounding: [`MOST_STEPS`] of single precision along each axis.
-pub(super) const NUDGE: f64 = 2.0 * MOST_STEPS as f64;
-const MOST_STEPS: u32 = 4;
-/// Triangles around a vertex that may be removed, at most.
-const MOST_AROUND: usize = 24;
-/// Triangles around a vertex afterwards.
-const MOST_AFTER: usize = 40;
 /// How far the new position may be from the planes of the old triangles, in units of the band, pass by pass.
 const PASSES: [f64; 6] = [1e-6, 0.01, 0.05, 0.12, 0.3, 2.0];
 /// Before this pass vertices are lifted.
@@ -57,8 +44,7 @@ const LIFT_BEFORE: usize = 4;
 const LENGTH_SHARE: f64 = 1e-3;
 /// Cosine of the angle by which a normal may turn.
 const LEAST_COSINE: f64 = 0.1;
-/// Heights of new triangles in units of rounding, and lengths of edges that are as good as none.
-const LEAST_HEIGHT: f64 = 8.0;
+/// Lengths of edges that are as good as none, in units of rounding.
 const TINY: f64 = 4.0;
 /// How far vertices of slivers may move off their planes, in units of rounding, where nothing else is simplified.
 const SLIVER_MOVE: f64 = 64.0;
@@ -67,84 +53,18 @@ const LEAST_LIFT: f64 = 0.05;
 const LEAST_TURN: f64 = 0.7;
 /// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
 const FIRST_LOOK: f64 = 0.6;
-/// Pairs of crossing triangles that are looked at.
-const MOST_PARTED: usize = 10_000;
-/// Sweeps that turn edges, at most.
-const FLIP_ROUNDS: usize = 8;
-
-/// A triangle that is compared with others.
-struct Facet {
-    corners: [u32; 3],
-    points: [Point; 3],
-    bounds: Box32,
-    /// Along the normal, and what a volume may err per length.
-    normal: Point,
-    error: f64,
-}
-
-impl Facet {
-    fn new(corners: [u32; 3], points: [Point; 3]) -> Self {
-        let (p, q) = (subtract(&points[1], &points[0]), subtract(&points[2], &points[0]));
-        // Products of two lengths, at most 8 roundings each, and three sums.
-        let error = 64.0 * f64::EPSILON * (dot(&p, &p) + dot(&q, &q));
-        Self { corners, points, bounds: Box32::of(&points), normal: cross(&p, &q), error }
-    }
-
-    /// Whether a plane surely parts the triangle from what another has besides common corners: its own, or one through an edge and the normal.
-    #[inline]
-    fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
-        let (mut above, mut below) = (true, true);
-        for (corner, point) in corners.iter().zip(points) {
-            if !self.corners.contains(corner) {
-                let offset = subtract(point, &self.points[0]);
-                let side = dot(&self.normal, &offset);
-                let error = self.error * (offset[0].abs() + offset[1].abs() + offset[2].abs());
-                above &= side > error;
-                below &= side < -error;
-            }
-        }
-        above || below || (0..3).any(|k| self.is_beyond(k, corners, points))
-    }
-
-    /// Whether another triangle lies beyond edge k, but for common corners on that edge. The vector m = edge x normal is exact to 16 roundings of
-    /// |edge| |normal|, products with it to 32 with |offset|; with exact m the triangle itself has no positive value, and 0 only on the edge.
-    fn is_beyond(&self, k: usize, corners: &[u32; 3], points: &[Point; 3]) -> bool {
-        if corners.contains(&self.corners[(k + 2) % 3]) {
-            return false;
-        }
-        let (start, end) = (self.corners[k], self.corners[(k + 1) % 3]);
-        let edge = subtract(&self.points[(k + 1) % 3], &self.points[k]);
-        let outwards = cross(&edge, &self.normal);
-        let error = self.error * (edge[0].abs() + edge[1].abs() + edge[2].abs());
-        corners.iter().zip(points).filter(|&(&corner, _)| corner != start && corner != end).all(|(_, point)| {
-            let offset = subtract(point, &self.points[k]);
-            dot(&outwards, &offset) > error * (offset[0].abs() + offset[1].abs() + offset[2].abs())
-        })
-    }
-}
 
 /// Working memory of a thread.
 pub(super) struct Simplifier<'a> {
     tree: Tree<'a>,
     places: Places,
     nearby: Nearby,
-    boxes: BoxTree,
-    /// Triangles when the boxes were made.
-    boxed: usize,
-    star: Star,
-    other: Star,
+    mender: Mender,
     choices: Vec<(f64, usize)>,
     normals: Vec<Point>,
     lengths: Vec<f64>,
     /// The least cost beyond the pass that was met when a vertex was ranked last.
     due: Vec<f64>,
-    /// Triangles lower than what rounding moves, as they were met last.
-    slivers: Vec<u32>,
-    close: Vec<(u32, Box32)>,
-    stamps: Vec<u32>,
-    stamp: u32,
-    /// Triangles of a star, old or new.
-    own: Vec<Facet>,
     /// Only what cannot be a solid is removed.
     clean_only: bool,
 }
@@ -155,19 +75,11 @@ impl<'a> Simplifier<'a> {
             tree: Tree::new(rule, setting.slack, 4 * setting.cells),
             places: Places::default(),
             nearby: Nearby::default(),
-            boxes: BoxTree::default(),
-            boxed: 0,
-            star: Star::default(),
-            other: Star::default(),
+            mender: Mender::default(),
             choices: Vec::new(),
             normals: Vec::new(),
             lengths: Vec::new(),
             due: Vec::new(),
-            slivers: Vec::new(),
-            close: Vec::new(),
-            stamps: Vec::new(),
-            stamp: 0,
-            own: Vec::new(),
             clean_only: setting.clean_only,
         }
     }
@@ -183,18 +95,16 @@ impl<'a> Simplifier<'a> {
         let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
         let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
         self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
-        self.stamps.clear();
-        self.stamps.resize(mesh.points.len(), 0);
-        self.stamp = 0;
+        self.mender.start(&mesh);
         let inside: Vec<bool> = mesh.points.iter().map(|point| core.contains(point)).collect();
         surface.settled.resize(mesh.points.len(), false);
-        self.clean(setting, &mut mesh, &inside, &surface.settled);
+        self.mender.clean(&mut mesh, &inside, &surface.settled, setting.rounding);
         if self.clean_only {
             self.remove_slivers(setting, &mut mesh, &inside);
             self.write(&mut mesh, &inside, surface);
             return;
         }
-        self.index(&mesh);
+        self.mender.index(&mesh);
         // A settled vertex waits until something changes; `fresh` says that something did since its last trial.
         let mut fresh: Vec<bool> = surface.settled.iter().map(|settled| !settled).collect();
         self.due.clear();
@@ -215,13 +125,11 @@ impl<'a> Simplifier<'a> {
                 }
                 let from = if is_fresh { 0.0 } else { lower };
                 if self.remove(setting, &mut mesh, &inside, vertex, from, upper) {
-                    for &neighbour in &self.star.ring {
+                    for &neighbour in &self.mender.star.ring {
                         fresh[neighbour as usize] = true;
                         surface.settled[neighbour as usize] = false;
                     }
-                    if mesh.alive < self.boxed / 2 {
-                        self.index(&mesh);
-                    }
+                    self.mender.keep_index(&mesh);
                 }
             }
             lower = upper;
@@ -232,11 +140,11 @@ impl<'a> Simplifier<'a> {
     /// Removes vertices of the slivers that could not be turned: rounding to single precision may fold them over their neighbours, and these are the
     /// only crossings that a lattice's surface was seen to have.
     fn remove_slivers(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool]) {
-        let slivers = std::mem::take(&mut self.slivers);
+        let slivers = std::mem::take(&mut self.mender.slivers);
         if !slivers.is_empty() {
             self.due.clear();
             self.due.resize(mesh.points.len(), 0.0);
-            self.index(mesh);
+            self.mender.index(mesh);
             let upper = (PASSES[0] * (setting.outer - setting.least)).max(SLIVER_MOVE * setting.rounding);
             for corner in slivers.iter().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<Vec<u32>>() {
                 if inside[corner as usize] && mesh.is_used(corner) {
@@ -244,7 +152,7 @@ impl<'a> Simplifier<'a> {
                 }
             }
         }
-        self.slivers = slivers;
+        self.mender.slivers = slivers;
     }
 
     /// Moves vertices outwards to the end of the band where the distance is smooth: chords between them have the whole band then.
@@ -263,7 +171,7 @@ impl<'a> Simplifier<'a> {
                 && mesh.is_used(vertex)
                 && self.lift(setting, core, mesh, inside, vertex)
             {
-                for &changed in self.star.ring.iter().chain([&vertex]) {
+                for &changed in self.mender.star.ring.iter().chain([&vertex]) {
                     fresh[changed as usize] = true;
                     settled[changed as usize] = false;
                 }
@@ -272,10 +180,10 @@ impl<'a> Simplifier<'a> {
     }
 
     fn lift(&mut self, setting: &Setting, core: &Core, mesh: &mut HalfEdges, inside: &[bool], vertex: u32) -> bool {
-        if !mesh.star(vertex, MOST_AROUND, &mut self.star) || self.star.ring.iter().any(|&other| !inside[other as usize]) {
+        if !mesh.star(vertex, MOST_AROUND, &mut self.mender.star) || self.mender.star.ring.iter().any(|&other| !inside[other as usize]) {
             return false;
         }
-        let count = self.star.ring.len();
+        let count = self.mender.star.ring.len();
         let from = mesh.points[vertex as usize];
         let Some(foot) = self.nearby.foot(&mut self.tree, &mut self.places, vertex, &from) else { return false };
         let length = distance_squared(&from, &foot).sqrt();
@@ -286,7 +194,7 @@ impl<'a> Simplifier<'a> {
         if self.tree.exhausted || !worth || !core.contains(&to) {
             return false;
         }
-        let (ring, points) = (&self.star.ring, &mesh.points);
+        let (ring, points) = (&self.mender.star.ring, &mesh.points);
         let normal = |apex: &Point, k: usize| {
             let (a, b) = (&points[ring[k] as usize], &points[ring[(k + 1) % count] as usize]);
             cross(&subtract(a, apex), &subtract(b, apex))
@@ -300,186 +208,35 @@ impl<'a> Simplifier<'a> {
         }
         let trial = self.nearby.trial();
         self.nearby.try_another();
-        let corners = self.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
+        let corners = self.mender.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
         self.nearby.begin(&mut self.tree, &mut self.places, corners);
         self.nearby.mark(&mut self.tree, &mut self.places, trial, to);
         let certified = (0..count).all(|k| {
             let next = (k + 1) % count;
-            let corners = [trial, self.star.ring[k], self.star.ring[next]];
+            let corners = [trial, self.mender.star.ring[k], self.mender.star.ring[next]];
             let triangle = [to, mesh.points[corners[1] as usize], mesh.points[corners[2] as usize]];
             let least = setting.least - setting.rounding;
             self.nearby.cover(&self.tree, [count, k, next, count + 1])
                 && self.nearby.is_clear(&mut self.tree, &mut self.places, corners, &triangle, least)
         });
-        if !certified || self.tree.exhausted || self.meetings(mesh, vertex, None, Some(to), 0) > 0 {
+        if !certified || self.tree.exhausted || self.mender.meetings(mesh, vertex, None, Some(to), 0) > 0 {
             return false;
         }
         mesh.points[vertex as usize] = to;
         self.nearby.accept(vertex);
-        self.place(mesh);
+        self.mender.place(mesh);
         true
-    }
-
-    /// Removes what has no area from a whole surface, and crossings: what one node leaves may become removable by what others do.
-    pub(super) fn finish(&mut self, setting: &Setting, surface: &mut BlockSurface, budget: &Budget) -> Result<u64, Stopped> {
-        let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
-        let (inside, settled) = (vec![true; mesh.points.len()], vec![false; mesh.points.len()]);
-        self.stamps.clear();
-        self.stamps.resize(mesh.points.len(), 0);
-        self.stamp = 0;
-        self.clean(setting, &mut mesh, &inside, &settled);
-        let mut moved = BTreeSet::new();
-        self.nudge(&mut mesh, &mut moved);
-        let crossings = crossings(&mesh, budget)?;
-        let mut left = crossings.count;
-        if left > 0 {
-            self.part(&mut mesh, &crossings.first, &mut moved);
-            left = self::crossings(&mesh, budget)?.count;
-        }
-        self.write(&mut mesh, &inside, surface);
-        Ok(left)
-    }
-
-    /// Gives what is left of triangles without area some, by moving corners by single steps of single precision, each at most once.
-    fn nudge(&mut self, mesh: &mut HalfEdges, moved: &mut BTreeSet<u32>) {
-        let is_flat = |mesh: &HalfEdges, triangle: u32| {
-            mesh.triangle(triangle).is_some_and(|t| has_no_area(t.map(|corner| DVec3::from_array(mesh.points[corner as usize]))))
-        };
-        for triangle in 0..mesh.triangles() {
-            if !is_flat(mesh, triangle) {
-                continue;
-            }
-            'corners: for corner in mesh.triangle(triangle).into_iter().flatten() {
-                if moved.contains(&corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
-                    continue;
-                }
-                let from = mesh.points[corner as usize];
-                for code in 1..27 {
-                    mesh.points[corner as usize] = stepped(&from, code, 1);
-                    if !self.star.halves.iter().any(|&half| is_flat(mesh, half / 3)) {
-                        moved.insert(corner);
-                        break 'corners;
-                    }
-                }
-                mesh.points[corner as usize] = from;
-            }
-        }
-    }
-
-    /// Parts triangles that cross by moving corners by a few steps of single precision, each at most once: slivers that rounding folds over their neighbours.
-    fn part(&mut self, mesh: &mut HalfEdges, pairs: &[[u32; 2]], moved: &mut BTreeSet<u32>) {
-        self.index(mesh);
-        for corner in pairs.iter().flatten().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<BTreeSet<u32>>() {
-            if moved.contains(&corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
-                continue;
-            }
-            let mut least = self.meetings(mesh, corner, None, None, usize::MAX);
-            let from = mesh.points[corner as usize];
-            let mut best = from;
-            for (steps, code) in (0..MOST_STEPS.ilog2() + 1).flat_map(|power| (1..27).map(move |code| (1 << power, code))) {
-                if least == 0 {
-                    break;
-                }
-                let to = stepped(&from, code, steps);
-                let met = self.meetings(mesh, corner, None, Some(to), least - 1);
-                if met < least {
-                    (least, best) = (met, to);
-                }
-            }
-            if best != from {
-                moved.insert(corner);
-                mesh.points[corner as usize] = best;
-                self.place(mesh);
-            }
-        }
-    }
-
-    /// Gives the triangles of the star the boxes of where they are now.
-    fn place(&mut self, mesh: &HalfEdges) {
-        for &half in &self.star.halves {
-            if let Some(corners) = mesh.triangle(half / 3) {
-                self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
-            }
-        }
-    }
-
-    /// Joins vertices at the same place, and turns edges of triangles without area, while that changes anything.
-    fn clean(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) {
-        for _ in 0..FLIP_ROUNDS {
-            let merged = self.merge(mesh, inside, settled);
-            if !self.flip(mesh, inside, setting.rounding) && !merged {
-                break;
-            }
-        }
-    }
-
-    /// Makes vertices at the same place one where that keeps the manifold: the surface as a set does not change. Whether there were such.
-    fn merge(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) -> bool {
-        let mut merged = false;
-        for vertex in 0..mesh.points.len() as u32 {
-            if !inside[vertex as usize] || settled[vertex as usize] || !mesh.star(vertex, MOST_AROUND, &mut self.star) {
-                continue;
-            }
-            for m in 0..self.star.ring.len() {
-                let target = self.star.ring[m];
-                if mesh.points[target as usize] == mesh.points[vertex as usize] && inside[target as usize] && self.keeps_manifold(mesh, m) {
-                    mesh.collapse(vertex, &self.star, m);
-                    merged = true;
-                    break;
-                }
-            }
-        }
-        merged
-    }
-
-    /// Turns the longest edge of triangles without area, when that leaves none: the surface as a set does not change. Whether one was turned.
-    fn flip(&mut self, mesh: &mut HalfEdges, inside: &[bool], rounding: f64) -> bool {
-        let mut turned = false;
-        self.slivers.clear();
-        for triangle in 0..mesh.triangles() {
-            let Some(corners) = mesh.triangle(triangle) else { continue };
-            let points = corners.map(|corner| mesh.points[corner as usize]);
-            if !corners.iter().all(|&corner| inside[corner as usize]) || !is_sliver(&points, LEAST_HEIGHT * rounding) {
-                continue;
-            }
-            self.slivers.push(triangle);
-            if !contact::is_flat(&points) {
-                continue;
-            }
-            let length = |&k: &usize| distance_squared(&points[k], &points[(k + 1) % 3]);
-            let Some(k) = (0..3).max_by(|p, q| length(p).total_cmp(&length(q))) else { continue };
-            let half = 3 * triangle + k as u32;
-            let twin = mesh.twin(half);
-            if twin == NONE {
-                continue;
-            }
-            let (a, b, c, d) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3], mesh.end(next(twin)));
-            let at = |corner: u32| mesh.points[corner as usize];
-            if contact::is_flat(&[at(d), at(c), at(a)]) || contact::is_flat(&[at(c), at(d), at(b)]) {
-                continue;
-            }
-            if mesh.star(c, usize::MAX, &mut self.other) && !self.other.ring.contains(&d) {
-                mesh.flip(half);
-                turned = true;
-            }
-        }
-        turned
     }
 
     /// Gives the mesh back to the surface, without what is gone.
     fn write(&mut self, mesh: &mut HalfEdges, inside: &[bool], surface: &mut BlockSurface) {
-        let mut numbers = vec![NONE; mesh.points.len()];
         surface.settled.clear();
-        for vertex in 0..mesh.points.len() as u32 {
-            if mesh.is_used(vertex) {
-                numbers[vertex as usize] = surface.vertices.len() as u32;
-                surface.vertices.push(mesh.points[vertex as usize]);
-                let closed = inside[vertex as usize] && mesh.star(vertex, usize::MAX, &mut self.star);
-                surface.settled.push(closed && self.star.ring.iter().all(|&other| inside[other as usize]));
-            }
+        for vertex in (0..mesh.points.len() as u32).filter(|&vertex| mesh.is_used(vertex)) {
+            let closed = inside[vertex as usize] && mesh.star(vertex, usize::MAX, &mut self.mender.star);
+            surface.settled.push(closed && self.mender.star.ring.iter().all(|&other| inside[other as usize]));
         }
-        surface.triangles.clear();
-        surface.triangles.extend((0..mesh.triangles()).filter_map(|t| mesh.triangle(t)).map(|t| t.map(|corner| numbers[corner as usize])));
+        let numbers;
+        (surface.vertices, surface.triangles, numbers) = mesh.compact();
         for (_, number) in &mut surface.shared {
             *number = numbers[*number as usize];
         }
@@ -487,32 +244,26 @@ impl<'a> Simplifier<'a> {
         surface.site_error = surface.site_error.max(self.tree.largest_error);
     }
 
-    fn index(&mut self, mesh: &HalfEdges) {
-        self.boxed = mesh.alive;
-        let box_of = |triangle| mesh.triangle(triangle).map(|corners| Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
-        self.boxes.build(mesh.triangles() as usize, box_of, false);
-    }
-
-    /// Tries to remove a vertex, moving it off its planes by more than `lower` and at most `upper`. Its star is left in `self.star`.
+    /// Tries to remove a vertex, moving it off its planes by more than `lower` and at most `upper`. Its star is left in `self.mender.star`.
     fn remove(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool], vertex: u32, lower: f64, upper: f64) -> bool {
-        if !mesh.star(vertex, MOST_AROUND, &mut self.star) || self.star.ring.iter().any(|&other| !inside[other as usize]) {
+        if !mesh.star(vertex, MOST_AROUND, &mut self.mender.star) || self.mender.star.ring.iter().any(|&other| !inside[other as usize]) {
             return false;
         }
         self.rank(setting, mesh, vertex, lower, upper);
         let mut known = false;
         for choice in 0..self.choices.len() {
             let m = self.choices[choice].1;
-            if !self.keeps_manifold(mesh, m) || !self.keeps_shape(setting, mesh, vertex, m) {
+            if !self.mender.keeps_manifold(mesh, m) || !self.keeps_shape(setting, mesh, vertex, m) {
                 continue;
             }
             if !known {
-                let corners = self.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
+                let corners = self.mender.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
                 self.nearby.begin(&mut self.tree, &mut self.places, corners);
                 known = true;
             }
             if self.is_certified(setting, mesh, m) && !self.tree.exhausted && self.is_free(setting, mesh, vertex, m) {
-                mesh.collapse(vertex, &self.star, m);
-                self.place(mesh);
+                mesh.collapse(vertex, &self.mender.star, m);
+                self.mender.place(mesh);
                 return true;
             }
         }
@@ -521,7 +272,7 @@ impl<'a> Simplifier<'a> {
 
     /// Lists the neighbours that the vertex may move to, the cheapest first.
     fn rank(&mut self, setting: &Setting, mesh: &HalfEdges, vertex: u32, lower: f64, upper: f64) {
-        let Self { star, normals, lengths, choices, due, .. } = self;
+        let Self { mender: Mender { star, .. }, normals, lengths, choices, due, .. } = self;
         let mut later = f64::INFINITY;
         let count = star.ring.len();
         let origin = &mesh.points[vertex as usize];
@@ -562,31 +313,13 @@ impl<'a> Simplifier<'a> {
         choices.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
-    /// The link condition (Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge contraction", 1999): the ends have no common neighbours
-    /// but the two across the edge.
-    fn keeps_manifold(&mut self, mesh: &HalfEdges, m: usize) -> bool {
-        let target = self.star.ring[m];
-        if !mesh.star(target, MOST_AFTER, &mut self.other) {
-            return false;
-        }
-        let (own, others) = (self.star.ring.len(), self.other.ring.len());
-        if own + others > MOST_AFTER || (own == 3 && others == 3) {
-            return false;
-        }
-        self.stamp += 1;
-        for &neighbour in &self.star.ring {
-            self.stamps[neighbour as usize] = self.stamp;
-        }
-        self.other.ring.iter().filter(|&&neighbour| self.stamps[neighbour as usize] == self.stamp).count() == 2
-    }
-
     /// Whether new triangles have area and look where the old ones did.
     fn keeps_shape(&self, setting: &Setting, mesh: &HalfEdges, vertex: u32, m: usize) -> bool {
-        let count = self.star.ring.len();
-        let target = &mesh.points[self.star.ring[m] as usize];
+        let count = self.mender.star.ring.len();
+        let target = &mesh.points[self.mender.star.ring[m] as usize];
         let least = LEAST_HEIGHT * setting.rounding;
         kept(m, count).all(|k| {
-            let (a, b) = (&mesh.points[self.star.ring[k] as usize], &mesh.points[self.star.ring[(k + 1) % count] as usize]);
+            let (a, b) = (&mesh.points[self.mender.star.ring[k] as usize], &mesh.points[self.mender.star.ring[(k + 1) % count] as usize]);
             let normal = cross(&subtract(a, target), &subtract(b, target));
             let square = dot(&normal, &normal);
             let longest = distance_squared(a, b).max(distance_squared(a, target)).max(distance_squared(b, target));
@@ -604,7 +337,7 @@ impl<'a> Simplifier<'a> {
 
     /// Whether the sites cover what is swept, and the new triangles keep from them.
     fn is_certified(&mut self, setting: &Setting, mesh: &HalfEdges, m: usize) -> bool {
-        let Self { tree, places, nearby, star, .. } = self;
+        let Self { tree, places, nearby, mender: Mender { star, .. }, .. } = self;
         let count = star.ring.len();
         kept(m, count).all(|k| nearby.cover(tree, [m, k, (k + 1) % count, count]))
             && kept(m, count).all(|k| {
@@ -617,103 +350,19 @@ impl<'a> Simplifier<'a> {
     /// Whether the new triangles meet no others. Where old ones did, it is enough that there are fewer such pairs, or no more when
     /// nothing moves to speak of.
     fn is_free(&mut self, setting: &Setting, mesh: &HalfEdges, vertex: u32, m: usize) -> bool {
-        let found = self.meetings(mesh, vertex, Some(m), None, 0);
+        let found = self.mender.meetings(mesh, vertex, Some(m), None, 0);
         if found == 0 {
             return true;
         }
-        let target = self.star.ring[m];
+        let target = self.mender.star.ring[m];
         let moved = distance_squared(&mesh.points[vertex as usize], &mesh.points[target as usize]).sqrt();
-        let before = self.meetings(mesh, vertex, None, None, usize::MAX);
+        let before = self.mender.meetings(mesh, vertex, None, None, usize::MAX);
         if before == 0 {
             return false;
         }
-        let after = self.meetings(mesh, vertex, Some(m), None, usize::MAX);
+        let after = self.mender.meetings(mesh, vertex, Some(m), None, usize::MAX);
         after < before || (after == before && moved <= TINY * setting.rounding)
     }
-
-    /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
-    fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>, most: usize) -> usize {
-        let Self { star, boxes, close, own, .. } = self;
-        let count = star.ring.len();
-        let apex = m.map_or(vertex, |m| star.ring[m]);
-        let point = |corner: u32| mesh.points[corner as usize];
-        own.clear();
-        let mut whole = Box32::EMPTY;
-        for k in 0..count {
-            if m.is_none_or(|m| k != m && (k + 1) % count != m) {
-                let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
-                let mut points = corners.map(point);
-                points[0] = to.unwrap_or(points[0]);
-                let facet = Facet::new(corners, points);
-                whole = whole.union(&facet.bounds);
-                own.push(facet);
-            }
-        }
-        let mut found = 0;
-        for (index, facet) in own.iter().enumerate() {
-            found += usize::from(contact::is_flat(&facet.points));
-            for other in &own[..index] {
-                let parted = facet.parts(&other.corners, &other.points);
-                found += usize::from(!parted && contact::meet([&facet.corners, &other.corners], [&facet.points, &other.points]));
-            }
-        }
-        if found > most {
-            return found;
-        }
-        close.clear();
-        boxes.query(&whole, 0, |leaf| {
-            let met = boxes.items(leaf).iter().zip(boxes.boxes(leaf)).filter(|(_, own)| own.meets(&whole));
-            close.extend(met.map(|(&triangle, own)| (triangle, *own)));
-            true
-        });
-        for &(triangle, own_box) in close.iter() {
-            if !own.iter().any(|facet| own_box.meets(&facet.bounds)) {
-                continue;
-            }
-            let Some(corners) = mesh.triangle(triangle) else { continue };
-            if corners.contains(&vertex) {
-                continue;
-            }
-            let points = corners.map(point);
-            for facet in own.iter() {
-                if own_box.meets(&facet.bounds)
-                    && !facet.parts(&corners, &points)
-                    && contact::meet([&corners, &facet.corners], [&points, &facet.points])
-                {
-                    found += 1;
-                    if found > most {
-                        return found;
-                    }
-                }
-            }
-        }
-        found
-    }
-}
-
-/// Crossings of what is left of a mesh, in its own numbers of triangles.
-fn crossings(mesh: &HalfEdges, budget: &Budget) -> Result<Crossings, Stopped> {
-    let kept: Vec<u32> = (0..mesh.triangles()).filter(|&triangle| mesh.triangle(triangle).is_some()).collect();
-    let triangles = kept.iter().filter_map(|&triangle| mesh.triangle(triangle)).collect();
-    let mesh = TriMesh { vertices: mesh.points.iter().copied().map(DVec3::from_array).collect(), triangles };
-    let mut crossings = Crossings::among(&mesh, MOST_PARTED, budget)?;
-    crossings.first.iter_mut().flatten().for_each(|triangle| *triangle = kept[*triangle as usize]);
-    Ok(crossings)
-}
-
-/// A point moved by some steps of single precision along the axes that a code of three digits names.
-fn stepped(from: &Point, code: usize, steps: u32) -> Point {
-    std::array::from_fn(|axis| {
-        let step = [|x: f32| x, f32::next_up, f32::next_down][code / [1, 3, 9][axis] % 3];
-        f64::from((0..steps).fold(from[axis] as f32, |x, _| step(x)))
-    })
-}
-
-/// Whether a triangle's least height is below `least`.
-fn is_sliver(points: &[Point; 3], least: f64) -> bool {
-    let normal = cross(&subtract(&points[1], &points[0]), &subtract(&points[2], &points[0]));
-    let longest = (0..3).map(|k| distance_squared(&points[k], &points[(k + 1) % 3])).fold(0.0, f64::max);
-    dot(&normal, &normal) <= least * least * longest
 }
 
 /// The triangles of a star of `count` that are kept when its vertex moves to ring m.

@@ -3,12 +3,12 @@
 use crate::attractor::cell::Point;
 
 /// No half-edge, vertex or triangle.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// See the module's comment. Closed or with borders; edges have two triangles at most.
 #[derive(Debug, Default)]
-pub(super) struct HalfEdges {
-    pub(super) points: Vec<Point>,
+pub(crate) struct HalfEdges {
+    pub(crate) points: Vec<Point>,
     /// Where a half-edge starts; `NONE` in triangles that are gone.
     corners: Vec<u32>,
     /// The other half, or `NONE` on a border.
@@ -16,31 +16,31 @@ pub(super) struct HalfEdges {
     /// A half-edge that starts at a vertex.
     leaving: Vec<u32>,
     /// Triangles left.
-    pub(super) alive: usize,
+    pub(crate) alive: usize,
 }
 
 /// The next half-edge of the triangle.
 #[inline]
-pub(super) fn next(half: u32) -> u32 {
+pub(crate) fn next(half: u32) -> u32 {
     if half % 3 == 2 { half - 2 } else { half + 1 }
 }
 
 /// The one before.
 #[inline]
-pub(super) fn previous(half: u32) -> u32 {
+pub(crate) fn previous(half: u32) -> u32 {
     if half.is_multiple_of(3) { half + 2 } else { half - 1 }
 }
 
 /// The closed fan of triangles around a vertex v: triangle k is (v, ring k, ring k + 1).
 #[derive(Debug, Default)]
-pub(super) struct Star {
+pub(crate) struct Star {
     /// From v to ring k.
-    pub(super) halves: Vec<u32>,
-    pub(super) ring: Vec<u32>,
+    pub(crate) halves: Vec<u32>,
+    pub(crate) ring: Vec<u32>,
 }
 
 impl HalfEdges {
-    pub(super) fn new(points: Vec<Point>, triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(points: Vec<Point>, triangles: &[[u32; 3]]) -> Self {
         let corners: Vec<u32> = triangles.iter().flatten().copied().collect();
         let mut leaving = vec![NONE; points.len()];
         for (half, &corner) in corners.iter().enumerate() {
@@ -83,31 +83,31 @@ impl HalfEdges {
 
     /// Where a half-edge ends.
     #[inline]
-    pub(super) fn end(&self, half: u32) -> u32 {
+    pub(crate) fn end(&self, half: u32) -> u32 {
         self.corners[next(half) as usize]
     }
 
     /// How many triangles there were.
-    pub(super) fn triangles(&self) -> u32 {
+    pub(crate) fn triangles(&self) -> u32 {
         (self.corners.len() / 3) as u32
     }
 
     /// The corners of a triangle, if it is still there.
     #[inline]
-    pub(super) fn triangle(&self, triangle: u32) -> Option<[u32; 3]> {
+    pub(crate) fn triangle(&self, triangle: u32) -> Option<[u32; 3]> {
         let first = 3 * triangle as usize;
         let corners = [self.corners[first], self.corners[first + 1], self.corners[first + 2]];
         (corners[0] != NONE).then_some(corners)
     }
 
     /// Whether a vertex still has triangles.
-    pub(super) fn is_used(&self, vertex: u32) -> bool {
+    pub(crate) fn is_used(&self, vertex: u32) -> bool {
         self.leaving[vertex as usize] != NONE
     }
 
     /// Fills the star of a vertex; false on a border or with more than `most` triangles.
     #[inline]
-    pub(super) fn star(&self, vertex: u32, most: usize, star: &mut Star) -> bool {
+    pub(crate) fn star(&self, vertex: u32, most: usize, star: &mut Star) -> bool {
         star.halves.clear();
         star.ring.clear();
         let start = self.leaving[vertex as usize];
@@ -130,13 +130,13 @@ impl HalfEdges {
 
     /// The other half of an edge, or `NONE`.
     #[inline]
-    pub(super) fn twin(&self, half: u32) -> u32 {
+    pub(crate) fn twin(&self, half: u32) -> u32 {
         self.twins[half as usize]
     }
 
     /// Turns the edge between two triangles (a, b, c) and (b, a, d) into cd: the half-edge from a becomes that from d to c. Its twin must be there, and no
     /// edge cd.
-    pub(super) fn flip(&mut self, half: u32) {
+    pub(crate) fn flip(&mut self, half: u32) {
         let twin = self.twins[half as usize];
         // Around the square: b c, c a, a d, d b.
         let (bc, ca, ad, db) = (next(half), previous(half), next(twin), previous(twin));
@@ -158,7 +158,7 @@ impl HalfEdges {
     }
 
     /// Removes a vertex by collapsing its edge to ring m into that neighbour.
-    pub(super) fn collapse(&mut self, vertex: u32, star: &Star, m: usize) {
+    pub(crate) fn collapse(&mut self, vertex: u32, star: &Star, m: usize) {
         let count = star.ring.len();
         let (before, after) = ((m + count - 1) % count, (m + 1) % count);
         let target = star.ring[m];
@@ -182,5 +182,18 @@ impl HalfEdges {
         self.leaving[star.ring[after] as usize] = next(star.halves[after]);
         self.leaving[vertex as usize] = NONE;
         self.alive -= 2;
+    }
+
+    /// What is left: points, triangles, and the new number of every old point, or `NONE`.
+    pub(crate) fn compact(&self) -> (Vec<Point>, Vec<[u32; 3]>, Vec<u32>) {
+        let mut numbers = vec![NONE; self.points.len()];
+        let mut points = Vec::new();
+        for vertex in (0..self.points.len()).filter(|&vertex| self.is_used(vertex as u32)) {
+            numbers[vertex] = points.len() as u32;
+            points.push(self.points[vertex]);
+        }
+        let triangles = (0..self.triangles()).filter_map(|t| self.triangle(t)).map(|t| t.map(|corner| numbers[corner as usize]));
+        let triangles = triangles.collect();
+        (points, triangles, numbers)
     }
 }

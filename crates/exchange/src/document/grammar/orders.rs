@@ -1,0 +1,139 @@
+//! The members of jobs and of questions about models.
+
+use serde_json::json;
+
+use lacuna_fabrication::job::Operation;
+
+use super::super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
+use super::{
+    MODEL, Member, Object, count, flag, list, number, one_of_words, optional, positive, reference, required, text, vector, version,
+};
+use crate::format::FORMATS;
+
+/// Operations by their words.
+pub(in super::super) const OPERATIONS: [(&str, Operation); 3] =
+    [("union", Operation::Union), ("intersection", Operation::Intersection), ("difference", Operation::Difference)];
+
+/// Kinds of jobs of the grammar that cannot be done yet.
+pub(in super::super) const LATER_KINDS: [&str; 6] = ["check", "slice", "sla", "cast", "panels", "convert"];
+
+pub(in super::super) const JOB: Object = Object {
+    title: "a job",
+    about: "An order: what to do, with which model, how precisely, and what to deliver. Exactly one of model, model_ref and inputs is given.",
+    members: &[
+        required("lacuna", "The version of the grammar: 1.", version),
+        required(
+            "kind",
+            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), measure (box, area and volume as intervals), or intersect (a printable solid: what an operation leaves of several).",
+            || one_of_words(&["evaluate", "solidify", "measure", "intersect"]),
+        ),
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional("inputs", "Named models, for kinds of jobs with several.", || list(reference("JobInput"), 1)),
+        required("params", "How to do it.", || reference("JobParams")),
+        optional(
+            "outputs",
+            "Names of the formats wanted, for example 3mf and stl.",
+            || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
+        ),
+        optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
+    ],
+};
+
+pub(in super::super) const SOLVE: Object = Object {
+    title: "a solve request",
+    about: "A model with unknown entries, and the values chosen for what its constraints leave free. Exactly one of model and model_ref is given.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "values",
+            "Values of free parameters by their names; those that are absent keep the value that the solver chooses.",
+            || json!({ "type": "object", "additionalProperties": number(), "propertyNames": text() }),
+        ),
+    ],
+};
+
+pub(in super::super) const JOB_INPUT: Object = Object {
+    title: "an input",
+    about: "A named model. Exactly one of model and model_ref is given.",
+    members: &[
+        required("name", "What the job calls the model.", text),
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "radius_mm",
+            "For intersect alone: the radius of the ball that dilates this input, in mm; 0 takes the solids that its closed surfaces bound as they are; the radius_mm of params when absent, and 0 without one.",
+            || json!({ "type": "number", "minimum": 0 }),
+        ),
+    ],
+};
+
+pub(in super::super) const JOB_PARAMS: Object = Object {
+    title: "params",
+    about: "Settings of a job. What a kind does not use must be absent.",
+    members: &[
+        required("tolerance_mm", "The Hausdorff bound on the result, in mm, above zero.", positive),
+        optional(
+            "radius_mm",
+            "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure and intersect, absent for evaluate.",
+            positive,
+        ),
+        optional(
+            "operation",
+            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), or in the first and in none of the others (difference). Required by intersect alone.",
+            || one_of_words(&OPERATIONS.map(|(word, _)| word)),
+        ),
+        optional(
+            "normals",
+            "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",
+            flag,
+        ),
+        optional("simplify", "Whether triangles are saved within the bound: for solidify alone; true when absent.", flag),
+        optional(
+            "stability",
+            "Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent.",
+            flag,
+        ),
+    ],
+};
+
+pub(in super::super) const JOB_LIMITS: Object = Object {
+    title: "limits",
+    about: "What a job may use. Each limit that is absent is the service's default.",
+    members: &[
+        optional("seconds", "Wall time in seconds.", positive),
+        optional("triangles", "Triangles of the result.", count),
+        optional("cells", "Leaf cells that the evaluation may produce.", count),
+        optional("memory_bytes", "Accounted memory in bytes.", count),
+        optional("depth", "Length of the longest address.", || json!({ "type": "integer", "minimum": 1, "maximum": u32::MAX })),
+    ],
+};
+
+pub(in super::super) const ADDRESS_QUESTION: Object = Object {
+    title: "a question about addresses",
+    about: "Where an address leads (at), or which addresses lead near a point (near). Exactly one of model and model_ref is given, and exactly one of at and near.",
+    members: &[
+        Member { required: false, ..MODEL.members[0] },
+        optional("model", "The model, in full.", || reference("EmbeddedModel")),
+        optional("model_ref", "The id of a stored model.", text),
+        optional(
+            "at",
+            "An address: the root cell, a colon, the indices of transitions, and in parentheses those that repeat without end, for example `0: 1 2 (0 3)`.",
+            || json!({ "type": "string" }),
+        ),
+        optional("near", "A point, in mm whatever the unit of the model.", vector),
+        optional(
+            "within_mm",
+            "With `near`: cells as far as this are listed; those that may hold the closest point of the shape when absent.",
+            || json!({ "type": "number", "minimum": 0 }),
+        ),
+        optional("tolerance_mm", "With `near`: radius to which cells are refined; a thousandth of the shape's when absent.", positive),
+        optional(
+            "most",
+            "With `near`: cells to list at most.",
+            || json!({ "type": "integer", "minimum": 1, "maximum": MOST_CELLS_LISTED, "default": CELLS_LISTED }),
+        ),
+    ],
+};

@@ -1,0 +1,379 @@
+//! What rounding to single precision does to a closed surface, mended: vertices that fall together, triangles that lose their area, slivers that are folded
+//! over their neighbours.
+//!
+//! Joining vertices at one place and turning the edges of triangles without area leave the surface as a set what it is. What is left is moved by a few steps of
+//! single precision, see [`NUDGE`].
+
+use super::box_tree::{Box32, BoxTree};
+use super::contact;
+use super::half_edges::{HalfEdges, NONE, Star, next};
+use super::topology::has_no_area;
+use super::{Crossings, TriMesh};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
+use crate::budget::{Budget, Stopped};
+use glam::DVec3;
+use std::collections::BTreeSet;
+
+/// How far vertices are moved that leave a triangle without area, or triangles that cross, in units of rounding: [`MOST_STEPS`] of single precision along each axis.
+pub(crate) const NUDGE: f64 = 2.0 * MOST_STEPS as f64;
+const MOST_STEPS: u32 = 4;
+/// Triangles around a vertex that is joined with another, at most.
+pub(crate) const MOST_AROUND: usize = 24;
+/// Triangles around a vertex afterwards.
+const MOST_AFTER: usize = 40;
+/// Triangles of less height than this are slivers, in units of rounding.
+pub(crate) const LEAST_HEIGHT: f64 = 8.0;
+/// Pairs of crossing triangles that are looked at.
+const MOST_PARTED: usize = 10_000;
+/// Sweeps that turn edges, at most.
+const FLIP_ROUNDS: usize = 8;
+
+/// A mended surface.
+pub(crate) struct Mended {
+    pub(crate) points: Vec<Point>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Pairs of triangles that still meet elsewhere than in corners and edges they share.
+    pub(crate) crossings: u64,
+}
+
+/// Mends a surface whose coordinates are single-precision numbers; `rounding` is what a position may have lost.
+///
+/// # Errors
+/// [`Stopped`].
+pub(crate) fn mend(points: Vec<Point>, triangles: &[[u32; 3]], rounding: f64, budget: &Budget) -> Result<Mended, Stopped> {
+    let mut mesh = HalfEdges::new(points, triangles);
+    let (inside, settled) = (vec![true; mesh.points.len()], vec![false; mesh.points.len()]);
+    let mut mender = Mender::default();
+    mender.start(&mesh);
+    mender.clean(&mut mesh, &inside, &settled, rounding);
+    let mut moved = BTreeSet::new();
+    mender.nudge(&mut mesh, &mut moved);
+    let found = crossings(&mesh, budget)?;
+    let mut left = found.count;
+    if left > 0 {
+        mender.part(&mut mesh, &found.first, &mut moved);
+        left = crossings(&mesh, budget)?.count;
+    }
+    let (points, triangles, _) = mesh.compact();
+    Ok(Mended { points, triangles, crossings: left })
+}
+
+/// A triangle that is compared with others.
+struct Facet {
+    corners: [u32; 3],
+    points: [Point; 3],
+    bounds: Box32,
+    /// Along the normal, and what a volume may err per length.
+    normal: Point,
+    error: f64,
+}
+
+impl Facet {
+    fn new(corners: [u32; 3], points: [Point; 3]) -> Self {
+        let (p, q) = (subtract(&points[1], &points[0]), subtract(&points[2], &points[0]));
+        // Products of two lengths, at most 8 roundings each, and three sums.
+        let error = 64.0 * f64::EPSILON * (dot(&p, &p) + dot(&q, &q));
+        Self { corners, points, bounds: Box32::of(&points), normal: cross(&p, &q), error }
+    }
+
+    /// Whether a plane surely parts the triangle from what another has besides common corners: its own, or one through an edge and the normal.
+    #[inline]
+    fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
+        let (mut above, mut below) = (true, true);
+        for (corner, point) in corners.iter().zip(points) {
+            if !self.corners.contains(corner) {
+                let offset = subtract(point, &self.points[0]);
+                let side = dot(&self.normal, &offset);
+                let error = self.error * (offset[0].abs() + offset[1].abs() + offset[2].abs());
+                above &= side > error;
+                below &= side < -error;
+            }
+        }
+        above || below || (0..3).any(|k| self.is_beyond(k, corners, points))
+    }
+
+    /// Whether another triangle lies beyond edge k, but for common corners on that edge. The vector m = edge x normal is exact to 16 roundings of
+    /// |edge| |normal|, products with it to 32 with |offset|; with exact m the triangle itself has no positive value, and 0 only on the edge.
+    fn is_beyond(&self, k: usize, corners: &[u32; 3], points: &[Point; 3]) -> bool {
+        if corners.contains(&self.corners[(k + 2) % 3]) {
+            return false;
+        }
+        let (start, end) = (self.corners[k], self.corners[(k + 1) % 3]);
+        let edge = subtract(&self.points[(k + 1) % 3], &self.points[k]);
+        let outwards = cross(&edge, &self.normal);
+        let error = self.error * (edge[0].abs() + edge[1].abs() + edge[2].abs());
+        corners.iter().zip(points).filter(|&(&corner, _)| corner != start && corner != end).all(|(_, point)| {
+            let offset = subtract(point, &self.points[k]);
+            dot(&outwards, &offset) > error * (offset[0].abs() + offset[1].abs() + offset[2].abs())
+        })
+    }
+}
+
+/// Working memory of a thread.
+#[derive(Default)]
+pub(crate) struct Mender {
+    /// The star of the vertex that was looked at last.
+    pub(crate) star: Star,
+    other: Star,
+    boxes: BoxTree,
+    /// Triangles when the boxes were made.
+    boxed: usize,
+    /// Triangles lower than what rounding moves, as they were met last.
+    pub(crate) slivers: Vec<u32>,
+    close: Vec<(u32, Box32)>,
+    stamps: Vec<u32>,
+    stamp: u32,
+    /// Triangles of a star, old or new.
+    own: Vec<Facet>,
+}
+
+impl Mender {
+    /// Begins with a mesh.
+    pub(crate) fn start(&mut self, mesh: &HalfEdges) {
+        self.stamps.clear();
+        self.stamps.resize(mesh.points.len(), 0);
+        self.stamp = 0;
+    }
+
+    /// Joins vertices at the same place, and turns edges of triangles without area, while that changes anything.
+    pub(crate) fn clean(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool], rounding: f64) {
+        for _ in 0..FLIP_ROUNDS {
+            let merged = self.merge(mesh, inside, settled);
+            if !self.flip(mesh, inside, rounding) && !merged {
+                break;
+            }
+        }
+    }
+
+    /// Makes vertices at the same place one where that keeps the manifold: the surface as a set does not change. Whether there were such.
+    fn merge(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) -> bool {
+        let mut merged = false;
+        for vertex in 0..mesh.points.len() as u32 {
+            if !inside[vertex as usize] || settled[vertex as usize] || !mesh.star(vertex, MOST_AROUND, &mut self.star) {
+                continue;
+            }
+            for m in 0..self.star.ring.len() {
+                let target = self.star.ring[m];
+                if mesh.points[target as usize] == mesh.points[vertex as usize] && inside[target as usize] && self.keeps_manifold(mesh, m) {
+                    mesh.collapse(vertex, &self.star, m);
+                    merged = true;
+                    break;
+                }
+            }
+        }
+        merged
+    }
+
+    /// Turns the longest edge of triangles without area, when that leaves none: the surface as a set does not change. Whether one was turned.
+    fn flip(&mut self, mesh: &mut HalfEdges, inside: &[bool], rounding: f64) -> bool {
+        let mut turned = false;
+        self.slivers.clear();
+        for triangle in 0..mesh.triangles() {
+            let Some(corners) = mesh.triangle(triangle) else { continue };
+            let points = corners.map(|corner| mesh.points[corner as usize]);
+            if !corners.iter().all(|&corner| inside[corner as usize]) || !is_sliver(&points, LEAST_HEIGHT * rounding) {
+                continue;
+            }
+            self.slivers.push(triangle);
+            if !contact::is_flat(&points) {
+                continue;
+            }
+            let length = |&k: &usize| distance_squared(&points[k], &points[(k + 1) % 3]);
+            let Some(k) = (0..3).max_by(|p, q| length(p).total_cmp(&length(q))) else { continue };
+            let half = 3 * triangle + k as u32;
+            let twin = mesh.twin(half);
+            if twin == NONE {
+                continue;
+            }
+            let (a, b, c, d) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3], mesh.end(next(twin)));
+            let at = |corner: u32| mesh.points[corner as usize];
+            if contact::is_flat(&[at(d), at(c), at(a)]) || contact::is_flat(&[at(c), at(d), at(b)]) {
+                continue;
+            }
+            if mesh.star(c, usize::MAX, &mut self.other) && !self.other.ring.contains(&d) {
+                mesh.flip(half);
+                turned = true;
+            }
+        }
+        turned
+    }
+
+    /// Gives what is left of triangles without area some, by moving corners by single steps of single precision, each at most once.
+    fn nudge(&mut self, mesh: &mut HalfEdges, moved: &mut BTreeSet<u32>) {
+        let is_flat = |mesh: &HalfEdges, triangle: u32| {
+            mesh.triangle(triangle).is_some_and(|t| has_no_area(t.map(|corner| DVec3::from_array(mesh.points[corner as usize]))))
+        };
+        for triangle in 0..mesh.triangles() {
+            if !is_flat(mesh, triangle) {
+                continue;
+            }
+            'corners: for corner in mesh.triangle(triangle).into_iter().flatten() {
+                if moved.contains(&corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
+                    continue;
+                }
+                let from = mesh.points[corner as usize];
+                for code in 1..27 {
+                    mesh.points[corner as usize] = stepped(&from, code, 1);
+                    if !self.star.halves.iter().any(|&half| is_flat(mesh, half / 3)) {
+                        moved.insert(corner);
+                        break 'corners;
+                    }
+                }
+                mesh.points[corner as usize] = from;
+            }
+        }
+    }
+
+    /// Parts triangles that cross by moving corners by a few steps of single precision, each at most once: slivers that rounding folds over their neighbours.
+    fn part(&mut self, mesh: &mut HalfEdges, pairs: &[[u32; 2]], moved: &mut BTreeSet<u32>) {
+        self.index(mesh);
+        for corner in pairs.iter().flatten().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<BTreeSet<u32>>() {
+            if moved.contains(&corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
+                continue;
+            }
+            let mut least = self.meetings(mesh, corner, None, None, usize::MAX);
+            let from = mesh.points[corner as usize];
+            let mut best = from;
+            for (steps, code) in (0..MOST_STEPS.ilog2() + 1).flat_map(|power| (1..27).map(move |code| (1 << power, code))) {
+                if least == 0 {
+                    break;
+                }
+                let to = stepped(&from, code, steps);
+                let met = self.meetings(mesh, corner, None, Some(to), least - 1);
+                if met < least {
+                    (least, best) = (met, to);
+                }
+            }
+            if best != from {
+                moved.insert(corner);
+                mesh.points[corner as usize] = best;
+                self.place(mesh);
+            }
+        }
+    }
+
+    /// Lists the boxes of all triangles for [`Mender::meetings`].
+    pub(crate) fn index(&mut self, mesh: &HalfEdges) {
+        self.boxed = mesh.alive;
+        let box_of = |triangle| mesh.triangle(triangle).map(|corners| Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
+        self.boxes.build(mesh.triangles() as usize, box_of, false);
+    }
+
+    /// Lists the boxes anew when half of the triangles are gone.
+    pub(crate) fn keep_index(&mut self, mesh: &HalfEdges) {
+        if mesh.alive < self.boxed / 2 {
+            self.index(mesh);
+        }
+    }
+
+    /// Gives the triangles of the star the boxes of where they are now.
+    pub(crate) fn place(&mut self, mesh: &HalfEdges) {
+        for &half in &self.star.halves {
+            if let Some(corners) = mesh.triangle(half / 3) {
+                self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
+            }
+        }
+    }
+
+    /// The link condition (Dey, Edelsbrunner, Guha and Nekhayev, "Topology preserving edge contraction", 1999): the ends have no common neighbours
+    /// but the two across the edge.
+    pub(crate) fn keeps_manifold(&mut self, mesh: &HalfEdges, m: usize) -> bool {
+        let target = self.star.ring[m];
+        if !mesh.star(target, MOST_AFTER, &mut self.other) {
+            return false;
+        }
+        let (own, others) = (self.star.ring.len(), self.other.ring.len());
+        if own + others > MOST_AFTER || (own == 3 && others == 3) {
+            return false;
+        }
+        self.stamp += 1;
+        for &neighbour in &self.star.ring {
+            self.stamps[neighbour as usize] = self.stamp;
+        }
+        self.other.ring.iter().filter(|&&neighbour| self.stamps[neighbour as usize] == self.stamp).count() == 2
+    }
+
+    /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
+    pub(crate) fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>, most: usize) -> usize {
+        let Self { star, boxes, close, own, .. } = self;
+        let count = star.ring.len();
+        let apex = m.map_or(vertex, |m| star.ring[m]);
+        let point = |corner: u32| mesh.points[corner as usize];
+        own.clear();
+        let mut whole = Box32::EMPTY;
+        for k in 0..count {
+            if m.is_none_or(|m| k != m && (k + 1) % count != m) {
+                let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
+                let mut points = corners.map(point);
+                points[0] = to.unwrap_or(points[0]);
+                let facet = Facet::new(corners, points);
+                whole = whole.union(&facet.bounds);
+                own.push(facet);
+            }
+        }
+        let mut found = 0;
+        for (index, facet) in own.iter().enumerate() {
+            found += usize::from(contact::is_flat(&facet.points));
+            for other in &own[..index] {
+                let parted = facet.parts(&other.corners, &other.points);
+                found += usize::from(!parted && contact::meet([&facet.corners, &other.corners], [&facet.points, &other.points]));
+            }
+        }
+        if found > most {
+            return found;
+        }
+        close.clear();
+        boxes.query(&whole, 0, |leaf| {
+            let met = boxes.items(leaf).iter().zip(boxes.boxes(leaf)).filter(|(_, own)| own.meets(&whole));
+            close.extend(met.map(|(&triangle, own)| (triangle, *own)));
+            true
+        });
+        for &(triangle, own_box) in close.iter() {
+            if !own.iter().any(|facet| own_box.meets(&facet.bounds)) {
+                continue;
+            }
+            let Some(corners) = mesh.triangle(triangle) else { continue };
+            if corners.contains(&vertex) {
+                continue;
+            }
+            let points = corners.map(point);
+            for facet in own.iter() {
+                if own_box.meets(&facet.bounds)
+                    && !facet.parts(&corners, &points)
+                    && contact::meet([&corners, &facet.corners], [&points, &facet.points])
+                {
+                    found += 1;
+                    if found > most {
+                        return found;
+                    }
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Crossings of what is left of a mesh, in its own numbers of triangles.
+fn crossings(mesh: &HalfEdges, budget: &Budget) -> Result<Crossings, Stopped> {
+    let kept: Vec<u32> = (0..mesh.triangles()).filter(|&triangle| mesh.triangle(triangle).is_some()).collect();
+    let triangles = kept.iter().filter_map(|&triangle| mesh.triangle(triangle)).collect();
+    let mesh = TriMesh { vertices: mesh.points.iter().copied().map(DVec3::from_array).collect(), triangles };
+    let mut crossings = Crossings::among(&mesh, MOST_PARTED, budget)?;
+    crossings.first.iter_mut().flatten().for_each(|triangle| *triangle = kept[*triangle as usize]);
+    Ok(crossings)
+}
+
+/// A point moved by some steps of single precision along the axes that a code of three digits names.
+fn stepped(from: &Point, code: usize, steps: u32) -> Point {
+    std::array::from_fn(|axis| {
+        let step = [|x: f32| x, f32::next_up, f32::next_down][code / [1, 3, 9][axis] % 3];
+        f64::from((0..steps).fold(from[axis] as f32, |x, _| step(x)))
+    })
+}
+
+/// Whether a triangle's least height is below `least`.
+fn is_sliver(points: &[Point; 3], least: f64) -> bool {
+    let normal = cross(&subtract(&points[1], &points[0]), &subtract(&points[2], &points[0]));
+    let longest = (0..3).map(|k| distance_squared(&points[k], &points[(k + 1) % 3])).fold(0.0, f64::max);
+    dot(&normal, &normal) <= least * least * longest
+}
