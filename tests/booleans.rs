@@ -16,7 +16,8 @@ const OPERATIONS: [Operation; 3] = [Operation::Union, Operation::Intersection, O
 
 /// A box with outward faces.
 fn cuboid(low: DVec3, high: DVec3) -> Shape {
-    let vertices = (0..8).map(|code| DVec3::from_array(std::array::from_fn(|axis| if code >> axis & 1 == 1 { high[axis] } else { low[axis] })));
+    let vertices =
+        (0..8).map(|code| DVec3::from_array(std::array::from_fn(|axis| if code >> axis & 1 == 1 { high[axis] } else { low[axis] })));
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     Shape::Mesh(PolygonMesh { vertices: vertices.collect(), faces: faces.map(|face| face.to_vec()).to_vec(), interior: Interior::Auto })
 }
@@ -106,7 +107,8 @@ fn balls() {
     let ball = 4.0 / 3.0 * PI * radius.powi(3);
     let lens = PI * (4.0 * radius + distance) * (2.0 * radius - distance).powi(2) / 12.0;
     let point = |x: f64| (pieces(&Pieces(vec![vec![DVec3::new(x, 0.0, 0.0)]])), Some(radius));
-    for (operation, exact) in [(Operation::Union, 2.0 * ball - lens), (Operation::Intersection, lens), (Operation::Difference, ball - lens)] {
+    for (operation, exact) in [(Operation::Union, 2.0 * ball - lens), (Operation::Intersection, lens), (Operation::Difference, ball - lens)]
+    {
         let (_, certificate) = solid(operation, 0.02, vec![point(0.0), point(distance)]);
         assert_volume(&certificate, exact, 0.03 * ball);
         assert_eq!(certificate.genus, Some(0));
@@ -155,10 +157,10 @@ fn random_solids_lie_between_their_bounds() {
                     Operation::Difference => depth[0].min(-depth[1]),
                 };
                 if held > inner + 1e-9 && within < 40 {
-                    assert!(inside::contains(&mesh, p), "{operation:?} {seed}: {p} is not in the solid");
+                    assert!(inside::contains(&mesh.vertices, &mesh.triangles, p), "{operation:?} {seed}: {p} is not in the solid");
                     within += 1;
                 } else if held < -outer - 1e-9 && beyond < 40 {
-                    assert!(!inside::contains(&mesh, p), "{operation:?} {seed}: {p} is in the solid");
+                    assert!(!inside::contains(&mesh.vertices, &mesh.triangles, p), "{operation:?} {seed}: {p} is in the solid");
                     beyond += 1;
                 }
             }
@@ -183,11 +185,8 @@ fn many_operands() {
 #[test]
 fn what_is_no_solid_is_refused() {
     let cubes = |first: Shape| vec![(first, None), (cube([1.0; 3], 2.0), None)];
-    let open = Shape::Mesh(PolygonMesh {
-        vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-        faces: vec![vec![0, 1, 2]],
-        interior: Interior::Auto,
-    });
+    let open =
+        Shape::Mesh(PolygonMesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], faces: vec![vec![0, 1, 2]], interior: Interior::Auto });
     let error = combine(Operation::Union, 1e-3, cubes(open), &Budget::default()).unwrap_err();
     assert_eq!((error.code, error.message.contains("radius_mm")), ("job.not-a-solid", true), "{error}");
     // A cube with a bow-tie: closed, and it crosses itself.
@@ -231,7 +230,10 @@ fn the_command_combines_documents_and_files() {
     assert_eq!(told["operation"]["operands"][1]["name"], "b");
     // Three radii for two models, and an empty result: refused, and no file is left.
     let empty = folder.join("empty.stl");
-    let refused = command(&["intersect", "--operation", "union", "--tolerance", "0.1", "--radius", "1", "--radius", "1", "--radius", "1", "-o"], &[&empty, &a, &b]);
+    let refused = command(
+        &["intersect", "--operation", "union", "--tolerance", "0.1", "--radius", "1", "--radius", "1", "--radius", "1", "-o"],
+        &[&empty, &a, &b],
+    );
     assert_eq!(refused.status.code(), Some(2));
     let refused = command(&["intersect", "--operation", "difference", "--tolerance", "0.1", "-o"], &[&empty, &a, &a]);
     assert_eq!(refused.status.code(), Some(4), "{}", String::from_utf8_lossy(&refused.stderr));

@@ -9,7 +9,7 @@ use lacuna_fabrication::{Certificate, Geometry, Input, Job, JobKind, Outcome, Pa
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::solid::TriMesh;
-use lacuna_tests::support::inside::contains;
+use lacuna_tests::support::inside;
 use lacuna_tests::support::random::{Pieces, Random};
 
 /// Rounding of the brute-force distance itself, at coordinates of tens of mm.
@@ -63,6 +63,10 @@ fn corners(mesh: &TriMesh, triangle: &[u32; 3]) -> [DVec3; 3] {
 /// Signed volume, from the mesh alone.
 fn volume(mesh: &TriMesh) -> f64 {
     mesh.triangles.iter().map(|t| corners(mesh, t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}
+
+fn contains(mesh: &TriMesh, p: DVec3) -> bool {
+    inside::contains(&mesh.vertices, &mesh.triangles, p)
 }
 
 /// The sandwich, on the mesh's surface and around it.

@@ -54,7 +54,7 @@ pub(super) enum Command {
     Solidify(SolidifyArgs),
     /// Make points, wires or a surface within a tolerance.
     Evaluate(EvaluateArgs),
-    /// Measure box, area and volume as intervals; JSON on stdout.
+    /// Measure box, area, volume, centroid, inertia, mass and fractal dimension as intervals; JSON on stdout.
     Measure(MeasureArgs),
     /// Combine solids: what lies in any of them, in all, or in the first alone.
     Intersect(IntersectArgs),
@@ -190,6 +190,9 @@ pub(super) struct MeasureArgs {
     /// Radius of the ball, in mm: measure the solid instead of the shape itself.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: Option<f64>,
+    /// Density of the material, in g/cm3: the mass is told too.
+    #[arg(long, value_name = "G/CM3", value_parser = positive)]
+    pub(super) density: Option<f64>,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
 }

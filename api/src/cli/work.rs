@@ -38,7 +38,7 @@ pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Proble
 
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { radius_mm: args.radius, ..Params::new(args.tolerance) };
+    let params = Params { radius_mm: args.radius, density_g_cm3: args.density, ..Params::new(args.tolerance) };
     let job = job_with(JobKind::Measure, vec![input_of(&args.model)?], params, &[], &args.limits);
     let (outcome, _) = perform(&job, &args.limits, manner, |_, _| Ok(Vec::new()))?;
     print_json(&outcome.certificate)

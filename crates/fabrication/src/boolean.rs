@@ -10,7 +10,7 @@ use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{dilate, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::mass::volume;
+use lacuna_kernel::measure::mass::{dilated_difference, volume};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::solid::{Solid, SolidError, TriMesh, carried};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
@@ -148,13 +148,7 @@ fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result
         (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
     };
     let volume: f64 = meshes.iter().map(volume).sum();
-    // V(s) / s^3 does not increase (see `dilated_volume`): V(r + outer) - V(r - inner) <= (((r + outer) / (r - inner))^3 - 1) V(r - inner), and V(r - inner) <= V(M).
-    let least = radius_mm - inner;
-    let volume_error = match radius_mm {
-        0.0 => 0.0,
-        _ if least > 0.0 => (((radius_mm + outer) / least).powi(3) - 1.0) * volume,
-        _ => f64::INFINITY,
-    };
+    let volume_error = if *radius_mm > 0.0 { dilated_difference(volume, *radius_mm, inner, outer) } else { 0.0 };
     let statement = OperandStatement {
         name: input.name.clone(),
         radius_mm: *radius_mm,

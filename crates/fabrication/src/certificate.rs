@@ -2,8 +2,8 @@
 
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
 use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
-use lacuna_kernel::measure::AxisBox;
-use lacuna_kernel::measure::mass::{area, dilated_area, dilated_volume, mesh_measures, volume};
+use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
+use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
 use lacuna_kernel::solid::{Rounded, Solid, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
@@ -121,6 +121,21 @@ pub struct Certificate {
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub area_mm2: Option<Interval>,
+    /// Centroid of the exact shape: of a `measure` alone.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::vector_schema))]
+    pub centroid_mm: Option<[Interval; 3]>,
+    /// Inertia tensor of the exact shape about its centroid, at density 1, row by row: of a `measure` alone.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::matrix_schema))]
+    pub inertia_mm5: Option<[[Interval; 3]; 3]>,
+    /// Mass of the exact shape, where the job names a density.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub mass_g: Option<Interval>,
+    /// Fractal dimension of the exact shape: of a `measure` alone.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub dimension: Option<DimensionStatement>,
     /// Volume that the written mesh encloses.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub mesh_volume_mm3: Option<f64>,
@@ -138,6 +153,45 @@ pub struct Certificate {
     pub output_digests: std::collections::BTreeMap<String, String>,
     /// What the user should know, in words.
     pub warnings: Vec<String>,
+}
+
+/// How much is known of a dimension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum DimensionBasis {
+    /// The shape consists of points, segments, triangles or bodies.
+    Elementary,
+    /// The shape consists of similar copies whose convex hulls have no inner point in common, up to 1e-9 of their size: Moran's equation holds.
+    Similarities,
+    /// The shape consists of similar copies, of which that is not known: Moran's equation bounds from above.
+    OverlappingSimilarities,
+    /// Bounds from the number of cells and how they contract.
+    Contraction,
+}
+
+/// A fractal dimension.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct DimensionStatement {
+    /// Hausdorff dimension and upper box dimension lie between these.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub bounds: Interval,
+    /// How they are known.
+    pub basis: DimensionBasis,
+}
+
+impl DimensionStatement {
+    pub(crate) fn of(dimension: Dimension) -> Self {
+        let basis = match dimension.knowledge {
+            DimensionKnowledge::Elementary => DimensionBasis::Elementary,
+            DimensionKnowledge::Similarities => DimensionBasis::Similarities,
+            DimensionKnowledge::OverlappingSimilarities => DimensionBasis::OverlappingSimilarities,
+            DimensionKnowledge::Contraction => DimensionBasis::Contraction,
+        };
+        Self { bounds: [dimension.bounds.low, dimension.bounds.high], basis }
+    }
 }
 
 /// A solid that was combined from several. `inner_bound_mm` and `outer_bound_mm` say how far inputs are eroded or dilated in the two solids that the result lies
@@ -243,6 +297,26 @@ impl From<&CriticalRadius> for CriticalRadiusStatement {
 }
 
 impl Certificate {
+    /// Adds centroid, inertia and mass of the exact shape, which differs from what the mesh encloses by a volume of `difference` at most, within `bounds`.
+    ///
+    /// With the mesh's centroid as the origin, no point of either is farther than R: first moments differ by R `difference` at most, second ones by R^2 times that.
+    pub(crate) fn state_mass(&mut self, mesh: &TriMesh, difference: f64, bounds: &AxisBox, density_g_cm3: Option<f64>) {
+        let Some(MassProperties { volume, centroid, inertia }) = mass_properties(mesh) else { return };
+        let reach = (0..3)
+            .map(|axis| (bounds.high[axis].high - centroid[axis]).max(centroid[axis] - bounds.low[axis].low).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let difference = difference + ROUNDING * volume;
+        if difference < volume {
+            let shift = reach * difference / (volume - difference) + ROUNDING * (reach + centroid.length());
+            let spread = reach * reach * difference + (volume + difference) * shift * shift + ROUNDING * volume * reach * reach;
+            self.centroid_mm = Some(centroid.to_array().map(|x| [x - shift, x + shift]));
+            self.inertia_mm5 = Some(inertia.map(|row| row.map(|x| [x - spread, x + spread])));
+        }
+        // 1 cm^3 is 1000 mm^3.
+        self.mass_g = self.volume_mm3.zip(density_g_cm3).map(|(volume, density)| volume.map(|v| v * 1e-3 * density));
+    }
+
     /// Adds what was found of the topology at radii nearby, `reached` around the radius.
     pub(crate) fn state_stability(&mut self, found: &Stability, radius: Radius, reached: Tolerance) {
         self.topology_stable = match found.verdict {
@@ -497,6 +571,14 @@ mod wire {
 
     pub(super) fn interval_schema() -> RefOr<Schema> {
         interval().into()
+    }
+
+    pub(super) fn vector_schema() -> RefOr<Schema> {
+        array_of(interval(), 3).into()
+    }
+
+    pub(super) fn matrix_schema() -> RefOr<Schema> {
+        array_of(array_of(interval(), 3), 3).into()
     }
 
     pub(super) fn box_schema() -> RefOr<Schema> {

@@ -41,6 +41,8 @@ pub struct Params {
     pub radius_mm: Option<f64>,
     /// What an `intersect` leaves of its inputs.
     pub operation: Option<Operation>,
+    /// Density in g/cm^3, for the mass in a `measure`.
+    pub density_g_cm3: Option<f64>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
     pub normals: bool,
     /// Whether a solid has no more triangles than its bound needs: else it has all of the lattice.
@@ -53,7 +55,7 @@ impl Params {
     /// A tolerance, and everything else as where a document says nothing.
     #[must_use]
     pub fn new(tolerance_mm: f64) -> Self {
-        Self { tolerance_mm, radius_mm: None, operation: None, normals: false, simplify: true, stability: false }
+        Self { tolerance_mm, radius_mm: None, operation: None, density_g_cm3: None, normals: false, simplify: true, stability: false }
     }
 }
 

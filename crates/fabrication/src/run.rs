@@ -4,12 +4,14 @@ use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refi
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
 use lacuna_kernel::dilation::{DilationError, dilate, dilate_unsimplified, predict, stability};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::{AxisBox, bounding_box};
+use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
+use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
 use lacuna_kernel::model::{Finding, Lowered, Model};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
+use crate::certificate::DimensionStatement;
 use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, boolean, certificate};
 
@@ -197,11 +199,21 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         }
         (JobKind::Measure | JobKind::Intersect, Some(radius)) => {
             let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
-            Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_dilation(attractor, &dilation, radius, tolerance) })
+            let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+            let mesh = dilation.solid.mesh();
+            let difference = dilated_difference(volume(mesh), radius.mm(), dilation.inner_mm, dilation.outer_mm);
+            certificate.state_mass(mesh, difference, &dilation.bounds.grown(radius.mm() + dilation.outer_mm), job.params.density_g_cm3);
+            certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
+            Ok(Outcome { geometry: Geometry::None, certificate })
         }
         (JobKind::Measure | JobKind::Intersect, None) => {
             let bounds = bounding_box(attractor, budget)?;
-            Ok(Outcome { geometry: Geometry::None, certificate: certificate::of_shape(attractor, &bounds, tolerance) })
+            let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
+            certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
+            if let Some((mesh, true)) = mesh_of(attractor) {
+                certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
+            }
+            Ok(Outcome { geometry: Geometry::None, certificate })
         }
     }
 }

@@ -297,10 +297,20 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         None => None,
     };
     let operation = operation(walker, &members, kind)?;
+    let density = members.get("density_g_cm3").map(|place| match kind {
+        Some(kind) if kind != JobKind::Measure => {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+                "only measure takes \"density_g_cm3\"; remove it, or ask for the kind \"measure\"".into()
+            });
+            None
+        }
+        _ => walker.positive(place, "a density in g/cm3"),
+    });
+    let density_g_cm3 = stated(density)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
-    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, normals, simplify, stability })
+    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, density_g_cm3, normals, simplify, stability })
 }
 
 /// The operation, which intersect needs and no other kind takes.

@@ -261,6 +261,7 @@ object! {
         .put("tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
         .put_some("operation", params.operation.as_ref())?
+        .put_some("density_g_cm3", params.density_g_cm3.map(Number).as_ref())?
         .put_if(params.normals, "normals", &true)?
         .put_if(!params.simplify, "simplify", &false)?
         .put_if(params.stability, "stability", &true)?;

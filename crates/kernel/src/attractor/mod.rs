@@ -365,6 +365,11 @@ impl Attractor {
         self.precisions[state.index()].as_ref()
     }
 
+    /// Whether the attractor of a state is proven to be connected.
+    pub(crate) fn is_proven_connected(&self, state: StateId) -> bool {
+        self.connected[state.index()].is_some()
+    }
+
     /// Whether cells of a state may be needles: it is proven connected, and its cells are of different proportions.
     pub(crate) fn has_needles(&self, state: StateId) -> bool {
         let varies = matches!(self.bound(state), StateBound::Frame { similar: false, .. });

@@ -1,12 +1,13 @@
 //! The box of an attractor, to any precision, by best-first expansion of cells per direction: the support
 //! function of a graph-directed set is the maximum of its children's.
 
-use crate::attractor::cell::{Cell, ControlPoint, Site, child_points};
+use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, dot};
 use crate::attractor::trim::{TrimmedSurface, Window};
 use crate::attractor::{Attractor, StateBound};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
+use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -45,6 +46,10 @@ impl AxisBox {
     pub fn diagonal(&self) -> f64 {
         (0..3).map(|axis| (self.high[axis].high - self.low[axis].low).powi(2)).sum::<f64>().sqrt()
     }
+}
+
+fn length(direction: &Point) -> f64 {
+    dot(direction, direction).sqrt()
 }
 
 struct Branch {
@@ -88,18 +93,28 @@ pub fn bounding_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, S
     let mut ends = [Interval { low: 0.0, high: 0.0 }; 6];
     for (index, end) in ends.iter_mut().enumerate() {
         let (axis, sign) = (index / 2, if index % 2 == 0 { -1.0 } else { 1.0 });
-        let support = support(attractor, axis, sign, budget)?;
+        let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
+        let support = support(attractor, &direction, budget)?;
         *end = Interval::new(sign * support.low, sign * support.high);
     }
     Ok(AxisBox { low: [ends[0], ends[2], ends[4]], high: [ends[1], ends[3], ends[5]] })
 }
 
-/// sup of `sign * x[axis]` over the attractor.
-fn support(attractor: &Attractor, axis: usize, sign: f64, budget: &Budget) -> Result<Interval, Stopped> {
-    let mut heap = BinaryHeap::new();
+/// [least, largest] of x . direction over the attractor, each an interval that contains it, in mm for a direction of length 1.
+///
+/// # Errors
+/// [`Stopped`] when the budget's token was fired.
+pub fn extent_along(attractor: &Attractor, direction: DVec3, budget: &Budget) -> Result<[Interval; 2], Stopped> {
+    let least = support(attractor, &(-direction).to_array(), budget)?;
+    let largest = support(attractor, &direction.to_array(), budget)?;
+    Ok([Interval::new(-least.high, -least.low), largest])
+}
+
+/// sup of x . direction over the attractor.
+fn support(attractor: &Attractor, direction: &Point, budget: &Budget) -> Result<Interval, Stopped> {
+    let mut search = Search::new(attractor, direction);
     let ends = attractor.trimmed().iter().flat_map(TrimmedSurface::loop_points);
-    let mut reached = ends.map(|point| sign * point[axis]).fold(f64::NEG_INFINITY, f64::max);
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    search.reached = ends.map(|point| dot(direction, &point)).fold(f64::NEG_INFINITY, f64::max);
     for (index, root) in attractor.roots().iter().enumerate() {
         if index % 4096 == 0 {
             budget.cancel.check()?;
@@ -108,62 +123,114 @@ fn support(attractor: &Attractor, axis: usize, sign: f64, budget: &Budget) -> Re
         if window.as_ref().is_some_and(Window::is_outside) {
             continue;
         }
-        let cell = attractor.root_cell(index);
-        let (floor, bound) = cell_support(attractor, &cell, &root.points, axis, sign);
+        search.start(attractor.root_cell(index), root.points.clone(), window);
+    }
+    search.run(budget)
+}
+
+/// sup of x . direction over a cell that is not cut along loops.
+pub(super) fn support_of_cell(
+    attractor: &Attractor,
+    cell: Cell,
+    points: Vec<ControlPoint>,
+    direction: &Point,
+    budget: &Budget,
+) -> Result<Interval, Stopped> {
+    let mut search = Search::new(attractor, direction);
+    search.start(cell, points, None);
+    search.run(budget)
+}
+
+/// Best first through the cells that may attain the supremum.
+struct Search<'a> {
+    attractor: &'a Attractor,
+    direction: &'a Point,
+    heap: BinaryHeap<Branch>,
+    /// Some point of the shape attains this.
+    reached: f64,
+    low: f64,
+    high: f64,
+    /// What rounding is relative to: products that a sum may cancel.
+    largest_term: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(attractor: &'a Attractor, direction: &'a Point) -> Self {
+        Self {
+            attractor,
+            direction,
+            heap: BinaryHeap::new(),
+            reached: f64::NEG_INFINITY,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            largest_term: 0.0,
+        }
+    }
+
+    fn start(&mut self, cell: Cell, points: Vec<ControlPoint>, window: Option<Window>) {
+        let (floor, bound) = cell_support(self.attractor, &cell, &points, self.direction);
         if window.as_ref().is_none_or(Window::is_inside) {
-            reached = reached.max(floor);
+            self.reached = self.reached.max(floor);
         }
-        low = low.min(cell.ball.centre[axis] - cell.ball.radius);
-        high = high.max(cell.ball.centre[axis] + cell.ball.radius);
+        let (centre, radius) = (dot(self.direction, &cell.ball.centre), cell.ball.radius * length(self.direction));
+        self.low = self.low.min(centre - radius);
+        self.high = self.high.max(centre + radius);
+        let terms = (0..3).map(|axis| self.direction[axis].abs() * (cell.ball.centre[axis].abs() + cell.ball.radius));
+        self.largest_term = self.largest_term.max(terms.sum());
         // Cells that cannot win are not stored; later ones may still raise `reached`.
-        if bound > reached {
-            heap.push(Branch { bound, cell, points: root.points.clone(), depth: 0, window });
+        if bound > self.reached {
+            self.heap.push(Branch { bound, cell, points, depth: 0, window });
         }
     }
-    let width = RELATIVE_WIDTH * (high - low).max(f64::MIN_POSITIVE);
-    let moved = attractor.trimmed().iter().map(TrimmedSurface::moved_mm).fold(0.0, f64::max);
-    let rounding = 1e-12 * low.abs().max(high.abs()) + moved;
-    let mut expansions = 0;
-    let mut bound = reached;
-    while let Some(branch) = heap.pop() {
-        bound = branch.bound.max(reached);
-        expansions += 1;
-        if bound - reached <= width || expansions > EXPANSIONS || branch.depth > 400 {
-            break;
-        }
-        if expansions % 256 == 0 {
-            budget.cancel.check()?;
-        }
-        let state = attractor.state_of(&branch.cell);
-        for (index, transition) in state.transitions.iter().enumerate() {
-            let window = branch.window.as_ref().and_then(|window| attractor.child_window(branch.cell.root as usize, window, index));
-            if window.as_ref().is_some_and(Window::is_outside) {
-                continue;
+
+    fn run(self, budget: &Budget) -> Result<Interval, Stopped> {
+        let Self { attractor, direction, mut heap, mut reached, low, high, largest_term } = self;
+        let width = RELATIVE_WIDTH * (high - low).max(f64::MIN_POSITIVE);
+        let moved = attractor.trimmed().iter().map(TrimmedSurface::moved_mm).fold(0.0, f64::max);
+        let rounding = 1e-12 * largest_term + moved;
+        let mut expansions = 0;
+        let mut bound = reached;
+        while let Some(branch) = heap.pop() {
+            bound = branch.bound.max(reached);
+            expansions += 1;
+            if bound - reached <= width || expansions > EXPANSIONS || branch.depth > 400 {
+                break;
             }
-            let mut points = vec![[0.0; 4]; transition.operator.columns()];
-            child_points(&branch.points, &transition.operator, &mut points);
-            let child = attractor.child_cell(&branch.cell, index, &points);
-            let (floor, ceiling) = cell_support(attractor, &child, &points, axis, sign);
-            match &window {
-                Some(window) if !window.is_inside() => {
-                    reached = attractor.window_points(&child, window).map(|point| sign * point[axis]).fold(reached, f64::max);
+            if expansions % 256 == 0 {
+                budget.cancel.check()?;
+            }
+            let state = attractor.state_of(&branch.cell);
+            for (index, transition) in state.transitions.iter().enumerate() {
+                let window = branch.window.as_ref().and_then(|window| attractor.child_window(branch.cell.root as usize, window, index));
+                if window.as_ref().is_some_and(Window::is_outside) {
+                    continue;
                 }
-                _ => reached = reached.max(floor),
+                let mut points = vec![[0.0; 4]; transition.operator.columns()];
+                child_points(&branch.points, &transition.operator, &mut points);
+                let child = attractor.child_cell(&branch.cell, index, &points);
+                let (floor, ceiling) = cell_support(attractor, &child, &points, direction);
+                match &window {
+                    Some(window) if !window.is_inside() => {
+                        reached = attractor.window_points(&child, window).map(|point| dot(direction, &point)).fold(reached, f64::max);
+                    }
+                    _ => reached = reached.max(floor),
+                }
+                if ceiling > reached {
+                    heap.push(Branch { bound: ceiling.min(branch.bound), cell: child, points, depth: branch.depth + 1, window });
+                }
             }
-            if ceiling > reached {
-                heap.push(Branch { bound: ceiling.min(branch.bound), cell: child, points, depth: branch.depth + 1, window });
-            }
+            bound = reached;
         }
-        bound = reached;
+        Ok(Interval { low: reached - rounding, high: bound.max(reached) + rounding })
     }
-    Ok(Interval { low: reached - rounding, high: bound.max(reached) + rounding })
 }
 
 /// [attained by some point of the cell, bound of all]: the ball, or the hull of control points when it
 /// holds and is lower; simplices are exact, chords attain their ends.
-fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axis: usize, sign: f64) -> (f64, f64) {
-    let centre = sign * cell.ball.centre[axis];
-    let (mut floor, mut ceiling) = (centre - cell.ball.radius, centre + cell.ball.radius);
+fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], direction: &Point) -> (f64, f64) {
+    let (centre, radius) = (dot(direction, &cell.ball.centre), cell.ball.radius * length(direction));
+    let along = |point: &ControlPoint| dot(direction, &[point[0], point[1], point[2]]);
+    let (mut floor, mut ceiling) = (centre - radius, centre + radius);
     let state = attractor.state_of(cell);
     let mut attain = |site: Site| {
         let corners: &[[f64; 3]] = match &site {
@@ -171,7 +238,7 @@ fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axi
             Site::Segment(ends) => ends,
             Site::Triangle(corners) => corners,
         };
-        floor = corners.iter().map(|x| sign * x[axis]).fold(floor, f64::max);
+        floor = corners.iter().map(|x| dot(direction, x)).fold(floor, f64::max);
     };
     if matches!(state.leaf, LeafPrimitive::Simplex | LeafPrimitive::Chord(_)) {
         attractor.emit(cell, points, &mut attain);
@@ -179,25 +246,24 @@ fn cell_support(attractor: &Attractor, cell: &Cell, points: &[ControlPoint], axi
     match attractor.bound(cell.state) {
         StateBound::Hull { margin, .. } if *margin == 0.0 => {
             let rational = attractor.roots()[cell.root as usize].rational;
-            let project = |point: &ControlPoint| sign * if rational { point[axis] / point[3] } else { point[axis] };
+            let project = |point: &ControlPoint| if rational { along(point) / point[3] } else { along(point) };
             ceiling = ceiling.min(points.iter().map(project).fold(f64::NEG_INFINITY, f64::max));
         }
         StateBound::Hull { margin, .. } => {
             // The proof of the margin holds in every coordinate: x lies within margin times their spread of the control
             // points' interval. Flat shapes are exact at once here too.
             if !attractor.roots()[cell.root as usize].rational {
-                let (least, most) = points
-                    .iter()
-                    .map(|point| sign * point[axis])
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
+                let (least, most) =
+                    points.iter().map(along).fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(x), most.max(x)));
                 floor = floor.max(least - margin * (most - least));
                 ceiling = ceiling.min(most + margin * (most - least));
             }
         }
         StateBound::Frame { low, high, .. } => {
-            let (mut least, mut most) = (sign * points[0][axis], sign * points[0][axis]);
+            let (mut least, mut most) = (along(&points[0]), along(&points[0]));
             for j in 0..3 {
-                let entry = sign * (points[j + 1][axis] - points[0][axis]);
+                let edge: Point = std::array::from_fn(|axis| points[j + 1][axis] - points[0][axis]);
+                let entry = dot(direction, &edge);
                 least += (entry * low[j]).min(entry * high[j]);
                 most += (entry * low[j]).max(entry * high[j]);
             }

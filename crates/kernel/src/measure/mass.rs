@@ -56,10 +56,77 @@ pub fn dilated_area(volume: Interval, radius: f64) -> Interval {
     Interval { low, high: 3.0 * volume.high / radius * (1.0 + ROUNDING) }
 }
 
+/// The volume between D_r and a mesh M with D(r - inner) in M in D(r + outer) is at most this, in mm^3; infinite when inner reaches r.
+///
+/// Both lie between D(r - inner) and D(r + outer), and V(r + outer) <= ((r + outer) / (r - inner))^3 V(r - inner), see [`dilated_volume`], with
+/// V(r - inner) <= V(M).
+#[must_use]
+pub fn dilated_difference(mesh_volume: f64, radius: f64, inner: f64, outer: f64) -> f64 {
+    if inner >= radius {
+        return f64::INFINITY;
+    }
+    (((radius + outer) / (radius - inner)).powi(3) - 1.0) * mesh_volume * (1.0 + ROUNDING)
+}
+
+/// Volume, centroid and inertia of a body of density 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassProperties {
+    /// In mm^3.
+    pub volume: f64,
+    /// In mm.
+    pub centroid: DVec3,
+    /// The inertia tensor about the centroid: integral of |x|^2 1 - x x^T, row by row, in mm^5.
+    pub inertia: [[f64; 3]; 3],
+}
+
+/// Of what a closed mesh encloses: sums over the tetrahedra of its triangles with its first vertex as the origin. For a tetrahedron with corners 0, a, b, c, of volume v:
+/// integral of x = v (a + b + c) / 4, and of x x^T = v (a a^T + b b^T + c c^T + s s^T) / 20 with s = a + b + c. `None` without volume. Cost: linear.
+#[must_use]
+pub fn mass_properties(mesh: &TriMesh) -> Option<MassProperties> {
+    let &origin = mesh.vertices.first()?;
+    let det = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c)) / 6.0;
+    let first = |axis: usize| sum(mesh, |a, b, c| det(a - origin, b - origin, c - origin) * (a + b + c - 3.0 * origin)[axis]) / 4.0;
+    let volume = volume(mesh);
+    if volume <= 0.0 {
+        return None;
+    }
+    let offset = DVec3::new(first(0), first(1), first(2)) / volume;
+    let second = |i: usize, j: usize| {
+        let about_origin = sum(mesh, |a, b, c| {
+            let (a, b, c) = (a - origin, b - origin, c - origin);
+            let s = a + b + c;
+            det(a, b, c) * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j])
+        }) / 20.0;
+        about_origin - volume * offset[i] * offset[j]
+    };
+    let squares = [second(0, 0), second(1, 1), second(2, 2)];
+    let total: f64 = squares.iter().sum();
+    let (xy, xz, yz) = (second(0, 1), second(0, 2), second(1, 2));
+    let inertia = [[total - squares[0], -xy, -xz], [-xy, total - squares[1], -yz], [-xz, -yz, total - squares[2]]];
+    Some(MassProperties { volume, centroid: origin + offset, inertia })
+}
+
 /// Volume and area of a shape that is one mesh of triangles: of the solid and its surface when the mesh
 /// stands for a solid, else no volume and the sheet's area (one side). `None` for other shapes.
 #[must_use]
 pub fn mesh_measures(attractor: &Attractor) -> Option<(Interval, Interval)> {
+    let (mesh, is_solid) = mesh_of(attractor)?;
+    let around = |value: f64| Interval::new(value * (1.0 - ROUNDING), value * (1.0 + ROUNDING));
+    // Terms may cancel: the rounding is that of their sizes.
+    let origin = mesh.vertices.first().copied().unwrap_or_default();
+    let size = sum(&mesh, |a, b, c| (a - origin).length() * (b - origin).length() * (c - origin).length());
+    let rounding = 16.0 * f64::EPSILON * size;
+    let enclosed = if is_solid {
+        Interval { low: volume(&mesh) - rounding, high: volume(&mesh) + rounding }
+    } else {
+        Interval { low: 0.0, high: 0.0 }
+    };
+    Some((enclosed, around(area(&mesh))))
+}
+
+/// The triangles of a shape that is one mesh of them, unjoined, and whether it stands for the solid that it bounds.
+#[must_use]
+pub fn mesh_of(attractor: &Attractor) -> Option<(TriMesh, bool)> {
     let roots = attractor.roots();
     let triangle = |state| {
         matches!(attractor.automaton().state(state).leaf, LeafPrimitive::Simplex) && attractor.automaton().state(state).dimension == 3
@@ -74,14 +141,5 @@ pub fn mesh_measures(attractor: &Attractor) -> Option<(Interval, Interval)> {
         mesh.vertices.extend(root.points.iter().map(|point| DVec3::new(point[0], point[1], point[2])));
         mesh.triangles.push([first, first + 1, first + 2]);
     }
-    let around = |value: f64| Interval::new(value * (1.0 - ROUNDING), value * (1.0 + ROUNDING));
-    // Terms may cancel: the rounding is that of their sizes.
-    let origin = mesh.vertices.first().copied().unwrap_or_default();
-    let size = sum(&mesh, |a, b, c| (a - origin).length() * (b - origin).length() * (c - origin).length());
-    let rounding = 16.0 * f64::EPSILON * size;
-    let enclosed = match solid {
-        Some(_) => Interval { low: volume(&mesh) - rounding, high: volume(&mesh) + rounding },
-        None => Interval { low: 0.0, high: 0.0 },
-    };
-    Some((enclosed, around(area(&mesh))))
+    Some((mesh, solid.is_some()))
 }

@@ -1,10 +1,12 @@
 //! Measures of shapes and solids, as intervals that are proven.
 
 pub mod bounds;
+pub mod dimension;
 pub mod mass;
 pub mod triangle;
 
-pub use bounds::{AxisBox, bounding_box};
+pub use bounds::{AxisBox, bounding_box, extent_along};
+pub use dimension::{Dimension, DimensionKnowledge, dimension};
 
 /// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]

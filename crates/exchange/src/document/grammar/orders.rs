@@ -85,6 +85,7 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), or in the first and in none of the others (difference). Required by intersect alone.",
             || one_of_words(&OPERATIONS.map(|(word, _)| word)),
         ),
+        optional("density_g_cm3", "The density of the material, in g/cm3, above zero, for the mass: for measure alone.", positive),
         optional(
             "normals",
             "Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent.",

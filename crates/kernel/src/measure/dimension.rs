@@ -1,0 +1,421 @@
+//! The fractal dimension of a shape: exactly for graph-directed similarities, else between bounds.
+//!
+//! The cells of a state are images of one of them. Where the control points of a child, and of the cell of its state that was met first, have proportional Gram
+//! matrices of edges, the map between them is a similarity, and its ratio c is the root of their quotient. Let M(s) have the entries sum of c^s over the transitions
+//! from one state to another. The attractor can be covered by cells of diameter d and less in a number below a multiple of d^-s when rho(M(s)) <= 1, so
+//! the s with rho(M(s)) = 1, the largest over the strongly connected components, bounds the upper box dimension from above; where the open set condition holds
+//! it is the Hausdorff dimension, and all dimensions between are equal to it (Moran, 1946; Hutchinson, 1981; Mauldin and Williams, "Hausdorff dimension in graph
+//! directed constructions", 1988).
+//!
+//! The open sets tried are the interiors of the cells' convex hulls. Children lie in the hull of their parent, so all that is asked is that hulls of siblings
+//! have no inner point in common: a direction along which one ends where the next begins, which are suprema of linear functions over the shape.
+//!
+//! In all other cases: cells at level n have diameters below a multiple of rate^n, with the bound of the joint spectral radius as the rate, and their number
+//! grows like the spectral radius of the automaton's graph; so the upper box dimension is at most the quotient of the logarithms.
+
+use super::Interval;
+use super::bounds::support_of_cell;
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Cell, ControlPoint, Point, child_points, cross, dot, subtract};
+use crate::automaton::{LeafPrimitive, StateId};
+use crate::budget::{Budget, Stopped};
+use std::collections::{BTreeSet, HashMap};
+
+/// How much of a dimension is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DimensionKnowledge {
+    /// Hausdorff and box dimension are this number: the shape consists of simplices.
+    Elementary,
+    /// Hausdorff and box dimension are this number: the shape consists of similar copies, and their convex hulls have no inner points in common,
+    /// up to [`SEPARATION`] of their size.
+    Similarities,
+    /// Bounds: the shape consists of similar copies that may overlap, or whose hulls do.
+    OverlappingSimilarities,
+    /// Bounds: cells are not similar to each other.
+    Contraction,
+}
+
+/// The dimension of a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dimension {
+    /// Hausdorff dimension and upper box dimension lie between.
+    pub bounds: Interval,
+    /// Why.
+    pub knowledge: DimensionKnowledge,
+}
+
+impl Dimension {
+    /// That of every body.
+    pub const SOLID: Self = Self { bounds: Interval { low: 3.0, high: 3.0 }, knowledge: DimensionKnowledge::Elementary };
+}
+
+/// Hulls that overlap by less than this share of their size count as apart.
+pub const SEPARATION: f64 = 1e-9;
+/// How far Gram matrices may be from proportional, relative to their size.
+const SIMILAR: f64 = 1e-9;
+/// What a root found from ratios in double precision may be off.
+const ROUNDING: f64 = 1e-13;
+/// States with similarities of their own, at most: their matrices are dense.
+const MOST_STATES: usize = 300;
+/// Transitions of a state whose hulls are compared in pairs, at most.
+const MOST_SIBLINGS: usize = 64;
+/// Steps of power iteration.
+const STEPS: usize = 2_000;
+
+/// The dimension of an attractor: the largest of its root cells'. Roots of the same state and similar control points count once.
+///
+/// Cost: linear in roots and transitions; for a state, two suprema over cells for each pair of at most [`MOST_SIBLINGS`] transitions.
+///
+/// # Errors
+/// [`Stopped`].
+pub fn dimension(attractor: &Attractor, budget: &Budget) -> Result<Dimension, Stopped> {
+    let mut result = elementary(0.0);
+    let mut known: Vec<(StateId, Vec<f64>, Dimension)> = Vec::new();
+    let mut growths: HashMap<StateId, f64> = HashMap::new();
+    for (index, root) in attractor.roots().iter().enumerate() {
+        budget.cancel.check()?;
+        let points = projected(&root.points, root.rational);
+        let state = attractor.automaton().state(root.state);
+        if root.solid.is_some() {
+            return Ok(Dimension::SOLID);
+        }
+        if state.transitions.is_empty() && matches!(state.leaf, LeafPrimitive::Simplex) {
+            result = larger(result, elementary(f64::from(rank(&points))));
+            continue;
+        }
+        let edges = gram(&points);
+        if let Some(&(.., found)) = known.iter().find(|(state, other, _)| *state == root.state && ratio(other, &edges).is_some()) {
+            result = larger(result, found);
+            continue;
+        }
+        let growth = *growths.entry(root.state).or_insert_with(|| growth(attractor, root.state));
+        let found = of_root(attractor, index, growth, budget)?;
+        if known.len() < MOST_STATES {
+            known.push((root.state, edges, found));
+        }
+        result = larger(result, found);
+    }
+    Ok(result)
+}
+
+fn elementary(value: f64) -> Dimension {
+    Dimension { bounds: Interval { low: value, high: value }, knowledge: DimensionKnowledge::Elementary }
+}
+
+/// The dimension of a union; what is known of it is known of the part that decides.
+fn larger(a: Dimension, b: Dimension) -> Dimension {
+    let bounds = Interval { low: a.bounds.low.max(b.bounds.low), high: a.bounds.high.max(b.bounds.high) };
+    let decides = if b.bounds.high > a.bounds.high { b } else { a };
+    Dimension { bounds, knowledge: decides.knowledge }
+}
+
+fn of_root(attractor: &Attractor, index: usize, growth: f64, budget: &Budget) -> Result<Dimension, Stopped> {
+    let root = &attractor.roots()[index];
+    let general = by_contraction(attractor, index, growth, budget)?;
+    if root.rational || attractor.root_window(index).is_some() {
+        return Ok(general);
+    }
+    let Some(system) = System::new(attractor, index) else { return Ok(general) };
+    let mut exponent = 0.0_f64;
+    let mut highest = 0.0_f64;
+    for component in system.components() {
+        let Some(found) = system.exponent(&component) else { return Ok(general) };
+        (exponent, highest) = (exponent.max(found.low), highest.max(found.high));
+    }
+    let similarity = Interval { low: (exponent - ROUNDING).max(0.0), high: highest + ROUNDING };
+    if system.is_separated(attractor, budget)? {
+        return Ok(Dimension { bounds: similarity, knowledge: DimensionKnowledge::Similarities });
+    }
+    let bounds = Interval { low: general.bounds.low.min(similarity.high), high: similarity.high.min(general.bounds.high) };
+    Ok(Dimension { bounds, knowledge: DimensionKnowledge::OverlappingSimilarities })
+}
+
+/// Bounds for every shape: of the cells' number and size, of the space, and 1 for what is connected and not a point.
+fn by_contraction(attractor: &Attractor, index: usize, growth: f64, budget: &Budget) -> Result<Dimension, Stopped> {
+    let root = &attractor.roots()[index];
+    let rate = attractor.contraction().upper;
+    let spread = f64::from(rank(&projected(&root.points, root.rational)));
+    let covering = match growth {
+        _ if growth <= 1.0 => 0.0,
+        _ if rate > 0.0 => growth.ln() / -rate.ln() * (1.0 + 1e-12),
+        _ => 0.0,
+    };
+    let high = covering.min(spread);
+    let mut low = 0.0;
+    if high > 0.0 && attractor.is_proven_connected(root.state) && attractor.root_window(index).is_none() {
+        for axis in 0..3 {
+            let mut ends = [0.0; 2];
+            for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
+                let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
+                *end = support_of_cell(attractor, attractor.root_cell(index), root.points.clone(), &direction, budget)?.low;
+            }
+            if ends[0] + ends[1] > 0.0 {
+                low = 1.0;
+            }
+        }
+    }
+    Ok(Dimension { bounds: Interval { low, high: high.max(low) }, knowledge: DimensionKnowledge::Contraction })
+}
+
+/// The spectral radius of the graph of the states that are reached, or a larger number: the number of cells at level n is below a multiple of its powers.
+fn growth(attractor: &Attractor, start: StateId) -> f64 {
+    let states = attractor.automaton().states();
+    let reached = reached(attractor, start);
+    let mut number = vec![usize::MAX; states.len()];
+    for (place, state) in reached.iter().enumerate() {
+        number[state.index()] = place;
+    }
+    let edges: Vec<Vec<usize>> = reached
+        .iter()
+        .map(|&state| attractor.automaton().state(state).transitions.iter().map(|t| number[t.to.index()]).collect())
+        .collect();
+    // Collatz and Wielandt: with a positive vector v, the largest quotient (A v)_i / v_i is at least the radius.
+    let mut v = vec![1.0_f64; reached.len()];
+    let mut best = f64::INFINITY;
+    for _ in 0..200 {
+        let next: Vec<f64> = edges.iter().map(|own| own.iter().map(|&to| v[to]).sum::<f64>()).collect();
+        best = next.iter().zip(&v).map(|(next, v)| next / v).fold(0.0, f64::max).min(best);
+        let largest = next.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        // A little of the old keeps every entry positive.
+        v = next.iter().zip(&v).map(|(next, v)| (next / largest + v * 1e-3).max(1e-300)).collect();
+    }
+    best
+}
+
+fn reached(attractor: &Attractor, start: StateId) -> Vec<StateId> {
+    let mut seen = vec![false; attractor.automaton().states().len()];
+    let mut open = vec![start];
+    let mut found = Vec::new();
+    seen[start.index()] = true;
+    while let Some(state) = open.pop() {
+        found.push(state);
+        for transition in &attractor.automaton().state(state).transitions {
+            if !std::mem::replace(&mut seen[transition.to.index()], true) {
+                open.push(transition.to);
+            }
+        }
+    }
+    found
+}
+
+fn projected(points: &[ControlPoint], rational: bool) -> Vec<Point> {
+    points.iter().map(|p| if rational { [p[0] / p[3], p[1] / p[3], p[2] / p[3]] } else { [p[0], p[1], p[2]] }).collect()
+}
+
+/// Scalar products of the edges from the first point, the upper triangle row by row.
+fn gram(points: &[Point]) -> Vec<f64> {
+    let edges: Vec<Point> = points[1..].iter().map(|point| subtract(point, &points[0])).collect();
+    (0..edges.len()).flat_map(|i| (i..edges.len()).map(move |j| (i, j))).map(|(i, j)| dot(&edges[i], &edges[j])).collect()
+}
+
+/// c, when the second Gram matrix is c^2 times the first; 0 for a point.
+fn ratio(first: &[f64], second: &[f64]) -> Option<f64> {
+    let size = |gram: &[f64]| gram.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    let (from, to) = (size(first), size(second));
+    if to == 0.0 {
+        return Some(0.0);
+    }
+    // Least squares: the sum over all entries has the least rounding.
+    let square = first.iter().zip(second).map(|(a, b)| a * b).sum::<f64>() / first.iter().map(|a| a * a).sum::<f64>();
+    let similar = from > 0.0 && first.iter().zip(second).all(|(a, b)| (b - square * a).abs() <= SIMILAR * to);
+    similar.then(|| square.sqrt())
+}
+
+/// The dimension of the points' affine hull.
+fn rank(points: &[Point]) -> u8 {
+    let Some(first) = points.first() else { return 0 };
+    let edges: Vec<Point> = points[1..].iter().map(|point| subtract(point, first)).collect();
+    let square = |x: &Point| dot(x, x);
+    let Some(longest) = edges.iter().max_by(|a, b| square(a).total_cmp(&square(b))).filter(|edge| square(edge) > 0.0) else { return 0 };
+    let scale = square(longest);
+    let normals: Vec<Point> = edges.iter().map(|edge| cross(longest, edge)).collect();
+    let Some(normal) = normals.iter().max_by(|a, b| square(a).total_cmp(&square(b))).filter(|n| square(n) > 1e-24 * scale * scale) else {
+        return 1;
+    };
+    2 + u8::from(edges.iter().any(|edge| dot(edge, normal).powi(2) > 1e-24 * square(normal) * scale))
+}
+
+/// A graph-directed system of similarities: a cell of every state, and the ratios between.
+struct System {
+    /// By the number of the state here: its first cell, and its control points.
+    cells: Vec<(Cell, Vec<ControlPoint>)>,
+    /// By state: number of the child's state, and ratio.
+    ratios: Vec<Vec<(usize, f64)>>,
+}
+
+impl System {
+    /// `None` when some child is not similar to the first cell of its state, or there are too many states.
+    fn new(attractor: &Attractor, root: usize) -> Option<Self> {
+        let mut numbers = vec![usize::MAX; attractor.automaton().states().len()];
+        let start = attractor.root_cell(root);
+        numbers[start.state.index()] = 0;
+        let mut system = Self { cells: vec![(start, attractor.roots()[root].points.clone())], ratios: Vec::new() };
+        let mut grams = vec![gram(&projected(&system.cells[0].1, false))];
+        while system.ratios.len() < system.cells.len() {
+            let (cell, points) = system.cells[system.ratios.len()].clone();
+            let state = attractor.state_of(&cell);
+            if state.transitions.is_empty() && !matches!(state.leaf, LeafPrimitive::Simplex) {
+                return None;
+            }
+            let mut own = Vec::with_capacity(state.transitions.len());
+            for (index, transition) in state.transitions.iter().enumerate() {
+                let mut child = vec![[0.0; 4]; transition.operator.columns()];
+                child_points(&points, &transition.operator, &mut child);
+                let edges = gram(&projected(&child, false));
+                let number = numbers[transition.to.index()];
+                if number != usize::MAX {
+                    own.push((number, ratio(&grams[number], &edges)?));
+                    continue;
+                }
+                let number = system.cells.len();
+                if number == MOST_STATES || edges.iter().all(|&x| x == 0.0) {
+                    return None;
+                }
+                numbers[transition.to.index()] = number;
+                own.push((number, 1.0));
+                system.cells.push((attractor.child_cell(&cell, index, &child), child));
+                grams.push(edges);
+            }
+            system.ratios.push(own);
+        }
+        Some(system)
+    }
+
+    /// States that reach each other, where something returns.
+    fn components(&self) -> Vec<Vec<usize>> {
+        let count = self.ratios.len();
+        let mut reaches = vec![vec![false; count]; count];
+        for (start, reaches) in reaches.iter_mut().enumerate() {
+            let mut open = vec![start];
+            while let Some(state) = open.pop() {
+                for &(to, ratio) in &self.ratios[state] {
+                    if ratio > 0.0 && !std::mem::replace(&mut reaches[to], true) {
+                        open.push(to);
+                    }
+                }
+            }
+        }
+        let with = |state: usize| (0..count).filter(|&other| reaches[state][other] && reaches[other][state]).collect::<Vec<_>>();
+        (0..count)
+            .filter(|&state| reaches[state][state])
+            .map(with)
+            .filter(|own| !own.is_empty())
+            .collect::<BTreeSet<_>>()
+            .into_iter()
+            .collect()
+    }
+
+    /// s with rho(M(s)) = 1 on a component, between two numbers where the radius is proven to be above and below 1.
+    fn exponent(&self, component: &[usize]) -> Option<Interval> {
+        // A ratio of 1 or more on a cycle cannot be: the automaton contracts. Single ratios may be.
+        let (mut low, mut high) = (0.0, 1.0);
+        if self.compare(component, low) == Some(std::cmp::Ordering::Equal) {
+            return Some(Interval { low: 0.0, high: 0.0 });
+        }
+        while self.compare(component, high) == Some(std::cmp::Ordering::Greater) {
+            (low, high) = (high, 2.0 * high);
+            if high > 1e3 {
+                return None;
+            }
+        }
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            match self.compare(component, middle) {
+                Some(std::cmp::Ordering::Greater) => low = middle,
+                Some(std::cmp::Ordering::Less) => high = middle,
+                // At the root up to rounding.
+                Some(std::cmp::Ordering::Equal) | None => return Some(Interval { low: middle - ROUNDING, high: middle + ROUNDING }),
+            }
+        }
+        Some(Interval { low, high })
+    }
+
+    /// How rho(M(s)) compares with 1 on a component: by the least and the largest quotient of (M + 1) v and v for a positive v (Collatz and Wielandt).
+    /// `None` when that is not settled after [`STEPS`].
+    fn compare(&self, component: &[usize], s: f64) -> Option<std::cmp::Ordering> {
+        let place = |state: usize| component.binary_search(&state).ok();
+        let rows: Vec<Vec<(usize, f64)>> = component
+            .iter()
+            .map(|&state| {
+                self.ratios[state].iter().filter_map(|&(to, c)| Some((place(to)?, if c > 0.0 { c.powf(s) } else { return None }))).collect()
+            })
+            .collect();
+        let mut v = vec![1.0_f64; component.len()];
+        for _ in 0..STEPS {
+            let next: Vec<f64> =
+                rows.iter().zip(&v).map(|(row, own)| own + row.iter().map(|&(to, weight)| weight * v[to]).sum::<f64>()).collect();
+            let quotients = || next.iter().zip(&v).map(|(next, v)| next / v);
+            let (least, largest) = (quotients().fold(f64::INFINITY, f64::min), quotients().fold(0.0, f64::max));
+            let error = 4.0 * f64::EPSILON * (1.0 + rows.iter().map(Vec::len).max().unwrap_or(0) as f64);
+            if least > 2.0 + error {
+                return Some(std::cmp::Ordering::Greater);
+            }
+            if largest < 2.0 - error {
+                return Some(std::cmp::Ordering::Less);
+            }
+            if largest - least <= error {
+                return Some(std::cmp::Ordering::Equal);
+            }
+            let scale = next.iter().copied().fold(0.0, f64::max);
+            v = next.iter().map(|x| x / scale).collect();
+        }
+        None
+    }
+
+    /// Whether the hulls of all siblings are apart but for their borders.
+    fn is_separated(&self, attractor: &Attractor, budget: &Budget) -> Result<bool, Stopped> {
+        for ((cell, points), ratios) in self.cells.iter().zip(&self.ratios) {
+            if ratios.len() > MOST_SIBLINGS {
+                return Ok(false);
+            }
+            let mut children: Vec<(Cell, Vec<ControlPoint>)> = Vec::with_capacity(ratios.len());
+            for (index, transition) in attractor.state_of(cell).transitions.iter().enumerate() {
+                let mut child = vec![[0.0; 4]; transition.operator.columns()];
+                child_points(points, &transition.operator, &mut child);
+                children.push((attractor.child_cell(cell, index, &child), child));
+            }
+            for (index, own) in children.iter().enumerate() {
+                for other in &children[..index] {
+                    if !are_apart(attractor, own, other, budget)? {
+                        return Ok(false);
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Whether a direction is found along which the hull of one cell ends where that of the other begins.
+fn are_apart(
+    attractor: &Attractor,
+    own: &(Cell, Vec<ControlPoint>),
+    other: &(Cell, Vec<ControlPoint>),
+    budget: &Budget,
+) -> Result<bool, Stopped> {
+    let between = subtract(&other.0.ball.centre, &own.0.ball.centre);
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for direction in std::iter::once(between).chain(axes) {
+        budget.cancel.check()?;
+        let length = dot(&direction, &direction).sqrt();
+        if length == 0.0 {
+            continue;
+        }
+        let (forth, back) = (direction.map(|x| x / length), direction.map(|x| -x / length));
+        let end = |(cell, points): &(Cell, Vec<ControlPoint>), direction: &Point| {
+            support_of_cell(attractor, *cell, points.clone(), direction, budget)
+        };
+        let first = [-end(own, &back)?.high, end(own, &forth)?.high];
+        let second = [-end(other, &back)?.high, end(other, &forth)?.high];
+        let size = (first[1] - first[0]).max(second[1] - second[0]);
+        let overlap = (first[1] - second[0]).min(second[1] - first[0]);
+        // What is flat across the direction is apart by name only.
+        if size > 1e3 * SEPARATION * own.0.ball.radius.max(other.0.ball.radius) && overlap <= SEPARATION * size {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}

@@ -1,0 +1,152 @@
+//! Dimensions, centroids and inertia against closed forms.
+
+use std::f64::consts::PI;
+
+use glam::{DMat3, DVec3};
+use lacuna_exchange::document::{DocumentLimits, read_model};
+use lacuna_exchange::library;
+use lacuna_fabrication::certificate::DimensionBasis;
+use lacuna_fabrication::{Certificate, Input, Job, JobKind, Params, run};
+use lacuna_kernel::budget::{Budget, Limits};
+use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
+
+fn measured(model: Model, params: Params) -> Certificate {
+    let inputs = vec![Input { name: "shape".into(), model, radius_mm: None }];
+    let job = Job { kind: JobKind::Measure, inputs, params, outputs: Vec::new(), limits: Limits::default() };
+    run(&job, &Budget::default()).unwrap().certificate
+}
+
+fn dimension(shape: Shape) -> ([f64; 2], DimensionBasis) {
+    let found = measured(Model { name: None, shape }, Params::new(0.01)).dimension.unwrap();
+    (found.bounds, found.basis)
+}
+
+fn document(text: &str) -> Shape {
+    read_model(text.as_bytes(), &DocumentLimits::default()).unwrap().shape
+}
+
+fn classic(name: &str) -> Shape {
+    document(library::find(name).unwrap().document)
+}
+
+#[track_caller]
+fn assert_exact(found: ([f64; 2], DimensionBasis), exact: f64) {
+    let ([low, high], basis) = found;
+    assert_eq!(basis, DimensionBasis::Similarities, "[{low}, {high}]");
+    assert!(low <= exact + 1e-15 && exact <= high + 1e-15 && high - low <= 1e-12, "{exact} is not in [{low}, {high}]");
+}
+
+fn similarities(maps: &[(f64, [f64; 3])]) -> Shape {
+    let maps = maps.iter().map(|&(scale, at)| AffineMap { linear: DMat3::from_diagonal(DVec3::splat(scale)), translation: DVec3::from(at) });
+    Shape::Ifs(Ifs { maps: maps.collect(), primitive: None, graph: None })
+}
+
+#[test]
+fn dimensions_of_moran() {
+    let third = 1.0 / 3.0;
+    // Cantor's set; ratios 1/2 and 1/4 (the golden ratio solves x + x^2 = 1); 1/2, 1/3, 1/6 fill the interval.
+    assert_exact(dimension(similarities(&[(third, [0.0; 3]), (third, [2.0 * third, 0.0, 0.0])])), 2.0_f64.ln() / 3.0_f64.ln());
+    let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+    assert_exact(dimension(similarities(&[(0.5, [0.0; 3]), (0.25, [0.75, 0.0, 0.0])])), golden.log2());
+    assert_exact(dimension(similarities(&[(0.5, [0.0; 3]), (third, [0.5, 0.0, 0.0]), (third / 2.0, [5.0 / 6.0, 0.0, 0.0])])), 1.0);
+    for (name, exact) in [
+        ("koch_curve", 4.0_f64.ln() / 3.0_f64.ln()),
+        ("sierpinski_triangle", 3.0_f64.log2()),
+        ("sierpinski_carpet", 8.0_f64.ln() / 3.0_f64.ln()),
+        ("menger_sponge", 20.0_f64.ln() / 3.0_f64.ln()),
+        ("sierpinski_tetrahedron", 2.0),
+    ] {
+        assert_exact(dimension(classic(name)), exact);
+    }
+}
+
+/// A = A / 2 u (B / 2 + 1 / 2), B = A / 2: log2 of the golden ratio (Mauldin and Williams).
+#[test]
+fn dimension_of_a_graph() {
+    let system = r#"{"lacuna": 1, "shape": {"family": "bcifs", "states": [
+        {"name": "A", "cell": "edge", "dimension": 2, "transitions": [
+            {"to": "A", "operator": [[1, 0.5], [0, 0.5]]}, {"to": "B", "operator": [[0.5, 0], [0.5, 1]]}]},
+        {"name": "B", "cell": "edge", "dimension": 2, "transitions": [{"to": "A", "operator": [[1, 0.5], [0, 0.5]]}]}],
+        "cells": [{"state": "A", "control_points": [[0, 0, 0], [3, 4, 0]]}]}}"#;
+    assert_exact(dimension(document(system)), f64::midpoint(1.0, 5.0_f64.sqrt()).log2());
+}
+
+#[test]
+fn dimensions_that_are_bounded() {
+    // The same map twice: a point, for which Moran's equation says 1.
+    let ([low, high], basis) = dimension(similarities(&[(0.5, [0.0; 3]), (0.5, [0.0; 3])]));
+    assert_eq!((low, basis), (0.0, DimensionBasis::OverlappingSimilarities));
+    assert!(high <= 1.0 + 1e-12);
+    // Levy's curve: similar copies whose hulls overlap; the equation says 2.
+    let ([low, high], basis) = dimension(classic("levy_curve"));
+    assert_eq!(basis, DimensionBasis::OverlappingSimilarities);
+    assert!(low >= 1.0 && (2.0..2.0 + 1e-9).contains(&high), "[{low}, {high}]");
+    // The fern: affine maps. No more than the plane, no less than nothing.
+    let ([low, high], basis) = dimension(classic("barnsley_fern"));
+    assert_eq!(basis, DimensionBasis::Contraction);
+    assert!(low <= high && high <= 2.0, "[{low}, {high}]");
+    let bezier = r#"{"lacuna": 1, "shape": {"family": "bezier_curve", "control_points": [[0,0,0],[1,2,0],[3,1,1],[4,0,0]]}}"#;
+    let ([_, high], _) = dimension(document(bezier));
+    assert!((high - 1.0).abs() < 1e-6, "{high}");
+}
+
+#[test]
+fn dimensions_of_meshes() {
+    let mesh = |faces: Vec<Vec<u32>>| {
+        let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Auto })
+    };
+    let tetrahedron = vec![vec![0, 2, 1], vec![0, 1, 3], vec![1, 2, 3], vec![2, 0, 3]];
+    for (faces, exact) in [(vec![vec![0], vec![1]], 0.0), (vec![vec![0, 1]], 1.0), (vec![vec![0, 1, 2], vec![3]], 2.0), (tetrahedron, 3.0)] {
+        assert_eq!(dimension(mesh(faces)), ([exact; 2], DimensionBasis::Elementary));
+    }
+}
+
+#[track_caller]
+fn assert_within(interval: [f64; 2], exact: f64, width: f64) {
+    assert!(interval[0] <= exact && exact <= interval[1], "{exact} is not in {interval:?}");
+    assert!(interval[1] - interval[0] <= width, "{interval:?} is wider than {width}");
+}
+
+#[test]
+fn mass_of_a_box_far_from_the_origin() {
+    let (low, size) = (DVec3::new(100.0, -50.0, 20.0), DVec3::new(2.0, 3.0, 5.0));
+    let vertices = (0..8).map(|code| low + DVec3::from_array(std::array::from_fn(|k| if code >> k & 1 == 1 { size[k] } else { 0.0 })));
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let shape = Shape::Mesh(PolygonMesh { vertices: vertices.collect(), faces: faces.map(|f| f.to_vec()).to_vec(), interior: Interior::Auto });
+    let found = measured(Model { name: None, shape }, Params { density_g_cm3: Some(2.7), ..Params::new(0.01) });
+    let centroid = found.centroid_mm.unwrap();
+    let inertia = found.inertia_mm5.unwrap();
+    let mass = size.x * size.y * size.z;
+    for axis in 0..3 {
+        assert_within(centroid[axis], (low + size / 2.0)[axis], 1e-6);
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        assert_within(inertia[axis][axis], mass * (size[u].powi(2) + size[v].powi(2)) / 12.0, 1e-5);
+        assert_within(inertia[axis][u], 0.0, 1e-5);
+    }
+    assert_within(found.mass_g.unwrap(), mass * 2.7e-3, 1e-6);
+}
+
+#[test]
+fn mass_of_a_ball_and_of_a_capsule() {
+    let points = |vertices: Vec<DVec3>| {
+        let faces = vec![(0..vertices.len() as u32).collect()];
+        Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Surface })
+    };
+    let (radius, at) = (2.0_f64, DVec3::new(1.0, 2.0, 3.0));
+    let params = || Params { radius_mm: Some(radius), ..Params::new(0.01) };
+    let found = measured(Model { name: None, shape: points(vec![at]) }, params());
+    let volume = 4.0 / 3.0 * PI * radius.powi(3);
+    for axis in 0..3 {
+        assert_within(found.centroid_mm.unwrap()[axis], at[axis], 0.3);
+        assert_within(found.inertia_mm5.unwrap()[axis][axis], 0.4 * volume * radius * radius, 0.2 * volume * radius * radius);
+    }
+    // A cylinder of length h between two half balls, along x.
+    let h = 6.0;
+    let found = measured(Model { name: None, shape: points(vec![at, at + h * DVec3::X]) }, params());
+    let (cylinder, ball) = (PI * radius * radius * h, volume);
+    let along = 0.5 * cylinder * radius * radius + 0.4 * ball * radius * radius;
+    assert_within(found.inertia_mm5.unwrap()[0][0], along, 0.4 * along);
+    assert_within(found.centroid_mm.unwrap()[0], at.x + h / 2.0, 0.3);
+    assert_eq!(found.dimension.unwrap().bounds, [3.0, 3.0]);
+}

@@ -1,0 +1,98 @@
+//! Plane sections through the command, as drawings that other programs read.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use lacuna_tests::support::binary;
+use lacuna_tests::support::scratch::Scratch;
+use serde_json::Value;
+
+fn write(path: &Path, shape: &Value) {
+    std::fs::write(path, serde_json::json!({ "lacuna": 1, "shape": shape }).to_string()).unwrap();
+}
+
+fn certificate(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// The areas of the groups of an SVG drawing: paths of `M x y L x y ... z`, v upwards.
+fn areas(drawing: &str) -> Vec<f64> {
+    let of_loop = |points: &str| {
+        let numbers: Vec<f64> = points.split(|c: char| c == 'L' || c == ' ').filter(|word| !word.is_empty()).map(|word| word.parse().unwrap()).collect();
+        let corners: Vec<&[f64]> = numbers.chunks(2).collect();
+        (0..corners.len()).map(|k| (corners[k], corners[(k + 1) % corners.len()])).map(|(a, b)| 0.5 * (b[0] * a[1] - a[0] * b[1])).sum::<f64>()
+    };
+    let of_group = |group: &str| {
+        let paths = group.split("<path d=\"").skip(1).map(|path| path.split('"').next().unwrap());
+        paths.flat_map(|path| path.split('M').skip(1)).map(|run| of_loop(run.trim_end_matches('z'))).sum::<f64>()
+    };
+    drawing.split("<g id=\"z_").skip(1).map(of_group).collect()
+}
+
+#[test]
+fn layers_of_a_ball() {
+    let folder = Scratch::new();
+    let (model, svg, dxf, told) = (folder.join("ball.json"), folder.join("ball.svg"), folder.join("ball.dxf"), folder.join("told.json"));
+    write(&model, &serde_json::json!({ "family": "mesh", "vertices": [[10, 20, 30]], "faces": [[0]] }));
+    let radius = 5.0_f64;
+    let arguments = ["slice", "--tolerance", "0.01", "--radius", "5", "--step", "0.5", "-o"].map(std::ffi::OsStr::new);
+    let paths = [svg.as_os_str(), "-o".as_ref(), dxf.as_os_str(), "--certificate".as_ref(), told.as_os_str(), model.as_os_str()];
+    binary::succeed(arguments.into_iter().chain(paths));
+    let certificate = certificate(&told);
+    let planes = certificate["sections"]["planes"].as_array().unwrap();
+    let drawn = areas(&std::fs::read_to_string(&svg).unwrap());
+    assert_eq!(planes.len(), drawn.len());
+    assert!((20..=21).contains(&planes.len()), "{}", planes.len());
+    let bound = |name: &str| certificate[name].as_f64().unwrap();
+    for (plane, drawn) in planes.iter().zip(drawn) {
+        let (height, area) = (plane["offset_mm"].as_f64().unwrap() - 30.0, plane["area_mm2"].as_f64().unwrap());
+        let disc = |radius: f64| PI * (radius * radius - height * height).max(0.0);
+        let (least, most) = (disc(radius - bound("inner_bound_mm")), disc(radius + bound("outer_bound_mm")));
+        assert!(least <= area && area <= most, "{area} at {height} is not in [{least}, {most}]");
+        assert!((area - drawn).abs() <= 1e-9 * area, "{drawn} is drawn, {area} is told");
+        assert_eq!((plane["polygons"].as_u64(), plane["holes"].as_u64()), (Some(1), Some(0)));
+    }
+    let drawing = std::fs::read_to_string(&dxf).unwrap();
+    assert_eq!(drawing.matches("POLYLINE\n").count(), planes.len());
+    assert!(certificate["output_digests"]["svg"].is_string() && certificate["output_digests"]["dxf"].is_string());
+}
+
+#[test]
+fn a_hole_and_an_oblique_plane() {
+    let folder = Scratch::new();
+    let (model, svg, told) = (folder.join("box.json"), folder.join("box.svg"), folder.join("told.json"));
+    // A cube of 2 about the origin: the plane across its diagonal through the centre gives a regular hexagon with sides of sqrt(2).
+    let vertices: Vec<[f64; 3]> = (0..8).map(|code| std::array::from_fn(|axis| if code >> axis & 1 == 1 { 1.0 } else { -1.0 })).collect();
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    write(&model, &serde_json::json!({ "family": "mesh", "vertices": vertices, "faces": faces }));
+    let arguments = ["slice", "--tolerance", "0.001", "--normal", "1,1,1", "--at", "0,9", "-o"].map(std::ffi::OsStr::new);
+    binary::succeed(arguments.into_iter().chain([svg.as_os_str(), "--certificate".as_ref(), told.as_os_str(), model.as_os_str()]));
+    let certificate = certificate(&told);
+    let area = certificate["sections"]["planes"][0]["area_mm2"].as_f64().unwrap();
+    assert!((area - 3.0 * 3.0_f64.sqrt()).abs() < 1e-5, "{area}");
+    assert_eq!(certificate["sections"]["planes"][1]["polygons"], 0);
+    assert!(certificate["warnings"][0].as_str().unwrap().contains("1 of 2 sections are empty"), "{}", certificate["warnings"]);
+}
+
+#[test]
+fn what_cannot_be_cut_is_refused() {
+    let folder = Scratch::new();
+    let (model, out) = (folder.join("point.json"), folder.join("out.svg"));
+    write(&model, &serde_json::json!({ "family": "mesh", "vertices": [[0, 0, 0]], "faces": [[0]] }));
+    let code = |words: &[&str], out: &Path| {
+        let arguments = words.iter().map(std::ffi::OsStr::new).chain(["-o".as_ref(), out.as_os_str(), model.as_os_str()]);
+        let output = binary::run(arguments);
+        assert!(!out.exists());
+        (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (exit, said) = code(&["slice", "--tolerance", "0.1", "--at", "0"], &out);
+    assert!(exit == 3 && said.contains("radius"), "{exit} {said}");
+    let (exit, said) = code(&["slice", "--tolerance", "0.1", "--radius", "1", "--normal", "0,0,0", "--at", "0"], &out);
+    assert!(exit == 3 && said.contains("normal"), "{exit} {said}");
+    let (exit, said) = code(&["slice", "--tolerance", "0.1", "--radius", "1", "--step", "1e-9"], &out);
+    assert!(exit == 4 && said.contains("step_mm"), "{exit} {said}");
+    let (exit, _) = code(&["slice", "--tolerance", "0.1", "--radius", "1"], &out);
+    assert_eq!(exit, 2);
+    let (exit, said) = code(&["slice", "--tolerance", "0.1", "--radius", "1", "--at", "0"], &folder.join("out.stl"));
+    assert!(exit != 0 && said.contains("SVG"), "{exit} {said}");
+}
