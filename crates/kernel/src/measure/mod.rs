@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub mod mass;
+pub mod section;
 pub mod triangle;
 
 pub use bounds::{AxisBox, bounding_box};
