@@ -105,7 +105,7 @@ impl Stopped {
 /// How far a computation has come.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
-    /// Name of the phase: `validate`, `refine`, `dilate`, `stitch`, `verify`, `write`.
+    /// Name of the phase: `validate`, `refine`, `dilate`, `stitch`, `verify`, `section`, `write`.
     pub phase: &'static str,
     /// Share of the phase that is done, in [0, 1].
     pub fraction: f64,

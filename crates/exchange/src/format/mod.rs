@@ -33,6 +33,7 @@ mod ply;
 pub mod preview;
 mod read;
 mod scanner;
+pub mod sections;
 mod stl;
 mod text;
 mod threemf;

@@ -3,6 +3,7 @@
 pub mod bounds;
 pub mod dimension;
 pub mod mass;
+pub mod section;
 pub mod triangle;
 
 pub use bounds::{AxisBox, bounding_box, extent_along};
