@@ -37,7 +37,8 @@ fn assert_exact(found: ([f64; 2], DimensionBasis), exact: f64) {
 }
 
 fn similarities(maps: &[(f64, [f64; 3])]) -> Shape {
-    let maps = maps.iter().map(|&(scale, at)| AffineMap { linear: DMat3::from_diagonal(DVec3::splat(scale)), translation: DVec3::from(at) });
+    let maps =
+        maps.iter().map(|&(scale, at)| AffineMap { linear: DMat3::from_diagonal(DVec3::splat(scale)), translation: DVec3::from(at) });
     Shape::Ifs(Ifs { maps: maps.collect(), primitive: None, graph: None })
 }
 
@@ -97,7 +98,8 @@ fn dimensions_of_meshes() {
         Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Auto })
     };
     let tetrahedron = vec![vec![0, 2, 1], vec![0, 1, 3], vec![1, 2, 3], vec![2, 0, 3]];
-    for (faces, exact) in [(vec![vec![0], vec![1]], 0.0), (vec![vec![0, 1]], 1.0), (vec![vec![0, 1, 2], vec![3]], 2.0), (tetrahedron, 3.0)] {
+    for (faces, exact) in [(vec![vec![0], vec![1]], 0.0), (vec![vec![0, 1]], 1.0), (vec![vec![0, 1, 2], vec![3]], 2.0), (tetrahedron, 3.0)]
+    {
         assert_eq!(dimension(mesh(faces)), ([exact; 2], DimensionBasis::Elementary));
     }
 }
@@ -113,7 +115,8 @@ fn mass_of_a_box_far_from_the_origin() {
     let (low, size) = (DVec3::new(100.0, -50.0, 20.0), DVec3::new(2.0, 3.0, 5.0));
     let vertices = (0..8).map(|code| low + DVec3::from_array(std::array::from_fn(|k| if code >> k & 1 == 1 { size[k] } else { 0.0 })));
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let shape = Shape::Mesh(PolygonMesh { vertices: vertices.collect(), faces: faces.map(|f| f.to_vec()).to_vec(), interior: Interior::Auto });
+    let shape =
+        Shape::Mesh(PolygonMesh { vertices: vertices.collect(), faces: faces.map(|f| f.to_vec()).to_vec(), interior: Interior::Auto });
     let found = measured(Model { name: None, shape }, Params { density_g_cm3: Some(2.7), ..Params::new(0.01) });
     let centroid = found.centroid_mm.unwrap();
     let inertia = found.inertia_mm5.unwrap();

@@ -81,6 +81,7 @@ pub fn kind_word(kind: JobKind) -> &'static str {
         JobKind::Solidify => "solidify",
         JobKind::Measure => "measure",
         JobKind::Intersect => "intersect",
+        JobKind::Slice => "slice",
     }
 }
 
@@ -206,6 +207,7 @@ fn default_outputs(kind: JobKind) -> &'static [&'static str] {
     match kind {
         JobKind::Solidify | JobKind::Intersect => &["3mf"],
         JobKind::Evaluate => &["obj"],
+        JobKind::Slice => &["svg"],
         JobKind::Measure => &[],
     }
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use lacuna_exchange::format::sections::SectionFile;
 use lacuna_exchange::format::{self, Format, FormatError, Metadata, PointFile};
-use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, StreamError, Validation};
+use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Stack, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::model::Model;
@@ -147,9 +148,15 @@ pub fn write_file(
 ) -> Result<(Digest, u64), Problem> {
     let metadata =
         Metadata { title: label.title, certificate: Some(&outcome.certificate), thumbnail_png: label.thumbnail_png, ..Metadata::default() };
-    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
     let failed = |error| Problem::io("the file could not be written", &error);
     let mut sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: &mut *pending, token });
+    if let Geometry::Sections(stack) = &outcome.geometry {
+        guarded(|| draw(format, stack, &metadata, &mut sink, token))??;
+        sink.flush().map_err(failed)?;
+        drop(sink);
+        return Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed);
+    }
+    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
     guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
     sink.flush().map_err(failed)?;
     drop(sink);
@@ -159,6 +166,20 @@ pub fn write_file(
         guarded(|| format::verify_written(format, &mut source, solid))?.map_err(|error| format_problem(&error))?;
     }
     Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)
+}
+
+/// Draws plane sections, one at a time.
+fn draw(format: Format, stack: &Stack, metadata: &Metadata<'_>, sink: &mut impl Write, token: &CancelToken) -> Result<(), Problem> {
+    let bounds = stack.frame.bounds(&stack.solid.mesh().vertices).unwrap_or_default();
+    let mut file = SectionFile::start(format, sink, bounds, metadata).map_err(|error| format_problem(&error))?;
+    let budget = Budget { cancel: token.clone(), ..Budget::default() };
+    let drawn = stack.each(&budget, &mut |section| file.push(section));
+    drawn.map_err(|error| match error {
+        StreamError::Job(error) => error.into(),
+        StreamError::Sink(error) => format_problem(&error),
+        StreamError::NotPoints => Problem::internal("sections are no points"),
+    })?;
+    file.finish().map_err(|error| format_problem(&error))
 }
 
 /// Evaluates a shape that is drawn as points straight into a PLY file, whatever their number; for every other shape
@@ -217,7 +238,7 @@ fn view(geometry: &Geometry) -> Option<format::Geometry<'_>> {
     match geometry {
         Geometry::Solid(solid) => Some(solid.into()),
         Geometry::Tessellation(tessellation) => Some(tessellation.into()),
-        Geometry::None => None,
+        Geometry::Sections(_) | Geometry::None => None,
     }
 }
 

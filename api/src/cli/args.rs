@@ -58,6 +58,8 @@ pub(super) enum Command {
     Measure(MeasureArgs),
     /// Combine solids: what lies in any of them, in all, or in the first alone.
     Intersect(IntersectArgs),
+    /// Cut a solid with parallel planes: closed polygons with holes, as SVG or DXF.
+    Slice(SliceArgs),
     /// Say what is wrong with a model; JSON on stdout, exit code 3 when it is invalid.
     Validate {
         /// The model document.
@@ -223,6 +225,38 @@ pub(super) struct IntersectArgs {
     /// the solids that they bound.
     #[arg(long, value_name = "MM", value_parser = distance)]
     pub(super) radius: Vec<f64>,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SliceArgs {
+    /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
+    pub(super) model: PathBuf,
+    /// Hausdorff bound on the solid, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) tolerance: f64,
+    /// Radius of the ball that dilates the model, in mm; without one, its closed surfaces are the solids that they bound.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) radius: Option<f64>,
+    /// What the planes are perpendicular to.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, default_value = "0,0,1", allow_hyphen_values = true)]
+    pub(super) normal: [f64; 3],
+    /// Where a plane is along the normal, in mm; may be given several times, or as a list with commas.
+    #[arg(
+        long,
+        value_name = "MM",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        required_unless_present = "step",
+        conflicts_with = "step"
+    )]
+    pub(super) at: Vec<f64>,
+    /// Height of layers, in mm: planes in their middles, from the bottom of the solid to its top.
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) step: Option<f64>,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]

@@ -44,6 +44,7 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Evaluate(args) => work::evaluate(&args, manner),
         Command::Measure(args) => work::measure(&args, manner),
         Command::Intersect(args) => work::intersect(&args, manner),
+        Command::Slice(args) => work::slice(&args, manner),
         Command::Run(args) => work::run(&args, manner),
         Command::Validate { model, draw } => study::validate(&model, draw.as_deref()),
         Command::Solve(args) => study::solve(&args, cli.quiet),

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use lacuna_exchange::format::{self, ReadLimits};
-use lacuna_fabrication::{Input, Job, JobKind, Operation, Outcome, Params};
+use lacuna_fabrication::{Input, Job, JobKind, Operation, Outcome, Params, Planes};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 
-use super::args::{EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SolidifyArgs};
+use super::args::{
+    EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SliceArgs, SolidifyArgs,
+};
 use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
 use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
@@ -65,6 +67,13 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
     }
     let params = Params { operation: Some(operation), ..Params::new(args.tolerance) };
     make(JobKind::Intersect, inputs, params, &args.output, &args.limits, manner)
+}
+
+/// `lacuna slice`.
+pub(super) fn slice(args: &SliceArgs, manner: Manner) -> Result<(), Problem> {
+    let planes = Planes { normal: args.normal.into(), offsets_mm: args.at.clone(), step_mm: args.step };
+    let params = Params { radius_mm: args.radius, planes: Some(planes), ..Params::new(args.tolerance) };
+    make(JobKind::Slice, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna run`.

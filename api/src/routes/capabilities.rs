@@ -74,7 +74,7 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
         FormatCapability { name: row.ending, media_type: row.media_type, carries }
     });
     Json(Capabilities {
-        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure, JobKind::Intersect],
+        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure, JobKind::Intersect, JobKind::Slice],
         formats: formats.collect(),
         limits: LimitCapability {
             body_bytes: config.body_bytes,

@@ -9,7 +9,7 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 
 use crate::Operation;
-use crate::boolean::Operand;
+use crate::operand::Operand;
 
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,6 +106,9 @@ pub struct Certificate {
     /// How the result was combined, when it was: the bounds are then those of a sandwich.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub operation: Option<OperationStatement>,
+    /// The sections of the solid, when it was cut.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub sections: Option<SectionsStatement>,
     /// At which radii the topology changes: when the job asks.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub stability: Option<StabilityStatement>,
@@ -153,6 +156,39 @@ pub struct Certificate {
     pub output_digests: std::collections::BTreeMap<String, String>,
     /// What the user should know, in words.
     pub warnings: Vec<String>,
+}
+
+/// Plane sections of the solid that is certified beside them: each lies between those of the solid's inner and outer bounds. A plane at the height of
+/// a level face gives the section just above it.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct SectionsStatement {
+    /// The planes' unit normal.
+    pub normal: [f64; 3],
+    /// The direction of first coordinates in the planes.
+    pub u: [f64; 3],
+    /// The direction of second coordinates.
+    pub v: [f64; 3],
+    /// The planes, in the order of the files.
+    pub planes: Vec<PlaneStatement>,
+}
+
+/// One section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct PlaneStatement {
+    /// Where the plane is along the normal.
+    pub offset_mm: f64,
+    /// Connected pieces; 0 where the plane misses the solid.
+    pub polygons: u64,
+    /// Holes in them.
+    pub holes: u64,
+    /// Their area.
+    pub area_mm2: f64,
+    /// Length of all loops.
+    pub perimeter_mm: f64,
 }
 
 /// How much is known of a dimension.
@@ -412,6 +448,25 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         volume_mm3: Some([exact.low, exact.high]),
         area_mm2: Some([exact_area.low, exact_area.high]),
         lattice_pitch_mm: Some(dilation.pitch_mm),
+        warnings,
+        ..counted
+    }
+}
+
+/// What is proven of one input as a solid.
+pub(crate) fn of_operand(rounded: &Rounded, operand: &Operand, tolerance: Tolerance) -> Certificate {
+    let counted = of_solid(&rounded.solid, rounded.crossings);
+    let mut warnings = operand.warnings.clone();
+    warnings.extend(counted.warnings.clone());
+    let [inner, outer] = [operand.statement.inner_bound_mm, operand.statement.outer_bound_mm].map(|bound| bound + rounded.moved_mm);
+    Certificate {
+        requested_tolerance_mm: tolerance.mm(),
+        kernel_version: env!("CARGO_PKG_VERSION").into(),
+        achieved_bound_mm: inner.max(outer),
+        inner_bound_mm: Some(inner),
+        outer_bound_mm: Some(outer),
+        leaf_cells: operand.leaf_cells,
+        bbox_mm: corners(&operand.bounds),
         warnings,
         ..counted
     }

@@ -16,6 +16,19 @@ pub enum JobKind {
     Measure,
     /// A printable solid: what an operation leaves of several.
     Intersect,
+    /// Plane sections of a solid.
+    Slice,
+}
+
+/// Parallel planes that cut a solid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planes {
+    /// What they are perpendicular to, of any length.
+    pub normal: glam::DVec3,
+    /// Where they are along the normal, in mm, unless there is a step.
+    pub offsets_mm: Vec<f64>,
+    /// The height of layers, in mm, the planes being in their middles from the bottom of the solid on.
+    pub step_mm: Option<f64>,
 }
 
 /// How solids are combined. All operations are regularised: a face, an edge or a point that two solids merely share leaves nothing behind.
@@ -37,10 +50,12 @@ pub struct Params {
     /// Hausdorff bound on the result, in mm.
     pub tolerance_mm: f64,
     /// Radius of the dilating ball, in mm: required by `solidify`, optional for `measure` (without
-    /// it the shape itself is measured) and for `intersect` (without it the inputs are solids themselves).
+    /// it the shape itself is measured), for `intersect` and for `slice` (without it the inputs are solids themselves).
     pub radius_mm: Option<f64>,
     /// What an `intersect` leaves of its inputs.
     pub operation: Option<Operation>,
+    /// The planes of a `slice`.
+    pub planes: Option<Planes>,
     /// Density in g/cm^3, for the mass in a `measure`.
     pub density_g_cm3: Option<f64>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
@@ -55,7 +70,16 @@ impl Params {
     /// A tolerance, and everything else as where a document says nothing.
     #[must_use]
     pub fn new(tolerance_mm: f64) -> Self {
-        Self { tolerance_mm, radius_mm: None, operation: None, density_g_cm3: None, normals: false, simplify: true, stability: false }
+        Self {
+            tolerance_mm,
+            radius_mm: None,
+            operation: None,
+            planes: None,
+            density_g_cm3: None,
+            normals: false,
+            simplify: true,
+            stability: false,
+        }
     }
 }
 

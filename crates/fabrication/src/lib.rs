@@ -3,10 +3,13 @@
 mod boolean;
 pub mod certificate;
 pub mod job;
+mod operand;
 pub mod run;
+mod slice;
 pub mod solve;
 
 pub use certificate::Certificate;
-pub use job::{Input, Job, JobKind, Operation, Params};
+pub use job::{Input, Job, JobKind, Operation, Params, Planes};
 pub use run::{Geometry, JobError, Outcome, Plan, StreamError, Validation, plan, run, stream_points, validate};
+pub use slice::Stack;
 pub use solve::{SolutionSpace, SolveRefusal, Solved, solve};

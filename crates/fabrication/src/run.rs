@@ -13,7 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, boolean, certificate};
+use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, slice};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub enum Geometry {
     Solid(Solid),
     /// An evaluation.
     Tessellation(Tessellation),
+    /// A solid and planes that cut it.
+    Sections(Box<Stack>),
     /// Numbers only.
     None,
 }
@@ -177,6 +179,9 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     if job.kind == JobKind::Intersect {
         return boolean::combine(job, tolerance, budget);
     }
+    if job.kind == JobKind::Slice {
+        return slice::slice(job, tolerance, budget);
+    }
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let attractor = &lowered.attractor;
@@ -197,7 +202,7 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         (JobKind::Solidify, None) => {
             Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()))
         }
-        (JobKind::Measure | JobKind::Intersect, Some(radius)) => {
+        (JobKind::Measure | JobKind::Intersect | JobKind::Slice, Some(radius)) => {
             let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
             let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
             let mesh = dilation.solid.mesh();
@@ -206,7 +211,7 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
             certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
             Ok(Outcome { geometry: Geometry::None, certificate })
         }
-        (JobKind::Measure | JobKind::Intersect, None) => {
+        (JobKind::Measure | JobKind::Intersect | JobKind::Slice, None) => {
             let bounds = bounding_box(attractor, budget)?;
             let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
             certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
@@ -327,6 +332,9 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     if job.kind == JobKind::Intersect {
         return boolean::plan(job, tolerance, budget);
+    }
+    if job.kind == JobKind::Slice {
+        return slice::plan(job, tolerance, budget);
     }
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;

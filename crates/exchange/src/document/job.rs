@@ -2,7 +2,9 @@
 
 use std::collections::HashSet;
 
-use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params};
+use glam::DVec3;
+
+use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params, Planes};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::Model;
 
@@ -11,7 +13,7 @@ use super::model::{model, version};
 use super::node::{Place, quoted};
 use super::walk::{Members, Walker, length, suggestion};
 use crate::diagnostic::{Diagnostic, code};
-use crate::format::FORMATS;
+use crate::format::{FORMATS, Format};
 
 /// A job as its document states it: legal, with references to stored models still to be resolved and
 /// limits still to be completed from the service's.
@@ -172,11 +174,12 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
 }
 
 fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
-    const KINDS: [(&str, JobKind); 4] = [
+    const KINDS: [(&str, JobKind); 5] = [
         ("evaluate", JobKind::Evaluate),
         ("solidify", JobKind::Solidify),
         ("measure", JobKind::Measure),
         ("intersect", JobKind::Intersect),
+        ("slice", JobKind::Slice),
     ];
     let text = walker.text(place, "the name of a kind of job")?;
     if let Some((_, kind)) = KINDS.iter().find(|(word, _)| *word == text) {
@@ -307,10 +310,11 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         _ => walker.positive(place, "a density in g/cm3"),
     });
     let density_g_cm3 = stated(density)?;
+    let planes = planes(walker, &members, kind)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
-    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, density_g_cm3, normals, simplify, stability })
+    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, planes, density_g_cm3, normals, simplify, stability })
 }
 
 /// The operation, which intersect needs and no other kind takes.
@@ -332,6 +336,33 @@ fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKin
         }
         (Some(place), _) => walker.word(place, "an operation", &OPERATIONS).map(Some),
     }
+}
+
+/// The planes, which slice needs and no other kind takes.
+#[allow(clippy::option_option)]
+fn planes(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Option<Planes>> {
+    if kind != Some(JobKind::Slice) {
+        let mut legal = true;
+        for place in ["normal", "offsets_mm", "step_mm"].iter().filter_map(|name| members.get(name)) {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || "only slice has planes; remove it, or ask for the kind \"slice\"".into());
+            legal = false;
+        }
+        return legal.then_some(None);
+    }
+    let normal = members.get("normal").map_or(Some(DVec3::Z), |place| {
+        let normal = DVec3::from_array(walker.numbers(place, "a vector of three numbers")?);
+        if normal == DVec3::ZERO {
+            walker.fault(&place, code::NOT_POSITIVE, || "has no length; expected the direction across the planes".into());
+            return None;
+        }
+        Some(normal)
+    });
+    one_of(walker, members, &["offsets_mm", "step_mm"], "slice")?;
+    let offsets = members
+        .get("offsets_mm")
+        .map_or(Some(Vec::new()), |place| walker.each_of(place, 1, "an array of offsets in mm", |walker, place| walker.number(place)));
+    let step = members.get("step_mm").map(|place| walker.positive(place, "the height of a layer in mm"));
+    Some(Some(Planes { normal: normal?, offsets_mm: offsets?, step_mm: stated(step)? }))
 }
 
 /// A flag that one kind of job takes, what that kind is called, and what the flag is when absent.
@@ -368,6 +399,18 @@ fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> 
     if kind == Some(JobKind::Measure) && !outputs.is_empty() {
         walker.fault(&place, code::CONFLICTING_MEMBERS, || "measure delivers numbers and no files; remove \"outputs\"".into());
         return None;
+    }
+    for (index, name) in outputs.iter().enumerate() {
+        let drawing = Format::from_name(name).is_some_and(Format::is_drawing);
+        if kind.is_some_and(|kind| (kind == JobKind::Slice) != drawing) {
+            let wanted =
+                FORMATS.iter().map(|row| row.format).filter(|format| format.is_drawing() != drawing).map(|format| format.facts().ending);
+            let wanted = wanted.collect::<Vec<_>>().join(", ");
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+                format!("output {index} is \"{name}\"; this kind of job is written as {wanted}")
+            });
+            return None;
+        }
     }
     Some(outputs)
 }

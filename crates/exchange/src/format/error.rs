@@ -65,6 +65,12 @@ pub enum FormatError {
         /// The format that was asked.
         format: Format,
     },
+    /// Sections were to be written into something else than a drawing.
+    #[error("a {format} file has no room for plane sections; SVG and DXF files have")]
+    CannotDraw {
+        /// The format that was asked.
+        format: Format,
+    },
     /// A table of addresses was asked of a shape whose cells have none.
     #[error(
         "there are no addresses to write: the shape, or a part of it, has no B-rep; addresses are known for curves between vertices and for faces with edges"
@@ -192,6 +198,7 @@ impl FormatError {
             Self::CannotCarry { .. }
             | Self::CannotRead { .. }
             | Self::CannotVerify { .. }
+            | Self::CannotDraw { .. }
             | Self::NoAddresses
             | Self::UnknownFormat
             | Self::Empty
@@ -218,6 +225,7 @@ impl FormatError {
             Self::CannotCarry { .. } => "format.cannot-carry",
             Self::CannotRead { .. } => "format.cannot-read",
             Self::CannotVerify { .. } => "format.cannot-verify",
+            Self::CannotDraw { .. } => "format.cannot-draw",
             Self::NoAddresses => "format.no-addresses",
             Self::UnknownFormat => "format.unknown",
             Self::Empty => "format.empty-geometry",

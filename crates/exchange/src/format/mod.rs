@@ -71,6 +71,10 @@ pub enum Format {
     Png,
     /// The addresses of an evaluation's cells, as comma-separated values.
     Addresses,
+    /// Scalable Vector Graphics 1.1: plane sections.
+    Svg,
+    /// Drawing exchange file of AutoCAD release 12: plane sections.
+    Dxf,
 }
 
 /// The kinds of content that a geometry holds or a format has room for.
@@ -105,12 +109,15 @@ pub struct FormatFacts {
 
 const EVERYTHING: Carries = Carries { solid: true, surface: true, wires: true, points: true };
 
+/// What holds no geometry of space: tables and drawings.
+const NOTHING: Carries = Carries { solid: false, surface: false, wires: false, points: false };
+
 /// Every format, the two for fabrication first.
 ///
 /// STL and OFF are lists of faces; 3MF objects of type `model` must be closed, and a printer's
 /// file that is not is a trap, so open surfaces are refused there although the format has a type
 /// for them.
-pub const FORMATS: [FormatFacts; 9] = [
+pub const FORMATS: [FormatFacts; 11] = [
     FormatFacts {
         format: Format::Stl,
         name: "STL",
@@ -153,9 +160,11 @@ pub const FORMATS: [FormatFacts; 9] = [
         ending: "csv",
         media_type: "text/csv",
         // No geometry: a table beside it.
-        carries: Carries { solid: false, surface: false, wires: false, points: false },
+        carries: NOTHING,
         reads: false,
     },
+    FormatFacts { format: Format::Svg, name: "SVG", ending: "svg", media_type: "image/svg+xml", carries: NOTHING, reads: false },
+    FormatFacts { format: Format::Dxf, name: "DXF", ending: "dxf", media_type: "image/vnd.dxf", carries: NOTHING, reads: false },
 ];
 
 impl Format {
@@ -164,6 +173,12 @@ impl Format {
     pub fn facts(self) -> &'static FormatFacts {
         // The table is in the order of the enum; a test holds it there.
         &FORMATS[self as usize]
+    }
+
+    /// Whether it holds plane sections: see [`sections`].
+    #[must_use]
+    pub fn is_drawing(self) -> bool {
+        matches!(self, Self::Svg | Self::Dxf)
     }
 
     /// The format of a file name's ending or of a media type, in any letter case; the media type
@@ -267,6 +282,7 @@ pub fn write<'a, W: Write + Seek>(
         Format::Vrml => vrml::write(&pieces, metadata, sink),
         Format::Png => preview::write(geometry, &preview::PreviewOptions::default(), sink),
         Format::Addresses => Err(FormatError::NoAddresses),
+        Format::Svg | Format::Dxf => Err(FormatError::Empty),
     }
 }
 
@@ -311,7 +327,7 @@ pub fn verify_written<'a, R: Read + Seek>(format: Format, source: &mut R, geomet
         Format::Ply => ply::verify(&pieces, source),
         Format::Off => off::verify(&pieces, source),
         Format::Vrml => vrml::verify(&pieces, source),
-        Format::Png | Format::Addresses => Err(FormatError::CannotVerify { format }),
+        Format::Png | Format::Addresses | Format::Svg | Format::Dxf => Err(FormatError::CannotVerify { format }),
     }
 }
 

@@ -180,6 +180,6 @@ pub fn read(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result
         Format::Ply => ply::read(bytes, limits),
         Format::Off => off::read(bytes, limits),
         Format::Vrml => vrml::read(bytes, limits),
-        Format::Glb | Format::Png | Format::Addresses => Err(FormatError::CannotRead { format }),
+        Format::Glb | Format::Png | Format::Addresses | Format::Svg | Format::Dxf => Err(FormatError::CannotRead { format }),
     }
 }

@@ -15,7 +15,7 @@ pub(in super::super) const OPERATIONS: [(&str, Operation); 3] =
     [("union", Operation::Union), ("intersection", Operation::Intersection), ("difference", Operation::Difference)];
 
 /// Kinds of jobs of the grammar that cannot be done yet.
-pub(in super::super) const LATER_KINDS: [&str; 6] = ["check", "slice", "sla", "cast", "panels", "convert"];
+pub(in super::super) const LATER_KINDS: [&str; 5] = ["check", "sla", "cast", "panels", "convert"];
 
 pub(in super::super) const JOB: Object = Object {
     title: "a job",
@@ -24,8 +24,8 @@ pub(in super::super) const JOB: Object = Object {
         required("lacuna", "The version of the grammar: 1.", version),
         required(
             "kind",
-            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), measure (box, area and volume as intervals), or intersect (a printable solid: what an operation leaves of several).",
-            || one_of_words(&["evaluate", "solidify", "measure", "intersect"]),
+            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), or slice (plane sections of a solid).",
+            || one_of_words(&["evaluate", "solidify", "measure", "intersect", "slice"]),
         ),
         optional("model", "The model, in full.", || reference("EmbeddedModel")),
         optional("model_ref", "The id of a stored model.", text),
@@ -77,13 +77,24 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         required("tolerance_mm", "The Hausdorff bound on the result, in mm, above zero.", positive),
         optional(
             "radius_mm",
-            "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure and intersect, absent for evaluate.",
+            "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, intersect and slice, absent for evaluate.",
             positive,
         ),
         optional(
             "operation",
             "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), or in the first and in none of the others (difference). Required by intersect alone.",
             || one_of_words(&OPERATIONS.map(|(word, _)| word)),
+        ),
+        optional("normal", "What the planes of slice are perpendicular to, of any length; [0, 0, 1] when absent.", vector),
+        optional(
+            "offsets_mm",
+            "Where the planes of slice are along the normal, in mm. Exactly one of offsets_mm and step_mm is given.",
+            || json!({ "type": "array", "items": number(), "minItems": 1 }),
+        ),
+        optional(
+            "step_mm",
+            "The height of layers, in mm, above zero: planes of slice are in their middles, from the bottom of the solid to its top.",
+            positive,
         ),
         optional("density_g_cm3", "The density of the material, in g/cm3, above zero, for the mass: for measure alone.", positive),
         optional(

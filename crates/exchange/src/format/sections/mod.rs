@@ -6,14 +6,15 @@
 //!
 //! ```
 //! use lacuna_exchange::format::Metadata;
-//! use lacuna_exchange::format::sections::{SectionFile, SectionFormat};
+//! use lacuna_exchange::format::Format;
+//! use lacuna_exchange::format::sections::SectionFile;
 //! use lacuna_kernel::measure::section::{Polygon, Section};
 //! use glam::{DVec2, DVec3};
 //!
 //! let triangle = Polygon { outer: vec![DVec2::ZERO, DVec2::X, DVec2::Y], holes: vec![] };
 //! let section = Section { offset_mm: 0.25, polygons: vec![triangle], unmatched: vec![] };
 //! let mut bytes = Vec::new();
-//! let mut file = SectionFile::start(SectionFormat::Svg, &mut bytes, [DVec3::ZERO, DVec3::ONE], &Metadata::default())?;
+//! let mut file = SectionFile::start(Format::Svg, &mut bytes, [DVec3::ZERO, DVec3::ONE], &Metadata::default())?;
 //! file.push(&section)?;
 //! file.finish()?;
 //! assert!(String::from_utf8_lossy(&bytes).contains("<g id=\"z_0.250\">\n<path d=\"M0 0L1 0L0 -1z\"/>\n</g>"));
@@ -23,58 +24,20 @@
 mod dxf;
 mod svg;
 
-use super::Metadata;
 use super::error::{FormatError, Place};
 use super::off::flush_full;
 use super::text::CHUNK_BYTES;
+use super::{Format, Metadata};
 use glam::{DVec2, DVec3};
 use lacuna_kernel::measure::section::Section;
 use std::collections::BTreeMap;
 use std::io::Write;
 
-/// A format of drawings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum SectionFormat {
-    /// Scalable Vector Graphics 1.1: a group for each section, a path for each polygon, v upwards on the page.
-    Svg,
-    /// Drawing exchange file of AutoCAD release 12: a layer for each section, a closed polyline for each loop, at its height.
-    Dxf,
-}
-
-impl SectionFormat {
-    /// The name that users know.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Svg => "SVG",
-            Self::Dxf => "DXF",
-        }
-    }
-
-    /// Ending of file names, without the dot.
-    #[must_use]
-    pub fn ending(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Dxf => "dxf",
-        }
-    }
-
-    /// Media type in HTTP.
-    #[must_use]
-    pub fn media_type(self) -> &'static str {
-        match self {
-            Self::Svg => "image/svg+xml",
-            Self::Dxf => "image/vnd.dxf",
-        }
-    }
-}
-
 /// A drawing that is being written: sections go through it one by one.
 ///
 /// The bytes depend on what is pushed alone. Memory: a chunk of text and the names of the sections.
 pub struct SectionFile<W> {
-    format: SectionFormat,
+    format: Format,
     sink: W,
     text: Vec<u8>,
     /// The number of each height's name, and how many sections have had it.
@@ -87,15 +50,18 @@ impl<W: Write> SectionFile<W> {
     /// [`PlaneFrame::bounds`](lacuna_kernel::measure::section::PlaneFrame::bounds) gives them, in mm. What lies beyond is written too.
     ///
     /// # Errors
-    /// [`FormatError::NotFinite`] for the corners, [`FormatError::Stream`] when the sink fails.
-    pub fn start(format: SectionFormat, sink: W, bounds: [DVec3; 2], metadata: &Metadata<'_>) -> Result<Self, FormatError> {
+    /// [`FormatError::CannotDraw`] for a format that is no drawing, [`FormatError::NotFinite`] for the corners, [`FormatError::Stream`] when the sink fails.
+    pub fn start(format: Format, sink: W, bounds: [DVec3; 2], metadata: &Metadata<'_>) -> Result<Self, FormatError> {
+        if !format.is_drawing() {
+            return Err(FormatError::CannotDraw { format });
+        }
         for value in bounds.iter().flat_map(DVec3::to_array) {
             check(value, Place::File)?;
         }
         let mut text = Vec::with_capacity(CHUNK_BYTES + 4096);
         match format {
-            SectionFormat::Svg => svg::start(bounds, metadata, &mut text),
-            SectionFormat::Dxf => dxf::start(bounds, metadata, &mut text),
+            Format::Svg => svg::start(bounds, metadata, &mut text),
+            _ => dxf::start(bounds, metadata, &mut text),
         }
         Ok(Self { format, sink, text, names: BTreeMap::new(), points: 0 })
     }
@@ -118,8 +84,8 @@ impl<W: Write> SectionFile<W> {
         *uses += 1;
         let mut out = Out { text: &mut self.text, sink: &mut self.sink };
         match self.format {
-            SectionFormat::Svg => svg::section(section, &name, *uses, &mut out),
-            SectionFormat::Dxf => dxf::section(section, &dxf::layer(&name, *number), &mut out),
+            Format::Svg => svg::section(section, &name, *uses, &mut out),
+            _ => dxf::section(section, &dxf::layer(&name, *number), &mut out),
         }
     }
 
@@ -129,8 +95,8 @@ impl<W: Write> SectionFile<W> {
     /// [`FormatError::Stream`] when the sink fails.
     pub fn finish(mut self) -> Result<(), FormatError> {
         self.text.extend_from_slice(match self.format {
-            SectionFormat::Svg => svg::END,
-            SectionFormat::Dxf => dxf::END,
+            Format::Svg => svg::END,
+            _ => dxf::END,
         });
         self.sink.write_all(&self.text)?;
         self.sink.flush()?;

@@ -12,7 +12,7 @@ fn square(centre: [f64; 2], half: f64, turn: f64) -> Vec<DVec2> {
         .to_vec()
 }
 
-fn written(format: SectionFormat, bounds: [DVec3; 2], title: Option<&str>, all: &[Section]) -> String {
+fn written(format: Format, bounds: [DVec3; 2], title: Option<&str>, all: &[Section]) -> String {
     let mut bytes = Vec::new();
     let mut file = SectionFile::start(format, &mut bytes, bounds, &Metadata { title, ..Metadata::default() }).unwrap();
     all.iter().for_each(|section| file.push(section).unwrap());
@@ -123,7 +123,7 @@ fn examples() -> ([DVec3; 2], Vec<Section>) {
 #[test]
 fn svg_carries_every_loop_bit_for_bit() {
     let (bounds, all) = examples();
-    let (root, groups, title) = read_svg(&written(SectionFormat::Svg, bounds, None, &all));
+    let (root, groups, title) = read_svg(&written(Format::Svg, bounds, None, &all));
     let size = bounds[1] - bounds[0];
     assert_eq!((root["width"].clone(), root["height"].clone()), (format!("{}mm", size.x), format!("{}mm", size.y)));
     assert_eq!(root["viewBox"], format!("{} {} {} {}", bounds[0].x, -bounds[1].y, size.x, size.y));
@@ -144,7 +144,7 @@ fn svg_carries_every_loop_bit_for_bit() {
 #[test]
 fn dxf_carries_every_loop_bit_for_bit() {
     let (bounds, all) = examples();
-    let text = written(SectionFormat::Dxf, bounds, None, &all);
+    let text = written(Format::Dxf, bounds, None, &all);
     let found = polylines(&text);
     let wanted: Vec<_> = all.iter().flat_map(|section| section.loops().map(|points| (section.offset_mm, points))).collect();
     assert_eq!(found.len(), wanted.len());
@@ -161,17 +161,17 @@ fn dxf_carries_every_loop_bit_for_bit() {
 #[test]
 fn titles_cannot_leave_their_place() {
     let (bounds, all) = examples();
-    let plain = written(SectionFormat::Svg, bounds, None, &all);
-    let svg = written(SectionFormat::Svg, bounds, Some(HOSTILE), &all);
+    let plain = written(Format::Svg, bounds, None, &all);
+    let svg = written(Format::Svg, bounds, Some(HOSTILE), &all);
     let (_, groups, title) = read_svg(&svg);
     assert_eq!(groups, read_svg(&plain).1);
     assert!(title.starts_with("a &lt;b&gt; &amp; &quot;c&quot;]]&gt; 0 EOF ") && title.contains("d\u{e9}j\u{e0} \u{1f600}"), "{title}");
     assert!(!svg.chars().any(|letter| letter.is_control() && letter != '\n') && !svg.contains('\u{fffe}'));
-    let dxf = written(SectionFormat::Dxf, bounds, Some(HOSTILE), &all);
-    assert_eq!(polylines(&dxf), polylines(&written(SectionFormat::Dxf, bounds, None, &all)));
+    let dxf = written(Format::Dxf, bounds, Some(HOSTILE), &all);
+    assert_eq!(polylines(&dxf), polylines(&written(Format::Dxf, bounds, None, &all)));
     let long = "x\u{e9}\n".repeat(1000);
     for (title, start) in [(HOSTILE, "a <b> & \"c\"]]> 0 EOF    "), (&long, "x\\U+00E9 x\\U+00E9 ")] {
-        let dxf = written(SectionFormat::Dxf, bounds, Some(title), &[]);
+        let dxf = written(Format::Dxf, bounds, Some(title), &[]);
         let (code, words) = pairs(&dxf)[0];
         assert!(code == 999 && words.starts_with(start) && words.len() <= 255 && dxf.is_ascii(), "{words:?}");
         assert_eq!(
@@ -184,7 +184,7 @@ fn titles_cannot_leave_their_place() {
 #[test]
 fn what_is_no_number_is_refused() {
     let (bounds, all) = examples();
-    for format in [SectionFormat::Svg, SectionFormat::Dxf] {
+    for format in [Format::Svg, Format::Dxf] {
         let start = |bounds| SectionFile::start(format, Vec::new(), bounds, &Metadata::default());
         assert!(matches!(start([bounds[0], DVec3::NAN]), Err(FormatError::NotFinite { place: Place::File, .. })));
         let mut file = start(bounds).unwrap();
@@ -215,7 +215,7 @@ fn long_loops_are_handed_on_while_they_are_written() {
     }
     let outer = (0..100_000).map(|k| DVec2::from_angle(f64::from(k) * 6.28e-5)).collect();
     let section = Section { offset_mm: 0.0, polygons: vec![Polygon { outer, holes: vec![] }], unmatched: vec![] };
-    for format in [SectionFormat::Svg, SectionFormat::Dxf] {
+    for format in [Format::Svg, Format::Dxf] {
         let run = |writes| {
             let mut file = SectionFile::start(format, Narrow(writes), [DVec3::NEG_ONE, DVec3::ONE], &Metadata::default())?;
             file.push(&section)?;

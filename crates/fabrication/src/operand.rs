@@ -1,0 +1,188 @@
+//! Inputs as solids: dilated by a ball, or what their closed surfaces bound.
+
+use glam::DVec3;
+use lacuna_boolean::{BooleanEngine, ManifoldRust};
+use lacuna_kernel::attractor::Attractor;
+use lacuna_kernel::budget::Budget;
+use lacuna_kernel::dilation::{dilate, predict};
+use lacuna_kernel::error::{Kind, LimitFacts};
+use lacuna_kernel::measure::mass::{dilated_difference, volume};
+use lacuna_kernel::measure::{AxisBox, bounding_box};
+use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried};
+use lacuna_kernel::tolerance::{Radius, Tolerance};
+use std::collections::HashMap;
+
+use crate::Job;
+use crate::certificate::OperandStatement;
+use crate::job::Input;
+use crate::run::{JobError, Plan, stl_bytes};
+
+/// An input as a solid.
+pub(crate) struct Operand {
+    /// What is told of it.
+    pub(crate) statement: OperandStatement,
+    /// The box of the exact solid.
+    pub(crate) bounds: AxisBox,
+    /// The volume between the exact solid and its mesh is at most this, in mm^3.
+    pub(crate) volume_error: f64,
+    pub(crate) leaf_cells: u64,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) meshes: Vec<TriMesh>,
+}
+
+/// An input before it is a solid: its shape, its radius (0 for the solid itself) and its box.
+pub(crate) struct Source<'a> {
+    pub(crate) input: &'a Input,
+    attractor: Attractor,
+    radius_mm: f64,
+    bounds: AxisBox,
+}
+
+impl<'a> Source<'a> {
+    /// The one input of a job.
+    pub(crate) fn only(job: &'a Job, budget: &Budget) -> Result<Self, JobError> {
+        if job.inputs.len() != 1 {
+            let message = format!("the job has {} inputs, and this kind takes one", job.inputs.len());
+            return Err(JobError::new(Kind::Invalid, "job.inputs", message));
+        }
+        let source = sources(job, budget)?.pop();
+        source.ok_or_else(|| JobError::new(Kind::Defect, "internal", "an input was there".into()))
+    }
+}
+
+/// All inputs of a job.
+pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a>>, JobError> {
+    let mut sources = Vec::with_capacity(job.inputs.len());
+    for (index, input) in job.inputs.iter().enumerate() {
+        budget.cancel.check()?;
+        budget.report("validate", index as f64 / job.inputs.len() as f64, index as u64);
+        let attractor = input.model.lower().map_err(|findings| named(JobError::model(findings), job, index))?.attractor;
+        let radius_mm = input.radius_mm.or(job.params.radius_mm).unwrap_or(0.0);
+        if radius_mm == 0.0 && !is_solid(&attractor) {
+            let message = format!(
+                "input '{}' encloses nothing: it is no closed surface; give it a \"radius_mm\", and it is dilated by a ball of that radius",
+                input.name
+            );
+            return Err(JobError::new(Kind::Invalid, "job.not-a-solid", message));
+        }
+        let bounds = bounding_box(&attractor, budget)?.grown(radius_mm);
+        sources.push(Source { input, attractor, radius_mm, bounds });
+    }
+    Ok(sources)
+}
+
+/// An error of one input: it is named where there are several.
+pub(crate) fn named(error: JobError, job: &Job, index: usize) -> JobError {
+    if job.inputs.len() > 1 { error.of_input(&job.inputs[index].name, index) } else { error }
+}
+
+/// Whether closed surfaces are all that there is.
+fn is_solid(attractor: &Attractor) -> bool {
+    attractor.roots().iter().all(|root| root.solid.is_some()) && !attractor.solids().is_empty()
+}
+
+/// The tolerance that single precision leaves.
+pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tolerance, JobError> {
+    let extent = sources.iter().map(|source| source.bounds.extent()).fold(0.0, f64::max);
+    let taken = carried(extent);
+    if tolerance.mm() < 2.0 * taken {
+        let reachable = 2.0 * taken;
+        let message = format!(
+            "single-precision files cannot carry a tolerance of {} mm at coordinates up to {extent:.1} mm; {reachable:.3e} mm can be carried",
+            tolerance.mm()
+        );
+        let limit =
+            LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
+        return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) });
+    }
+    Ok(Tolerance::new(tolerance.mm() - taken)?)
+}
+
+/// One input as a solid, within a tolerance.
+pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result<Operand, JobError> {
+    let Source { input, attractor, radius_mm, bounds } = source;
+    let mut warnings = attractor.warnings().to_vec();
+    let (meshes, inner, outer, leaf_cells) = if *radius_mm > 0.0 {
+        let dilation = dilate(attractor, Radius::new(*radius_mm)?, tolerance, budget)?;
+        if dilation.crossings > 0 {
+            warnings.push(format!("{} pairs of triangles of input '{}' cross", dilation.crossings, input.name));
+        }
+        (vec![dilation.solid.mesh().clone()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
+    } else {
+        (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
+    };
+    let volume: f64 = meshes.iter().map(volume).sum();
+    let volume_error = if *radius_mm > 0.0 { dilated_difference(volume, *radius_mm, inner, outer) } else { 0.0 };
+    let statement = OperandStatement {
+        name: input.name.clone(),
+        radius_mm: *radius_mm,
+        inner_bound_mm: inner,
+        outer_bound_mm: outer,
+        triangles: meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
+        mesh_volume_mm3: volume,
+    };
+    Ok(Operand { statement, bounds: *bounds, volume_error, leaf_cells, warnings, meshes })
+}
+
+/// The closed surfaces of a shape. Corners at one place were one vertex of the model: placing it moved them alike.
+fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
+    let mut meshes = Vec::with_capacity(attractor.solids().len());
+    for surface in attractor.solids() {
+        let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());
+        for (index, corners) in surface.triangles.iter().enumerate() {
+            let points = &attractor.roots()[surface.first_root + index].points;
+            let mut number = |k: usize| {
+                *numbers.entry(corners[k]).or_insert_with(|| {
+                    mesh.vertices.push(DVec3::new(points[k][0], points[k][1], points[k][2]));
+                    mesh.vertices.len() as u32 - 1
+                })
+            };
+            let triangle = [number(0), number(1), number(2)];
+            mesh.triangles.push(triangle);
+        }
+        meshes.push(mesh);
+    }
+    meshes
+}
+
+/// One input as one solid in single precision: several closed surfaces are joined.
+pub(crate) fn solid_of(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result<(Rounded, Operand), JobError> {
+    let mut operand = operand(source, share(std::slice::from_ref(source), tolerance)?, budget)?;
+    let meshes = std::mem::take(&mut operand.meshes);
+    let mesh = if let [mesh] = meshes.as_slice() {
+        mesh.clone()
+    } else {
+        let meshes: Vec<&TriMesh> = meshes.iter().collect();
+        ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| JobError::new(error.kind(), error.code(), error.to_string()))?
+    };
+    Ok((rounded(&mesh, budget)?, operand))
+}
+
+/// A mesh as a solid in single precision.
+pub(crate) fn rounded(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, JobError> {
+    Solid::rounded(mesh, budget).map_err(|error| match error {
+        SolidError::Stopped(stopped) => stopped.into(),
+        other => JobError::new(
+            Kind::Unreachable,
+            "boolean.rounding",
+            format!("the result is no solid any more in single precision ({other}); a larger radius or a smaller shape may do"),
+        ),
+    })
+}
+
+/// Predicts the cost of making solids of the inputs.
+pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
+    let share = share(sources, tolerance)?;
+    let mut plan = Plan { leaf_cells: 0.0, triangles: 0.0, memory_bytes: 0.0, output_bytes: 0.0, lattice_pitch_mm: None };
+    for source in sources {
+        if source.radius_mm > 0.0 {
+            let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, budget)?;
+            plan.triangles += prediction.triangles;
+            plan.memory_bytes += prediction.memory_bytes;
+        } else {
+            plan.triangles += source.attractor.roots().len() as f64;
+        }
+    }
+    plan.output_bytes = stl_bytes(plan.triangles);
+    Ok(plan)
+}

@@ -1,0 +1,123 @@
+//! Plane sections of a solid: layers, templates and drawings.
+
+use lacuna_kernel::budget::Budget;
+use lacuna_kernel::error::{Kind, LimitFacts};
+use lacuna_kernel::measure::section::{PlaneFrame, Section, SectionError, sections};
+use lacuna_kernel::solid::Solid;
+use lacuna_kernel::tolerance::Tolerance;
+
+use crate::certificate::{self, PlaneStatement, SectionsStatement};
+use crate::job::Planes;
+use crate::operand::{Source, solid_of};
+use crate::run::{JobError, Outcome, Plan, StreamError};
+use crate::{Geometry, Job};
+
+/// A solid and the planes that cut it. Sections are made when they are asked for: a stack of any height takes no memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stack {
+    /// The solid.
+    pub solid: Solid,
+    /// The planes' axes.
+    pub frame: PlaneFrame,
+    /// Where the planes are along the normal, in mm.
+    pub offsets_mm: Vec<f64>,
+}
+
+/// Planes that a job may have: each has a line in the certificate.
+const MOST_PLANES: usize = 100_000;
+
+impl Stack {
+    /// Hands over the sections in the order of the offsets.
+    ///
+    /// # Errors
+    /// A stop, or what `sink` returns.
+    pub fn each<E>(&self, budget: &Budget, sink: &mut dyn FnMut(&Section) -> Result<(), E>) -> Result<(), StreamError<E>> {
+        sections(&self.solid, &self.frame, &self.offsets_mm, budget, &mut |section| sink(&section).map_err(StreamError::Sink))
+    }
+}
+
+impl<E> From<SectionError> for StreamError<E> {
+    fn from(error: SectionError) -> Self {
+        Self::Job(error.into())
+    }
+}
+
+impl From<SectionError> for JobError {
+    fn from(error: SectionError) -> Self {
+        Self::new(error.kind(), error.code(), error.to_string())
+    }
+}
+
+/// Does a job of kind `slice`.
+pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+    let (planes, frame) = planes(job)?;
+    let source = Source::only(job, budget)?;
+    let (rounded, operand) = solid_of(&source, tolerance, budget)?;
+    let mut certificate = certificate::of_operand(&rounded, &operand, tolerance);
+    let offsets_mm = offsets(planes, &rounded.solid, &frame)?;
+    let stack = Stack { solid: rounded.solid, frame, offsets_mm };
+    let mut told = Vec::with_capacity(stack.offsets_mm.len());
+    let each = stack.each::<JobError>(budget, &mut |section| {
+        told.push(PlaneStatement {
+            offset_mm: section.offset_mm,
+            polygons: section.polygons.len() as u64,
+            holes: section.polygons.iter().map(|polygon| polygon.holes.len() as u64).sum(),
+            area_mm2: section.area_mm2(),
+            perimeter_mm: section.perimeter_mm(),
+        });
+        Ok(())
+    });
+    each.map_err(|error| match error {
+        StreamError::Job(error) | StreamError::Sink(error) => error,
+        StreamError::NotPoints => JobError::new(Kind::Defect, "internal", "sections are no points".into()),
+    })?;
+    let empty = told.iter().filter(|plane| plane.polygons == 0).count();
+    if empty > 0 {
+        certificate.warnings.push(format!("{empty} of {} sections are empty: their planes miss the solid", told.len()));
+    }
+    let [normal, u, v] = [frame.normal(), frame.u(), frame.v()].map(|axis| axis.to_array());
+    certificate.sections = Some(SectionsStatement { normal, u, v, planes: told });
+    Ok(Outcome { geometry: Geometry::Sections(Box::new(stack)), certificate })
+}
+
+/// What the job says of its planes.
+fn planes(job: &Job) -> Result<(&Planes, PlaneFrame), JobError> {
+    let bad = |message: String| JobError::new(Kind::Invalid, "bad-parameter", message);
+    let missing = || bad("slice needs its planes: offsets_mm or step_mm".into());
+    let planes = job.params.planes.as_ref().ok_or_else(missing)?;
+    let frame = PlaneFrame::new(planes.normal).map_err(|error| bad(error.to_string()))?;
+    Ok((planes, frame))
+}
+
+/// The offsets asked for; with a step, those in the middles of layers from the bottom of the solid to its top.
+fn offsets(planes: &Planes, solid: &Solid, frame: &PlaneFrame) -> Result<Vec<f64>, JobError> {
+    let too_many = |asked: f64, remedy: Option<(&'static str, f64)>| {
+        let message =
+            format!("the job has {asked:.0} planes, and at most {MOST_PLANES} are possible; take fewer at a time, or a larger step");
+        let limit = LimitFacts { limit: "planes", asked, allowed: MOST_PLANES as f64, remedy };
+        JobError { limit: Some(limit), ..JobError::new(Kind::Limit, "limit.planes", message) }
+    };
+    let Some(step) = planes.step_mm else {
+        let count = planes.offsets_mm.len();
+        return if count <= MOST_PLANES { Ok(planes.offsets_mm.clone()) } else { Err(too_many(count as f64, None)) };
+    };
+    let ends = solid
+        .mesh()
+        .vertices
+        .iter()
+        .map(|&vertex| frame.offset(vertex))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let count = ((ends.1 - ends.0) / step).ceil().max(1.0);
+    if count > MOST_PLANES as f64 {
+        return Err(too_many(count, Some(("step_mm", (ends.1 - ends.0) / MOST_PLANES as f64 * (1.0 + 1e-9)))));
+    }
+    let layers = (0..count as u32).map(|layer| ends.0 + (f64::from(layer) + 0.5) * step);
+    Ok(layers.filter(|offset| *offset < ends.1).collect())
+}
+
+/// Predicts the cost: that of the solid.
+pub(crate) fn plan(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
+    planes(job)?;
+    let source = Source::only(job, budget)?;
+    crate::operand::predicted(std::slice::from_ref(&source), tolerance, budget)
+}
