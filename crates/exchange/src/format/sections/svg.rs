@@ -27,7 +27,8 @@ pub(super) fn start([low, high]: [DVec3; 2], metadata: &Metadata<'_>, text: &mut
     escape(metadata.title.unwrap_or("sections"), &mut words);
     words.push_str("</title>\n<desc>");
     escape(metadata.application, &mut words);
-    words.push_str("</desc>\n<g fill=\"#222222\" fill-opacity=\"0.2\" fill-rule=\"evenodd\" stroke=\"#222222\" stroke-width=\"0.1\" stroke-linejoin=\"round\">\n");
+    words.push_str("</desc>\n<g fill=\"#222222\" fill-opacity=\"0.2\" fill-rule=\"evenodd\" ");
+    words.push_str("stroke=\"#222222\" stroke-width=\"0.1\" stroke-linejoin=\"round\">\n");
     text.extend_from_slice(words.as_bytes());
 }
 

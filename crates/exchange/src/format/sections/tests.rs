@@ -20,8 +20,11 @@ fn written(format: Format, bounds: [DVec3; 2], title: Option<&str>, all: &[Secti
     String::from_utf8(bytes).unwrap()
 }
 
-/// (attributes of the root, groups with the paths in each, title). Fails on what is not XML.
-fn read_svg(text: &str) -> (BTreeMap<String, String>, Vec<(String, Vec<String>)>, String) {
+/// The name of a group, and the data of its paths.
+type Group = (String, Vec<String>);
+
+/// (attributes of the root, groups, title). Fails on what is not XML.
+fn read_svg(text: &str) -> (BTreeMap<String, String>, Vec<Group>, String) {
     use quick_xml::events::Event;
     let mut reader = quick_xml::Reader::from_str(text);
     let (mut root, mut groups, mut title, mut open) = (BTreeMap::new(), Vec::new(), String::new(), Vec::new());
@@ -30,7 +33,7 @@ fn read_svg(text: &str) -> (BTreeMap<String, String>, Vec<(String, Vec<String>)>
             Event::Eof => break,
             Event::Start(start) | Event::Empty(start) if start.name().as_ref() == "path" => {
                 let data = start.attributes().map(Result::unwrap).find(|one| one.key.as_ref() == "d").unwrap();
-                let (_, paths): &mut (String, Vec<String>) = groups.last_mut().unwrap();
+                let (_, paths): &mut Group = groups.last_mut().unwrap();
                 paths.push(data.value.to_string());
             }
             Event::Start(start) => {

@@ -54,8 +54,8 @@ pub struct Polygon {
 
 /// The section of a solid with one plane, in the coordinates (u, v) of its [`PlaneFrame`].
 ///
-/// It is the limit of the sections just above: a bottom face gives its polygon, a top face nothing. At heights where no vertex is, it is the
-/// solid cut by the plane. Empty where the plane misses the solid.
+/// It is the limit of the sections just above: a bottom face gives its polygon, a top face nothing. At heights where no vertex is, it is
+/// the solid cut by the plane. Empty where the plane misses the solid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
     /// Where the plane is along the normal, in mm.
@@ -175,7 +175,8 @@ impl SectionError {
 
 /// Largest coordinate, in mm: fourth powers of it, which exact predicates form, stay numbers.
 const LARGEST_MM: f64 = 1e75;
-/// Triangles that are cut before sections are handed on: enough to keep all threads busy, and some hundred megabytes at most.
+/// Triangles that are cut before sections are handed on: enough to keep all threads busy, and some hundred megabytes at most, unless one
+/// section alone cuts more.
 const BATCH: u64 = 1 << 20;
 
 /// Cuts a solid with parallel planes and hands the sections to `sink` in the order of the offsets, which may be any and repeat.

@@ -21,8 +21,8 @@ pub(super) struct Ring {
     pub(super) area: f64,
 }
 
-/// The loops of cuts, each from the least name on, in the order of these. Along a closed oriented surface every edge ends one cut and starts
-/// another, so names pair all of them.
+/// The loops of cuts, each from the least name on, in the order of these. Along a closed oriented surface every edge ends one cut and
+/// starts another, so names pair all of them.
 pub(super) fn rings(mut cuts: Vec<Cut>, point: impl Fn(u64) -> DVec2) -> Vec<Ring> {
     cuts.sort_unstable_by_key(|cut| cut.from);
     let mut ends: Vec<(u64, u32)> = cuts.iter().enumerate().map(|(index, cut)| (cut.to, index as u32)).collect();

@@ -44,7 +44,8 @@ impl Stabbing {
         Self { starts, lows, highs }
     }
 
-    /// Visits the items whose intervals contain a number from 1 to the most, in an order that depends on them alone. Cost: log most + visits.
+    /// Visits the items whose intervals contain a number from 1 to the most, in an order that depends on them alone. Cost: log most and
+    /// the visits.
     pub(super) fn each(&self, number: u32, mut visit: impl FnMut(u32)) {
         let levels = number.trailing_zeros()..u32::BITS;
         let path = levels.map(|level| u64::from(number >> level | 1) << level);
