@@ -1,10 +1,14 @@
 //! Measures of shapes and solids, as intervals that are proven.
 
 pub mod bounds;
+pub mod contact;
+pub mod hausdorff;
 pub mod mass;
 pub mod triangle;
 
 pub use bounds::{AxisBox, bounding_box};
+pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive};
+pub use hausdorff::{Directed, Hausdorff, hausdorff};
 
 /// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
