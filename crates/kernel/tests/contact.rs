@@ -203,6 +203,8 @@ fn contact_of_curves_and_meshes_is_proven() {
     assert_eq!(found.verdict(), Verdict::Touching, "a corner is within");
 }
 
+type Distance = Box<dyn Fn(DVec3) -> f64>;
+
 #[test]
 fn clouds_against_brute_force() {
     let mut random = Random(11);
@@ -212,8 +214,8 @@ fn clouds_against_brute_force() {
         let (p, q) = (random.point(14.0), random.point(14.0));
         let along = (q - p).normalize();
         let (low, high) = (p.min(q), p.max(q));
-        let to_ray = |x: DVec3, least: f64, most: f64| x.distance(p + along * (x - p).dot(along).clamp(least, most));
-        let cases: Vec<(Primitive, Box<dyn Fn(DVec3) -> f64>)> = vec![
+        let to_ray = move |x: DVec3, least: f64, most: f64| x.distance(p + along * (x - p).dot(along).clamp(least, most));
+        let cases: Vec<(Primitive, Distance)> = vec![
             (Primitive::Point(p.to_array()), Box::new(move |x| x.distance(p))),
             (Primitive::Segment([p.to_array(), q.to_array()]), Box::new(move |x| to_ray(x, 0.0, p.distance(q)))),
             (Primitive::Ray { origin: p.to_array(), direction: (q - p).to_array() }, Box::new(move |x| to_ray(x, 0.0, f64::INFINITY))),

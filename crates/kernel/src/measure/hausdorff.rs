@@ -103,6 +103,7 @@ impl Ord for Piece {
 struct Search<'a> {
     first: Tree<'a>,
     second: Tree<'a>,
+    budget: &'a Budget,
     slack: f64,
     /// How narrow distances from the second shape need not be: a small share of the tolerance.
     accuracy_mm: f64,
@@ -122,6 +123,7 @@ fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Bu
         place: first.node(0).body.ball,
         first,
         second,
+        budget,
         accuracy_mm: tolerance.mm() / 16.0,
         queue: BinaryHeap::new(),
         bytes: 0,
@@ -130,7 +132,6 @@ fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Bu
         low: 0.0,
     };
     search.look(Part::Node(0), &[0], f64::INFINITY);
-    let most_bytes = budget.limits.memory_bytes.min(MOST_BYTES);
     // A piece that cannot be split ends the search: all others are no farther.
     let mut high = 0.0;
     let mut complete = true;
@@ -139,12 +140,11 @@ fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Bu
         if high - search.low <= tolerance.mm() {
             break;
         }
-        let bytes = search.first.bytes + search.second.bytes + search.bytes;
-        if search.looked > budget.limits.cells.min(MOST_NODES) || bytes > most_bytes {
+        budget.cancel.check()?;
+        if search.is_exhausted() {
             complete = false;
             break;
         }
-        budget.cancel.check()?;
         search.bytes -= memory(&piece);
         if !search.split(&piece) {
             complete = false;
@@ -161,6 +161,13 @@ fn memory(piece: &Piece) -> u64 {
 }
 
 impl Search<'_> {
+    /// Whether a limit was hit.
+    fn is_exhausted(&self) -> bool {
+        let limits = &self.budget.limits;
+        let bytes = self.first.bytes + self.second.bytes + self.bytes;
+        self.looked > limits.cells.min(MOST_NODES) || bytes > limits.memory_bytes.min(MOST_BYTES)
+    }
+
     /// Puts the parts of a piece into the queue: whether it has any. One as small as what is rounded has none.
     fn split(&mut self, piece: &Piece) -> bool {
         if self.around(piece.part).1 <= self.slack {
@@ -210,7 +217,8 @@ impl Search<'_> {
     }
 
     /// [least, most] of the distance of c from the second shape, and the nodes that may be closest to points within
-    /// `radius` of c, all of `near` being known to be enough. The interval is narrow against the radius, or the tolerance.
+    /// `radius` of c, all of `near` being known to be enough. The interval is narrow against the radius, or the
+    /// tolerance, unless a limit is hit.
     fn distance(&mut self, c: &Point, radius: f64, near: &[NodeId]) -> (f64, f64, Vec<NodeId>) {
         let mut queue = BinaryHeap::new();
         let mut high = f64::INFINITY;
@@ -221,7 +229,8 @@ impl Search<'_> {
         let mut done = Vec::new();
         let mut least = f64::INFINITY;
         while let Some(Reverse(Near { low, id })) = queue.pop() {
-            if high - low <= wanted {
+            // Whatever ends the search, what was not opened bounds the distance.
+            if high - low <= wanted || self.is_exhausted() || self.budget.cancel.reason().is_some() {
                 least = least.min(low);
                 done.push((low, id));
                 break;

@@ -164,7 +164,7 @@ impl ContactError {
 
 /// The tree of a shape that can be searched.
 pub(crate) fn tree<'a>(attractor: &'a Attractor, budget: &Budget) -> Result<Tree<'a>, ContactError> {
-    if attractor.trimmed().is_empty() { Ok(Tree::new(attractor, budget.limits.depth)) } else { Err(ContactError::Trimmed) }
+    if attractor.trimmed().is_empty() { Ok(Tree::new(attractor, budget)?) } else { Err(ContactError::Trimmed) }
 }
 
 /// Where two shapes come within the resolution of each other, and their distance.

@@ -4,6 +4,7 @@ use super::body::{least, most};
 use super::tree::{NodeId, Tree};
 use super::{CellPair, Place};
 use crate::attractor::cell::Point;
+use crate::budget::{Budget, Stopped};
 use crate::groups::Groups;
 use crate::measure::Interval;
 use std::collections::BTreeMap;
@@ -51,13 +52,17 @@ impl Gathered {
 /// cell that is within the resolution of the second lies in both. A pair without such points is no place.
 ///
 /// Cost: the pairs by their logarithm, and those that overlap along the axis on which boxes are spread most.
+///
+/// # Errors
+/// [`Stopped`] when the budget's token was fired.
 pub(super) fn places(
     trees: &[Tree<'_>; 2],
     found: &[Found],
     resolution_mm: f64,
     slack: f64,
+    budget: &Budget,
     described: impl Fn(&Found) -> CellPair,
-) -> Vec<Place> {
+) -> Result<Vec<Place>, Stopped> {
     let mut sorted = found.to_vec();
     sorted.sort_unstable_by_key(|pair| pair.nodes);
     let mut boxed: Vec<Gathered> = Vec::new();
@@ -84,6 +89,7 @@ pub(super) fn places(
     let mut groups = Groups::new(boxed.len());
     let mut open: Vec<usize> = Vec::new();
     for (index, one) in boxed.iter().enumerate() {
+        budget.cancel.check()?;
         open.retain(|&other| boxed[other].high[axis] + resolution_mm >= one.low[axis]);
         for &other in open.iter().filter(|&&other| one.is_near(&boxed[other], resolution_mm)) {
             groups.join(index, other);
@@ -107,5 +113,5 @@ pub(super) fn places(
         pairs: place.pairs,
         distance_mm: place.distance_mm,
     };
-    gathered.into_values().map(place).collect()
+    Ok(gathered.into_values().map(place).collect())
 }

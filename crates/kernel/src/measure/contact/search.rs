@@ -95,7 +95,7 @@ pub(super) fn search(first: Tree<'_>, second: Tree<'_>, query: &ContactQuery, bu
     let mut found = Vec::new();
     let (low, complete) = search.run(query, budget, &mut found)?;
     let distance_mm = Interval { low: low.min(search.nearest.distance_mm.high), high: search.nearest.distance_mm.high };
-    let mut places = places(&search.trees, &found, search.resolution_mm, search.slack, |pair| search.described(pair));
+    let mut places = places(&search.trees, &found, search.resolution_mm, search.slack, budget, |pair| search.described(pair))?;
     if let (true, [only]) = (complete, places.as_mut_slice()) {
         // The closest points are nowhere else, even if what proves their distance is a larger pair.
         only.distance_mm.high = only.distance_mm.high.min(distance_mm.high);

@@ -4,6 +4,8 @@ use super::body::{Body, Nature, ball_of_box, least, most};
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, dot};
 use crate::attractor::{Address, Attractor, StateBound, rounding};
 use crate::automaton::LeafPrimitive;
+use crate::budget::{Budget, Stopped};
+use std::collections::VecDeque;
 use std::ops::Range;
 
 /// Index of a node.
@@ -53,37 +55,37 @@ pub(crate) struct Tree<'a> {
 
 impl<'a> Tree<'a> {
     /// The roots of a shape, in groups of two halves along the longest side of their centres' box.
-    pub(crate) fn new(attractor: &'a Attractor, most_letters: u32) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`] when the budget's token was fired.
+    pub(crate) fn new(attractor: &'a Attractor, budget: &Budget) -> Result<Self, Stopped> {
+        let most_letters = budget.limits.depth;
         let mut tree = Self { attractor: Some(attractor), nodes: Vec::new(), bytes: 0, slack: 1e-130, most_letters };
         let mut roots: Vec<Option<Node>> = attractor
             .roots()
             .iter()
             .enumerate()
             .map(|(index, root)| {
+                budget.cancel.check()?;
                 let cell = attractor.root_cell(index);
                 tree.slack = tree.slack.max(rounding(&cell.ball));
                 let body = cell_body(attractor, &cell, &root.points, 0);
-                Some(Node {
-                    body,
-                    content: Content::Cell(cell, root.points.clone()),
-                    before: None,
-                    letter: index,
-                    depth: 0,
-                    children: None,
-                })
+                let content = Content::Cell(cell, root.points.clone());
+                Ok(Some(Node { body, content, before: None, letter: index, depth: 0, children: None }))
             })
-            .collect();
+            .collect::<Result<_, Stopped>>()?;
         let mut order: Vec<usize> = (0..roots.len()).collect();
         // Places of nodes are handed out before the nodes are made: a group needs those of its halves.
-        let mut waiting = std::collections::VecDeque::from([0..order.len()]);
+        let mut waiting: VecDeque<Range<usize>> = std::iter::once(0..order.len()).collect();
         let mut next: NodeId = 1;
         while let Some(range) = waiting.pop_front() {
+            budget.cancel.check()?;
             let members = &mut order[range.clone()];
             let node = if let [only] = *members {
                 roots[only].take()
             } else {
                 let body = group_body(members.iter().filter_map(|&root| roots[root].as_ref()).map(|node| &node.body));
-                let centre = |root: usize| attractor_centre(&roots, root);
+                let centre = |root: usize| roots[root].as_ref().map_or([0.0; 3], |node| node.body.ball.centre);
                 let spread = |axis: usize| {
                     let (low, high) = members
                         .iter()
@@ -101,7 +103,7 @@ impl<'a> Tree<'a> {
             };
             node.into_iter().for_each(|node| tree.push(node));
         }
-        tree
+        Ok(tree)
     }
 
     /// A tree of one node, whose largest coordinate is `size`.
@@ -193,10 +195,6 @@ impl<'a> Tree<'a> {
         prefix.reverse();
         matches!(node.content, Content::Cell(..)).then(|| Address { root: node.letter, prefix, period: Vec::new() })
     }
-}
-
-fn attractor_centre(roots: &[Option<Node>], root: usize) -> Point {
-    roots[root].as_ref().map_or([0.0; 3], |node| node.body.ball.centre)
 }
 
 fn group_body<'b>(bodies: impl Iterator<Item = &'b Body>) -> Body {
