@@ -3,6 +3,7 @@
 //! | module | asks |
 //! |---|---|
 //! | `booleans` | do combined solids hold what their certificates say? |
+//! | `contacts` | are distances, places of contact and comparisons of shapes those of closed forms? |
 //! | `corpus` | does every case of `fixtures/` hold, through the real command? |
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
@@ -18,6 +19,7 @@
 
 mod architecture;
 mod booleans;
+mod contacts;
 mod container;
 mod contract;
 mod corpus;

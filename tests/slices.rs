@@ -18,8 +18,7 @@ fn certificate(path: &Path) -> Value {
 /// The areas of the groups of an SVG drawing: paths of `M x y L x y ... z`, v upwards.
 fn areas(drawing: &str) -> Vec<f64> {
     let of_loop = |points: &str| {
-        let numbers: Vec<f64> =
-            points.split(|c: char| c == 'L' || c == ' ').filter(|word| !word.is_empty()).map(|word| word.parse().unwrap()).collect();
+        let numbers: Vec<f64> = points.split(['L', ' ']).filter(|word| !word.is_empty()).map(|word| word.parse().unwrap()).collect();
         let corners: Vec<&[f64]> = numbers.chunks(2).collect();
         (0..corners.len())
             .map(|k| (corners[k], corners[(k + 1) % corners.len()]))

@@ -146,7 +146,7 @@ fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<J
     let model = |id: &str| find(id).and_then(|bytes| read_model(&bytes).ok());
     let mut job = read.resolve(&within(&Limits::default(), most), most, model).map_err(refused)?;
     if job.outputs.is_empty() {
-        job.outputs = default_outputs(job.kind).iter().map(|&name| name.to_owned()).collect();
+        job.outputs = default_outputs(&job).iter().map(|&name| name.to_owned()).collect();
     }
     if job.kind == JobKind::Measure && !job.outputs.is_empty() {
         let message = "a measurement makes numbers only; ask for no outputs";
@@ -203,8 +203,9 @@ impl SolveReport {
 }
 
 /// What a job makes when it asks for no format: what printers read, and what carries wires.
-fn default_outputs(kind: JobKind) -> &'static [&'static str] {
-    match kind {
+fn default_outputs(job: &Job) -> &'static [&'static str] {
+    match job.kind {
+        JobKind::Intersect if job.params.operation.is_none() => &[],
         JobKind::Solidify | JobKind::Intersect => &["3mf"],
         JobKind::Evaluate => &["obj"],
         JobKind::Slice => &["svg"],

@@ -391,7 +391,14 @@ mod tests {
     #[test]
     fn a_limit_says_what_would_pass() {
         let facts = LimitFacts { limit: "triangles", asked: 7e6, allowed: 5e6, remedy: Some(("tolerance_mm", 0.08)) };
-        let error = JobError { kind: Kind::Limit, code: "triangles", message: "too many".into(), limit: Some(facts), diagnostics: vec![] };
+        let error = JobError {
+            kind: Kind::Limit,
+            code: "triangles",
+            message: "too many".into(),
+            limit: Some(facts),
+            input: None,
+            diagnostics: vec![],
+        };
         let json = serde_json::to_value(Problem::from(error)).unwrap();
         assert_eq!(json["limit"], "triangles");
         assert_eq!(json["remedy"]["tolerance_mm"], 0.08);

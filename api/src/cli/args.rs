@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lacuna_exchange::document::MOST_CELLS_LISTED;
+use lacuna_exchange::document::with::{self, PRIMITIVES};
+use lacuna_kernel::measure::Primitive;
 
 /// Fabrication-oriented geometry: fractals, curves and meshes to certified, printable solids.
 ///
@@ -56,7 +58,8 @@ pub(super) enum Command {
     Evaluate(EvaluateArgs),
     /// Measure box, area, volume, centroid, inertia, mass and fractal dimension as intervals; JSON on stdout.
     Measure(MeasureArgs),
-    /// Combine solids: what lies in any of them, in all, or in the first alone.
+    /// Combine solids: what lies in any of them, in all, or in the first alone. Without an operation: tell where two shapes, or a shape and a
+    /// point, line, plane, box or ball, come within the tolerance of each other; JSON on stdout.
     Intersect(IntersectArgs),
     /// Cut a solid with parallel planes: closed polygons with holes, as SVG or DXF.
     Slice(SliceArgs),
@@ -184,8 +187,11 @@ pub(super) struct EvaluateArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct MeasureArgs {
-    /// The model document.
+    /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
     pub(super) model: PathBuf,
+    /// Another one: tell the Hausdorff distance of both instead.
+    #[arg(conflicts_with_all = ["radius", "density"])]
+    pub(super) other: Option<PathBuf>,
     /// Hausdorff bound on what is measured, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) tolerance: f64,
@@ -213,20 +219,34 @@ pub(super) enum OperationName {
 #[derive(Debug, Args)]
 pub(super) struct IntersectArgs {
     /// Model documents, or STL, 3MF, OBJ, PLY, OFF or VRML files: two or more.
-    #[arg(required = true, num_args = 2.., value_name = "MODEL")]
+    #[arg(required = true, num_args = 1.., value_name = "MODEL")]
     pub(super) models: Vec<PathBuf>,
-    /// What to leave of them.
-    #[arg(long, value_enum)]
-    pub(super) operation: OperationName,
-    /// Hausdorff bound on every solid, in mm.
+    /// What to leave of them as a solid; without it, files are not written.
+    #[arg(long, value_enum, requires = "outputs")]
+    pub(super) operation: Option<OperationName>,
+    /// What one model is held against: point:X,Y,Z, segment:, ray: or line: with six numbers, plane:NX,NY,NZ,OFFSET, box: with its two corners, or
+    /// ball:X,Y,Z,RADIUS, in mm.
+    #[arg(long, value_name = "WHAT:NUMBERS", value_parser = primitive, conflicts_with = "operation")]
+    pub(super) with: Option<Primitive>,
+    /// Hausdorff bound on every solid, in mm; without an operation, how near shapes must come.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) tolerance: f64,
     /// Radius of the ball that dilates the inputs, in mm: once for all, or once for each in their order. 0, or none, takes closed surfaces as
     /// the solids that they bound.
-    #[arg(long, value_name = "MM", value_parser = distance)]
+    #[arg(long, value_name = "MM", value_parser = distance, requires = "operation")]
     pub(super) radius: Vec<f64>,
-    #[command(flatten)]
-    pub(super) output: OutputArgs,
+    /// File to write, its format chosen by its ending; may be given several times. `-` is stdout.
+    #[arg(short, long = "output", value_name = "FILE", requires = "operation")]
+    pub(super) outputs: Vec<PathBuf>,
+    /// Format of what goes to stdout.
+    #[arg(long, value_name = "FORMAT", requires = "operation")]
+    pub(super) format: Option<String>,
+    /// Write the certificate as JSON.
+    #[arg(long, value_name = "FILE", requires = "operation")]
+    pub(super) certificate: Option<PathBuf>,
+    /// Write a picture.
+    #[arg(long, value_name = "FILE.png", requires = "operation")]
+    pub(super) preview: Option<PathBuf>,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
 }
@@ -383,6 +403,18 @@ fn named_value(text: &str) -> Result<(String, f64), String> {
         Ok(value) if value.is_finite() => Ok((name.to_owned(), value)),
         _ => Err(format!("{value:?} is not a finite number")),
     }
+}
+
+fn primitive(text: &str) -> Result<Primitive, String> {
+    let (word, numbers) = text.split_once(':').ok_or("WHAT:NUMBERS is expected, for example plane:0,0,1,5")?;
+    let numbers: Option<Vec<f64>> =
+        numbers.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    let Some((_, count)) = PRIMITIVES.iter().find(|(known, _)| *known == word) else {
+        let known = PRIMITIVES.map(|(word, _)| word).join(", ");
+        return Err(format!("'{word}' is none of {known}"));
+    };
+    let found = numbers.and_then(|numbers| with::primitive(word, &numbers));
+    found.ok_or_else(|| format!("a {word} takes {count} numbers with commas between"))
 }
 
 fn distance(text: &str) -> Result<f64, String> {

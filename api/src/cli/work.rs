@@ -41,18 +41,24 @@ pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Proble
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
     let params = Params { radius_mm: args.radius, density_g_cm3: args.density, ..Params::new(args.tolerance) };
-    let job = job_with(JobKind::Measure, vec![input_of(&args.model)?], params, &[], &args.limits);
-    let (outcome, _) = perform(&job, &args.limits, manner, |_, _| Ok(Vec::new()))?;
+    let inputs = std::iter::once(&args.model).chain(&args.other).map(|path| input_of(path)).collect::<Result<_, _>>()?;
+    tell(JobKind::Measure, inputs, params, &args.limits, manner)
+}
+
+/// Does a job that makes numbers, and prints its certificate.
+fn tell(kind: JobKind, inputs: Vec<Input>, params: Params, limit_args: &LimitArgs, manner: Manner) -> Result<(), Problem> {
+    let job = job_with(kind, inputs, params, &[], limit_args);
+    let (outcome, _) = perform(&job, limit_args, manner, |_, _| Ok(Vec::new()))?;
     print_json(&outcome.certificate)
 }
 
 /// `lacuna intersect`.
 pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Problem> {
-    let operation = match args.operation {
+    let operation = args.operation.map(|operation| match operation {
         OperationName::Union => Operation::Union,
         OperationName::Intersection => Operation::Intersection,
         OperationName::Difference => Operation::Difference,
-    };
+    });
     let mut inputs: Vec<Input> = args.models.iter().map(|path| input_of(path)).collect::<Result<_, _>>()?;
     match args.radius.as_slice() {
         [] => {}
@@ -65,8 +71,19 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
             return Err(Problem::new(ProblemKind::Usage, detail));
         }
     }
-    let params = Params { operation: Some(operation), ..Params::new(args.tolerance) };
-    make(JobKind::Intersect, inputs, params, &args.output, &args.limits, manner)
+    let params = Params { operation, with: args.with, ..Params::new(args.tolerance) };
+    if operation.is_none() {
+        let wanted = if args.with.is_some() { 1 } else { 2 };
+        if inputs.len() != wanted {
+            let detail = format!("{} models are given; name two, one and --with, or an --operation", inputs.len());
+            return Err(Problem::new(ProblemKind::Usage, detail));
+        }
+        return tell(JobKind::Intersect, inputs, params, &args.limits, manner);
+    }
+    let IntersectArgs { outputs, format, certificate, preview, .. } = args;
+    let output =
+        OutputArgs { outputs: outputs.clone(), format: format.clone(), certificate: certificate.clone(), preview: preview.clone() };
+    make(JobKind::Intersect, inputs, params, &output, &args.limits, manner)
 }
 
 /// `lacuna slice`.

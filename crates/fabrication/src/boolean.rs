@@ -94,6 +94,10 @@ fn evaluate(operation: Operation, operands: &[Operand], job: &Job, budget: &Budg
 
 /// Predicts the cost of a job of kind `intersect`: that of its inputs, and of what the engine holds beside them.
 pub(crate) fn plan(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
+    if job.params.operation.is_none() {
+        // Nothing is made, and what a search costs shows in the search.
+        return Ok(Plan { leaf_cells: 0.0, triangles: 0.0, memory_bytes: 0.0, output_bytes: 0.0, lattice_pitch_mm: None });
+    }
     let plan = predicted(&sources(job, budget)?, tolerance, budget)?;
     Ok(Plan { memory_bytes: plan.memory_bytes + ENGINE_BYTES_PER_TRIANGLE * plan.triangles, ..plan })
 }

@@ -106,6 +106,12 @@ pub struct Certificate {
     /// How the result was combined, when it was: the bounds are then those of a sandwich.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub operation: Option<OperationStatement>,
+    /// Where two shapes come together: of an `intersect` without an operation.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub contact: Option<ContactStatement>,
+    /// How far two shapes are from being the same: of a `measure` of two.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub hausdorff: Option<HausdorffStatement>,
     /// The sections of the solid, when it was cut.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub sections: Option<SectionsStatement>,
@@ -156,6 +162,102 @@ pub struct Certificate {
     pub output_digests: std::collections::BTreeMap<String, String>,
     /// What the user should know, in words.
     pub warnings: Vec<String>,
+}
+
+/// What is proven of two shapes, at a place or as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum ContactVerdict {
+    /// They have no common point.
+    Disjoint,
+    /// They are within the upper end of the distance; whether they have a common point is not known.
+    Near,
+    /// They have a common point.
+    Touching,
+}
+
+/// Two cells, the first of the first shape.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct CellPairStatement {
+    /// Address of the first, as `address` takes it.
+    pub first: String,
+    /// Address of the second; absent where that is no shape.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub second: Option<String>,
+    /// Centre of a ball around the first.
+    pub first_mm: [f64; 3],
+    /// Centre of a ball around the second.
+    pub second_mm: [f64; 3],
+    /// Their distance.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub distance_mm: Interval,
+}
+
+/// A place where shapes come within the tolerance.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct PlaceStatement {
+    /// Lower and upper corner of a box that holds all points of the first shape within the tolerance of the second, of this place.
+    pub bbox_mm: [[f64; 3]; 2],
+    /// What is proven there.
+    pub verdict: ContactVerdict,
+    /// The distance of the shapes there.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub distance_mm: Interval,
+    /// Pairs of cells that make up the place.
+    pub pairs: u64,
+    /// The nearest of them.
+    pub nearest: CellPairStatement,
+}
+
+/// How far two shapes are apart, and where they come within the tolerance of each other.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct ContactStatement {
+    /// What is proven.
+    pub verdict: ContactVerdict,
+    /// The distance of the shapes.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub distance_mm: Interval,
+    /// The nearest pair of cells that was looked at.
+    pub nearest: CellPairStatement,
+    /// The places, a thousand at most.
+    pub places: Vec<PlaceStatement>,
+    /// Whether there are no other places, and the distance is as narrow as the tolerance allows.
+    pub complete: bool,
+}
+
+/// How far the points of one shape are from the other, at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct DirectedStatement {
+    /// The supremum of the distances.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub distance_mm: Interval,
+    /// Near here is a point that far.
+    pub near_mm: [f64; 3],
+}
+
+/// The Hausdorff distance of two shapes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct HausdorffStatement {
+    /// The larger of the two directed ones.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub distance_mm: Interval,
+    /// From the first shape to the second.
+    pub from_first: DirectedStatement,
+    /// From the second shape to the first.
+    pub from_second: DirectedStatement,
+    /// Whether the intervals are as narrow as the tolerance.
+    pub complete: bool,
 }
 
 /// Plane sections of the solid that is certified beside them: each lies between those of the solid's inner and outer bounds. A plane at the height of
@@ -451,6 +553,31 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         warnings,
         ..counted
     }
+}
+
+/// What is proven of shapes that are compared: the box of all.
+pub(crate) fn of_shapes(shapes: &[(Attractor, AxisBox)], width: f64, tolerance: Tolerance) -> Certificate {
+    let whole = shapes.iter().map(|(_, bounds)| *bounds).reduce(|a, b| AxisBox {
+        low: std::array::from_fn(|axis| chosen(a.low[axis], b.low[axis], f64::min)),
+        high: std::array::from_fn(|axis| chosen(a.high[axis], b.high[axis], f64::max)),
+    });
+    Certificate {
+        requested_tolerance_mm: tolerance.mm(),
+        kernel_version: env!("CARGO_PKG_VERSION").into(),
+        achieved_bound_mm: width,
+        bbox_mm: whole.map(|bounds| corners(&bounds)).unwrap_or_default(),
+        warnings: shapes.iter().flat_map(|(shape, _)| shape.warnings().to_vec()).collect(),
+        ..Certificate::default()
+    }
+}
+
+/// The interval of the smaller, or the larger, of two numbers in intervals.
+fn chosen(
+    a: lacuna_kernel::measure::Interval,
+    b: lacuna_kernel::measure::Interval,
+    choose: fn(f64, f64) -> f64,
+) -> lacuna_kernel::measure::Interval {
+    lacuna_kernel::measure::Interval::new(choose(a.low, b.low), choose(a.high, b.high))
 }
 
 /// What is proven of one input as a solid.

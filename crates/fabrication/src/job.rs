@@ -1,6 +1,7 @@
 //! What is ordered.
 
 use lacuna_kernel::budget::Limits;
+use lacuna_kernel::measure::contact::Primitive;
 use lacuna_kernel::model::Model;
 
 /// What a job does.
@@ -14,7 +15,7 @@ pub enum JobKind {
     Solidify,
     /// Box, area and volume as intervals.
     Measure,
-    /// A printable solid: what an operation leaves of several.
+    /// A printable solid: what an operation leaves of several. Without an operation: where two shapes, or a shape and a primitive, come together.
     Intersect,
     /// Plane sections of a solid.
     Slice,
@@ -54,6 +55,8 @@ pub struct Params {
     pub radius_mm: Option<f64>,
     /// What an `intersect` leaves of its inputs.
     pub operation: Option<Operation>,
+    /// What an `intersect` without an operation holds its one input against.
+    pub with: Option<Primitive>,
     /// The planes of a `slice`.
     pub planes: Option<Planes>,
     /// Density in g/cm^3, for the mass in a `measure`.
@@ -74,6 +77,7 @@ impl Params {
             tolerance_mm,
             radius_mm: None,
             operation: None,
+            with: None,
             planes: None,
             density_g_cm3: None,
             normals: false,
@@ -99,7 +103,7 @@ pub struct Input {
 pub struct Job {
     /// What to do.
     pub kind: JobKind,
-    /// With what: one input, or two or more for `intersect`.
+    /// With what: one input; two to compare for `measure`, two or more for `intersect`.
     pub inputs: Vec<Input>,
     /// How.
     pub params: Params,

@@ -2,6 +2,7 @@
 
 mod boolean;
 pub mod certificate;
+mod contact;
 pub mod job;
 mod operand;
 pub mod run;

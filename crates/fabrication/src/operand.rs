@@ -83,7 +83,8 @@ fn is_solid(attractor: &Attractor) -> bool {
 
 /// The tolerance that single precision leaves.
 pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tolerance, JobError> {
-    let extent = sources.iter().map(|source| source.bounds.extent()).fold(0.0, f64::max);
+    // A solid may reach beyond the exact one by the tolerance.
+    let extent = sources.iter().map(|source| source.bounds.extent()).fold(0.0, f64::max) + tolerance.mm();
     let taken = carried(extent);
     if tolerance.mm() < 2.0 * taken {
         let reachable = 2.0 * taken;

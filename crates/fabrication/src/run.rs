@@ -13,7 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, slice};
+use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, contact, slice};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,7 +177,14 @@ fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     if job.kind == JobKind::Intersect {
-        return boolean::combine(job, tolerance, budget);
+        return if job.params.operation.is_some() {
+            boolean::combine(job, tolerance, budget)
+        } else {
+            contact::contact(job, tolerance, budget)
+        };
+    }
+    if job.kind == JobKind::Measure && job.inputs.len() > 1 {
+        return contact::compare(job, tolerance, budget);
     }
     if job.kind == JobKind::Slice {
         return slice::slice(job, tolerance, budget);
@@ -332,6 +339,9 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     if job.kind == JobKind::Intersect {
         return boolean::plan(job, tolerance, budget);
+    }
+    if job.kind == JobKind::Measure && job.inputs.len() > 1 {
+        return Ok(Plan { leaf_cells: 0.0, triangles: 0.0, memory_bytes: 0.0, output_bytes: 0.0, lattice_pitch_mm: None });
     }
     if job.kind == JobKind::Slice {
         return slice::plan(job, tolerance, budget);

@@ -6,12 +6,14 @@ use glam::DVec3;
 
 use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params, Planes};
 use lacuna_kernel::budget::Limits;
+use lacuna_kernel::measure::contact::Primitive;
 use lacuna_kernel::model::Model;
 
 use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, OPERATIONS};
 use super::model::{model, version};
 use super::node::{Place, quoted};
 use super::walk::{Members, Walker, length, suggestion};
+use super::with::with;
 use crate::diagnostic::{Diagnostic, code};
 use crate::format::{FORMATS, Format};
 
@@ -170,7 +172,35 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
     let params = members.get("params").and_then(|place| params(walker, place, kind));
     let outputs = members.get("outputs").map_or(Some(Vec::new()), |place| outputs(walker, place, kind));
     let limits = members.get("limits").map_or(Some(RequestedLimits::default()), |place| limits(walker, place));
-    Some(JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits? })
+    let document = JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits? };
+    settle(walker, &members, &document)?;
+    Some(document)
+}
+
+/// What an intersect needs and makes: two inputs or more for an operation; two, or one and a primitive, and no file, without one.
+fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument) -> Option<()> {
+    if document.kind != JobKind::Intersect {
+        return Some(());
+    }
+    let (count, Params { operation, with, .. }) = (document.inputs.len(), &document.params);
+    let place = members.get("inputs").unwrap_or(members.place);
+    let wanted = match (operation, with) {
+        (Some(_), _) if count < 2 => Some("two or more for an operation"),
+        (None, None) if count != 2 => Some("two to be held against each other; three or more need an \"operation\", one a \"with\""),
+        (None, Some(_)) if count != 1 => Some("one to be held against what \"with\" says"),
+        _ => None,
+    };
+    if let Some(wanted) = wanted {
+        walker.fault(&place, code::WRONG_LENGTH, || format!("there are {count} inputs; expected {wanted}"));
+        return None;
+    }
+    if let (None, Some(place), false) = (operation, members.get("outputs"), document.outputs.is_empty()) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "without an \"operation\" intersect delivers numbers and no files; remove \"outputs\"".into()
+        });
+        return None;
+    }
+    Some(())
 }
 
 fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
@@ -196,14 +226,10 @@ fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
     None
 }
 
-/// Exactly one of `model`, `model_ref` and `inputs`; an operation takes two inputs or more, every other kind one.
+/// Exactly one of `model`, `model_ref` and `inputs`.
 fn inputs(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Vec<InputDocument>> {
     one_of(walker, members, &["model", "model_ref", "inputs"], "a job")?;
     let Some(place) = members.get("inputs") else {
-        if kind == Some(JobKind::Intersect) {
-            walker.fault(&members.place, code::MISSING_MEMBER, || "intersect needs the member \"inputs\": two models or more".into());
-            return None;
-        }
         return Some(vec![InputDocument { name: None, ..source(walker, members)? }]);
     };
     let mut names: HashSet<String> = HashSet::new();
@@ -221,10 +247,12 @@ fn inputs(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>)
         let source = one_of(walker, &members, &["model", "model_ref"], "an input").and_then(|()| source(walker, &members));
         Some(InputDocument { name: Some(name?), radius_mm: stated(radius)?, ..source? })
     });
+    // How many an intersect takes depends on its operation, which the job itself settles.
     match (length(place.node), kind) {
-        (Some(found), Some(JobKind::Intersect)) if found < 2 => walker.wrong_length(&place, found, "two inputs or more"),
         (_, Some(JobKind::Intersect)) => inputs,
-        (Some(found), _) if found > 1 => walker.wrong_length(&place, found, "one input: evaluate, solidify and measure take one model"),
+        (Some(found), Some(JobKind::Measure)) if found > 2 => walker.wrong_length(&place, found, "one input, or two to compare"),
+        (_, Some(JobKind::Measure)) => inputs,
+        (Some(found), _) if found > 1 => walker.wrong_length(&place, found, "one input: evaluate, solidify and slice take one model"),
         _ => inputs,
     }
 }
@@ -299,7 +327,7 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         Some(radius) => Some(radius?),
         None => None,
     };
-    let operation = operation(walker, &members, kind)?;
+    let (operation, with) = operation(walker, &members, kind)?;
     let density = members.get("density_g_cm3").map(|place| match kind {
         Some(kind) if kind != JobKind::Measure => {
             walker.fault(&place, code::CONFLICTING_MEMBERS, || {
@@ -314,28 +342,33 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
-    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, planes, density_g_cm3, normals, simplify, stability })
+    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, with, planes, density_g_cm3, normals, simplify, stability })
 }
 
-/// The operation, which intersect needs and no other kind takes.
-#[allow(clippy::option_option)]
-fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Option<Operation>> {
-    match (members.get("operation"), kind) {
-        (None, Some(JobKind::Intersect)) => {
-            walker.fault(&members.place, code::MISSING_MEMBER, || {
-                "intersect needs the member \"operation\": union, intersection or difference".into()
-            });
-            None
-        }
-        (None, _) => Some(None),
-        (Some(place), Some(kind)) if kind != JobKind::Intersect => {
+/// The operation and the primitive, which intersect alone takes, and of which one rules out the other.
+#[allow(clippy::type_complexity)]
+fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<(Option<Operation>, Option<Primitive>)> {
+    let mut legal = true;
+    for name in ["operation", "with"] {
+        if let (Some(place), Some(kind)) = (members.get(name), kind)
+            && kind != JobKind::Intersect
+        {
             walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-                "only intersect takes \"operation\"; remove it, or ask for the kind \"intersect\"".into()
+                format!("only intersect takes \"{name}\"; remove it, or ask for the kind \"intersect\"")
             });
-            None
+            legal = false;
         }
-        (Some(place), _) => walker.word(place, "an operation", &OPERATIONS).map(Some),
     }
+    if let (Some(_), Some(place)) = (members.get("operation"), members.get("with")) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "an operation combines inputs, and takes no \"with\"; remove one of the two".into()
+        });
+        legal = false;
+    }
+    let operation = members.get("operation").map(|place| walker.word(place, "an operation", &OPERATIONS));
+    let primitive = members.get("with").map(|place| with(walker, place));
+    let (operation, primitive) = (stated(operation)?, stated(primitive)?);
+    legal.then_some((operation, primitive))
 }
 
 /// The planes, which slice needs and no other kind takes.

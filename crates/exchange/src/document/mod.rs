@@ -28,6 +28,7 @@ mod transform;
 mod trim;
 mod units;
 mod walk;
+pub mod with;
 mod write;
 
 #[cfg(test)]

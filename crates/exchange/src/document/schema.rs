@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::grammar::{
     ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
     INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
-    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, control_point_schema, matrix_schema,
+    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, WITH, control_point_schema, matrix_schema,
     reference, trim_point_schema,
 };
 
@@ -90,6 +90,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
     schemas.push(("Border".into(), exactly_one(object(&BORDER, &[]), &["side", "vertices", "boundaries"])));
+    schemas.push(("With".into(), exactly_one(object(&WITH, &[]), &super::with::PRIMITIVES.map(|(word, _)| word))));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
     schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
     schemas.push(("AddressQuestion".into(), address_question()));

@@ -261,6 +261,7 @@ object! {
         .put("tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
         .put_some("operation", params.operation.as_ref())?
+        .put_some("with", params.with.as_ref().map(with).as_ref())?
         .put_some("normal", params.planes.as_ref().map(|planes| planes.normal.to_array().map(Number)).as_ref())?
         .put_some("offsets_mm", params.planes.as_ref().filter(|planes| planes.step_mm.is_none()).map(|planes| planes.offsets_mm.iter().copied().map(Number).collect::<Vec<_>>()).as_ref())?
         .put_some("step_mm", params.planes.as_ref().and_then(|planes| planes.step_mm).map(Number).as_ref())?
@@ -485,4 +486,10 @@ impl Serialize for Wire<'_, Entry> {
             Entry::Parameter(name) => serializer.serialize_str(name),
         }
     }
+}
+
+/// A primitive as its one member.
+fn with(primitive: &lacuna_kernel::measure::Primitive) -> std::collections::BTreeMap<&'static str, Vec<Number>> {
+    let (word, numbers) = super::with::numbers(primitive);
+    std::collections::BTreeMap::from([(word, numbers.into_iter().map(Number).collect())])
 }

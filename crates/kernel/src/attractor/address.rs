@@ -431,7 +431,7 @@ fn cell_of(attractor: &Attractor, root: usize, steps: &[Step]) -> Ball {
 
 /// What rounding may add to the distances of cells below a root, as in evaluations: products of depth 60 lose less
 /// than 1e-12 of the largest coordinate.
-pub(super) fn rounding(root: &Ball) -> f64 {
+pub(crate) fn rounding(root: &Ball) -> f64 {
     1e-12 * (root.radius + root.centre.iter().fold(0.0_f64, |most, x| most.max(x.abs())))
 }
 

@@ -24,6 +24,7 @@ use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, St
 use crate::budget::Budget;
 use crate::error::Kind;
 use crate::tolerance::Tolerance;
+pub(crate) use address::rounding;
 pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};

@@ -342,8 +342,8 @@ impl<'a> Workshop<'a> {
         }
         let own = centres[3];
         for (axis, other) in centres.into_iter().enumerate().take(3) {
-            let (u, v) = (1 << (axis + 1) % 3, 1 << (axis + 2) % 3);
-            let face = [0, u, u | v, v].map(|offset| corners[1 << axis | offset]);
+            let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            let face = [0, u, u | v, v].map(|offset| corners[(1 << axis) | offset]);
             let between = own.1 | other.1;
             if !is_mixed(face.iter().fold(between, |sides, corner| sides | corner.1)) {
                 continue;

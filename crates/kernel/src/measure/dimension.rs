@@ -221,6 +221,10 @@ fn ratio(first: &[f64], second: &[f64]) -> Option<f64> {
     similar.then(|| square.sqrt())
 }
 
+fn longest_edge(points: &[ControlPoint]) -> f64 {
+    gram(&projected(points, false)).into_iter().fold(0.0, f64::max).sqrt()
+}
+
 /// The dimension of the points' affine hull.
 fn rank(points: &[Point]) -> u8 {
     let Some(first) = points.first() else { return 0 };
@@ -412,8 +416,8 @@ fn are_apart(
         let second = [-end(other, &back)?.high, end(other, &forth)?.high];
         let size = (first[1] - first[0]).max(second[1] - second[0]);
         let overlap = (first[1] - second[0]).min(second[1] - first[0]);
-        // What is flat across the direction is apart by name only.
-        if size > 1e3 * SEPARATION * own.0.ball.radius.max(other.0.ball.radius) && overlap <= SEPARATION * size {
+        // What is flat across the direction, or a point, is apart by name only.
+        if size > 1e3 * SEPARATION * longest_edge(&own.1).max(longest_edge(&other.1)) && overlap <= SEPARATION * size {
             return Ok(true);
         }
     }

@@ -1,13 +1,17 @@
 //! Measures of shapes and solids, as intervals that are proven.
 
 pub mod bounds;
+pub mod contact;
 pub mod dimension;
+pub mod hausdorff;
 pub mod mass;
 pub mod section;
 pub mod triangle;
 
 pub use bounds::{AxisBox, bounding_box, extent_along};
+pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
+pub use hausdorff::{Directed, Hausdorff, hausdorff};
 
 /// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]

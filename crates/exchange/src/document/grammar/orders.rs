@@ -70,6 +70,27 @@ pub(in super::super) const JOB_INPUT: Object = Object {
     ],
 };
 
+/// The schema of so many numbers.
+macro_rules! numbers {
+    ($count:literal) => {
+        || json!({ "type": "array", "items": number(), "minItems": $count, "maxItems": $count })
+    };
+}
+
+pub(in super::super) const WITH: Object = Object {
+    title: "what a shape is held against",
+    about: "Exactly one of these, in mm whatever the unit of the model.",
+    members: &[
+        optional("point", "x, y, z: does it belong to the shape?", numbers!(3)),
+        optional("segment", "Its two ends.", numbers!(6)),
+        optional("ray", "Where it begins, and its direction of any length.", numbers!(6)),
+        optional("line", "A point of it, and its direction of any length.", numbers!(6)),
+        optional("plane", "Its normal of any length, and its distance from the origin along that.", numbers!(4)),
+        optional("box", "Its lower and its upper corner: with all points within.", numbers!(6)),
+        optional("ball", "Its centre and its radius: with all points within.", numbers!(4)),
+    ],
+};
+
 pub(in super::super) const JOB_PARAMS: Object = Object {
     title: "params",
     about: "Settings of a job. What a kind does not use must be absent.",
@@ -82,9 +103,12 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         ),
         optional(
             "operation",
-            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), or in the first and in none of the others (difference). Required by intersect alone.",
+            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), or in the first and in none of the others (difference). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file.",
             || one_of_words(&OPERATIONS.map(|(word, _)| word)),
         ),
+        optional("with", "What the one input of intersect is held against, where there is neither a second one nor an operation.", || {
+            reference("With")
+        }),
         optional("normal", "What the planes of slice are perpendicular to, of any length; [0, 0, 1] when absent.", vector),
         optional(
             "offsets_mm",

@@ -1,0 +1,303 @@
+//! The Hausdorff distance of two shapes, both ways, by pieces of the one and the cells of the other near them.
+//!
+//! Directed: h(A, B) = sup over x in A of d(x, B). Let a piece of A lie within r of a point c, and have a point within e of
+//! it. As d(., B) grows no faster than x moves, the piece's supremum lies in [d(c, B) - e, d(c, B) + r]. The piece of the
+//! largest upper end is split until that is within the tolerance of the largest lower end. Pieces are cells, and parts
+//! of simplices, which have no cells but are known exactly.
+//!
+//! d(c, B) is enclosed by the nodes of B's tree that may hold the points of B closest to the piece: those no farther from c
+//! than d(c, B) + 2 r, as a point x of the piece has its closest point within d(x, B) <= d(c, B) + r of it. A piece hands
+//! its nodes to its parts, so that no search begins at the roots.
+
+use super::Interval;
+use super::contact::{Body, ContactError, Nature, NodeId, Tree, corners, tree};
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Ball, Point, Site, distance_squared};
+use crate::budget::Budget;
+use crate::tolerance::Tolerance;
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
+/// How far the points of a shape are from another, at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Directed {
+    /// The supremum of the distances lies in this interval, in mm.
+    pub distance_mm: Interval,
+    /// A ball that holds a point of the shape which is at least as far as the lower end.
+    pub place: Ball,
+}
+
+/// The Hausdorff distance of two shapes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hausdorff {
+    /// How far points of the first are from the second.
+    pub from_first: Directed,
+    /// How far points of the second are from the first.
+    pub from_second: Directed,
+    /// Whether both intervals are as narrow as the tolerance; else a limit ended the search, and the intervals hold.
+    pub complete: bool,
+}
+
+impl Hausdorff {
+    /// The larger of both: the Hausdorff distance, in mm.
+    #[must_use]
+    pub fn distance_mm(&self) -> Interval {
+        let (first, second) = (self.from_first.distance_mm, self.from_second.distance_mm);
+        Interval { low: first.low.max(second.low), high: first.high.max(second.high) }
+    }
+}
+
+/// Nodes to look at, at most, and the memory that cells and pieces may take, in each direction.
+const MOST_NODES: u64 = 20_000_000;
+const MOST_BYTES: u64 = 512 << 20;
+
+/// The Hausdorff distance of two shapes, both ways, as intervals no wider than the tolerance unless a limit is hit.
+///
+/// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Shapes that
+/// are alike everywhere are the slowest: every cell as small as the tolerance is looked at.
+///
+/// # Errors
+/// [`ContactError`] for a trimmed surface, or when stopped. Limits are no errors.
+pub fn hausdorff(a: &Attractor, b: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Hausdorff, ContactError> {
+    let (from_first, first_complete) = directed(tree(a, budget)?, tree(b, budget)?, tolerance, budget)?;
+    let (from_second, second_complete) = directed(tree(b, budget)?, tree(a, budget)?, tolerance, budget)?;
+    Ok(Hausdorff { from_first, from_second, complete: first_complete && second_complete })
+}
+
+/// A part of the first shape.
+#[derive(Clone, Copy)]
+enum Part {
+    Node(NodeId),
+    /// A part of a simplex.
+    Site(Site),
+}
+
+/// A piece in the queue.
+struct Piece {
+    /// The supremum over it, at most.
+    high: f64,
+    /// Order of discovery.
+    number: u64,
+    part: Part,
+    /// Nodes of the second shape that may hold the closest points.
+    near: Vec<NodeId>,
+}
+
+impl PartialEq for Piece {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Piece {}
+impl PartialOrd for Piece {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Piece {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.high.total_cmp(&other.high).then(other.number.cmp(&self.number))
+    }
+}
+
+struct Search<'a> {
+    first: Tree<'a>,
+    second: Tree<'a>,
+    budget: &'a Budget,
+    slack: f64,
+    /// How narrow distances from the second shape need not be: a small share of the tolerance.
+    accuracy_mm: f64,
+    queue: BinaryHeap<Piece>,
+    /// Memory of the pieces in the queue.
+    bytes: u64,
+    looked: u64,
+    number: u64,
+    /// The largest lower end, and where.
+    low: f64,
+    place: Ball,
+}
+
+fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Budget) -> Result<(Directed, bool), ContactError> {
+    let mut search = Search {
+        slack: first.slack + second.slack,
+        place: first.node(0).body.ball,
+        first,
+        second,
+        budget,
+        accuracy_mm: tolerance.mm() / 16.0,
+        queue: BinaryHeap::new(),
+        bytes: 0,
+        looked: 0,
+        number: 0,
+        low: 0.0,
+    };
+    search.look(Part::Node(0), &[0], f64::INFINITY);
+    // A piece that cannot be split ends the search: all others are no farther.
+    let mut high = 0.0;
+    let mut complete = true;
+    while let Some(piece) = search.queue.pop() {
+        high = piece.high;
+        if high - search.low <= tolerance.mm() {
+            break;
+        }
+        budget.cancel.check()?;
+        if search.is_exhausted() {
+            complete = false;
+            break;
+        }
+        search.bytes -= memory(&piece);
+        if !search.split(&piece) {
+            complete = false;
+            break;
+        }
+        high = 0.0;
+    }
+    let distance_mm = Interval { low: search.low.min(high.max(search.low)), high: high.max(search.low) };
+    Ok((Directed { distance_mm, place: search.place }, complete))
+}
+
+fn memory(piece: &Piece) -> u64 {
+    (std::mem::size_of::<Piece>() + std::mem::size_of_val(piece.near.as_slice())) as u64
+}
+
+impl Search<'_> {
+    /// Whether a limit was hit.
+    fn is_exhausted(&self) -> bool {
+        let limits = &self.budget.limits;
+        let bytes = self.first.bytes + self.second.bytes + self.bytes;
+        self.looked > limits.cells.min(MOST_NODES) || bytes > limits.memory_bytes.min(MOST_BYTES)
+    }
+
+    /// Puts the parts of a piece into the queue: whether it has any. One as small as what is rounded has none.
+    fn split(&mut self, piece: &Piece) -> bool {
+        if self.around(piece.part).1 <= self.slack {
+            return false;
+        }
+        let parts: Vec<Part> = match piece.part {
+            Part::Node(id) if self.first.is_splittable(id) => self.first.children(id).map(Part::Node).collect(),
+            Part::Node(id) if self.first.subdivides(id) => Vec::new(),
+            Part::Node(id) => self.first.node(id).body.sites.iter().flat_map(halves).map(Part::Site).collect(),
+            Part::Site(site) => halves(&site).into_iter().map(Part::Site).collect(),
+        };
+        parts.iter().for_each(|&part| self.look(part, &piece.near, piece.high));
+        !parts.is_empty()
+    }
+
+    /// Encloses the supremum over a part, at most `most`, and puts it into the queue if it may be the largest.
+    fn look(&mut self, part: Part, near: &[NodeId], most: f64) {
+        let (centre, radius, astray) = self.around(part);
+        let (least, farthest, near) = self.distance(&centre, radius, near);
+        let low = least - astray - self.slack;
+        if low > self.low {
+            (self.low, self.place) = (low, Ball { centre, radius: astray + self.slack });
+        }
+        let high = (farthest + radius + self.slack).min(most);
+        if high > self.low {
+            self.number += 1;
+            let piece = Piece { high, number: self.number, part, near };
+            self.bytes += memory(&piece);
+            self.queue.push(piece);
+        }
+    }
+
+    /// A point c, how far points of the part are from it at most, and how far the nearest is at most.
+    fn around(&self, part: Part) -> (Point, f64, f64) {
+        let farthest = |c: &Point, site: &Site| corners(site).iter().map(|x| distance_squared(c, x)).fold(0.0, f64::max).sqrt();
+        match part {
+            Part::Site(site) => {
+                let c = middle(&site);
+                (c, farthest(&c, &site), 0.0)
+            }
+            Part::Node(id) => {
+                let body = &self.first.node(id).body;
+                let c = middle(&body.sites[0]);
+                (c, body.sites.iter().map(|site| farthest(&c, site)).fold(0.0, f64::max) + body.error, body.error)
+            }
+        }
+    }
+
+    /// [least, most] of the distance of c from the second shape, and the nodes that may be closest to points within
+    /// `radius` of c, all of `near` being known to be enough. The interval is narrow against the radius, or the
+    /// tolerance, unless a limit is hit.
+    fn distance(&mut self, c: &Point, radius: f64, near: &[NodeId]) -> (f64, f64, Vec<NodeId>) {
+        let mut queue = BinaryHeap::new();
+        let mut high = f64::INFINITY;
+        for &id in near {
+            self.enter(c, id, &mut queue, &mut high);
+        }
+        let wanted = self.accuracy_mm.max(0.25 * radius);
+        let mut done = Vec::new();
+        let mut least = f64::INFINITY;
+        while let Some(Reverse(Near { low, id })) = queue.pop() {
+            // Whatever ends the search, what was not opened bounds the distance.
+            if high - low <= wanted || self.is_exhausted() || self.budget.cancel.reason().is_some() {
+                least = least.min(low);
+                done.push((low, id));
+                break;
+            }
+            let children = self.second.children(id);
+            if children.is_empty() {
+                // As narrow as can be: others may still be nearer than this one surely is.
+                least = least.min(low);
+                done.push((low, id));
+                continue;
+            }
+            children.for_each(|child| self.enter(c, child, &mut queue, &mut high));
+        }
+        done.extend(queue.into_iter().map(|Reverse(Near { low, id })| (low, id)));
+        done.retain(|&(low, _)| low <= high + 2.0 * (radius + self.slack));
+        // In the order of their discovery, whatever that of the heap.
+        done.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        (least.min(high), high, done.into_iter().map(|(_, id)| id).collect())
+    }
+
+    fn enter(&mut self, c: &Point, id: NodeId, queue: &mut BinaryHeap<Reverse<Near>>, high: &mut f64) {
+        self.looked += 1;
+        let gap = Body::of_site(Site::Point(*c), Nature::Loose).gap(&self.second.node(id).body, self.slack);
+        *high = high.min(gap.high);
+        let slab = gap.direction.map_or(0.0, |n| -self.second.reach(id, &n.map(|x| -x)) - n.iter().zip(c).map(|(n, c)| n * c).sum::<f64>());
+        queue.push(Reverse(Near { low: gap.low.max(slab - self.slack), id }));
+    }
+}
+
+/// A node of the second shape, by its distance.
+struct Near {
+    low: f64,
+    id: NodeId,
+}
+
+impl PartialEq for Near {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Near {}
+impl PartialOrd for Near {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Near {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.low.total_cmp(&other.low).then(self.id.cmp(&other.id))
+    }
+}
+
+/// The mean of the corners.
+fn middle(site: &Site) -> Point {
+    let corners = corners(site);
+    std::array::from_fn(|axis| corners.iter().map(|x| x[axis] / corners.len() as f64).sum())
+}
+
+/// Parts of half the size: two of a segment, four of a triangle, none of a point.
+fn halves(site: &Site) -> Vec<Site> {
+    let half = |a: &Point, b: &Point| -> Point { std::array::from_fn(|axis| 0.5 * a[axis] + 0.5 * b[axis]) };
+    match site {
+        Site::Point(_) => Vec::new(),
+        Site::Segment([a, b]) => vec![Site::Segment([*a, half(a, b)]), Site::Segment([half(a, b), *b])],
+        Site::Triangle([a, b, c]) => {
+            let (ab, bc, ca) = (half(a, b), half(b, c), half(c, a));
+            [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]].map(Site::Triangle).into()
+        }
+    }
+}

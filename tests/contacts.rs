@@ -1,0 +1,102 @@
+//! Distances, contacts and comparisons of shapes through the command and as job documents, against closed forms.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use lacuna_exchange::document::{DocumentLimits, read_job};
+use lacuna_exchange::library;
+use lacuna_tests::support::binary;
+use lacuna_tests::support::scratch::Scratch;
+use serde_json::{Value, json};
+
+fn write(folder: &Scratch, name: &str, shape: &Value) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, json!({ "lacuna": 1, "shape": shape }).to_string()).unwrap();
+    path
+}
+
+fn told(words: &[&str], paths: &[&Path]) -> Value {
+    let arguments = words.iter().map(OsStr::new).chain(paths.iter().map(|path| path.as_os_str()));
+    serde_json::from_slice(&binary::succeed(arguments)).unwrap()
+}
+
+#[track_caller]
+fn assert_within(interval: &Value, exact: f64, width: f64) {
+    let [low, high] = [0, 1].map(|k| interval[k].as_f64().unwrap());
+    assert!(low <= exact && exact <= high && high - low <= width, "{exact} and {interval}");
+}
+
+#[test]
+fn segments_that_pass_each_other() {
+    let folder = Scratch::new();
+    let first = write(&folder, "a.json", &json!({ "family": "mesh", "vertices": [[-5, 0, 0], [5, 0, 0]], "faces": [[0, 1]] }));
+    let second = write(&folder, "b.json", &json!({ "family": "mesh", "vertices": [[0, -5, 3], [0, 5, 3]], "faces": [[0, 1]] }));
+    let found = told(&["intersect", "--tolerance", "0.01"], &[&first, &second]);
+    assert_eq!((&found["contact"]["verdict"], &found["contact"]["complete"]), (&json!("disjoint"), &json!(true)));
+    assert_within(&found["contact"]["distance_mm"], 3.0, 0.05);
+    assert_eq!(found["contact"]["places"], json!([]));
+    // They cross when the second is lifted to the first.
+    let third = write(&folder, "c.json", &json!({ "family": "mesh", "vertices": [[0, -5, 0], [0, 5, 0]], "faces": [[0, 1]] }));
+    let found = told(&["intersect", "--tolerance", "0.01"], &[&first, &third]);
+    assert_eq!((&found["contact"]["verdict"], found["contact"]["places"].as_array().unwrap().len()), (&json!("touching"), 1));
+    // Each end is 5 from the other segment.
+    let found = told(&["measure", "--tolerance", "0.01"], &[&first, &third]);
+    assert_within(&found["hausdorff"]["distance_mm"], 5.0, 0.01);
+}
+
+#[test]
+fn a_fractal_and_what_lies_beside_it() {
+    let folder = Scratch::new();
+    let path = folder.join("koch.json");
+    std::fs::write(&path, library::find("koch_curve").unwrap().document).unwrap();
+    // 100 mm long, its top at sqrt(3) / 6 of that; nothing of it below the base line.
+    let top = 100.0 * 3.0_f64.sqrt() / 6.0;
+    let plane = |height: f64| told(&["intersect", "--tolerance", "0.01", "--with", &format!("plane:0,1,0,{height}")], &[&path]);
+    assert_within(&plane(top + 2.0)["contact"]["distance_mm"], 2.0, 0.05);
+    assert_eq!(plane(top / 2.0)["contact"]["verdict"], "touching");
+    let point = told(&["intersect", "--tolerance", "0.01", "--with", &format!("point:50,{top},0")], &[&path]);
+    assert_eq!((&point["contact"]["verdict"], point["contact"]["places"].as_array().unwrap().len()), (&json!("near"), 1));
+    let ball = told(&["intersect", "--tolerance", "0.01", "--with", "ball:50,-4,0,1"], &[&path]);
+    assert_eq!(ball["contact"]["verdict"], "disjoint");
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let folder = Scratch::new();
+    let path = write(&folder, "a.json", &json!({ "family": "mesh", "vertices": [[0, 0, 0]], "faces": [[0]] }));
+    for words in [
+        vec!["intersect", "--tolerance", "0.1"],
+        vec!["intersect", "--tolerance", "0.1", "--with", "plane:0,0,1"],
+        vec!["intersect", "--tolerance", "0.1", "--with", "cone:0,0,1"],
+        vec!["intersect", "--tolerance", "0.1", "--with", "point:0,0,0", "--operation", "union", "-o", "a.stl"],
+        vec!["intersect", "--tolerance", "0.1", "--operation", "union"],
+    ] {
+        let output = binary::run(words.iter().map(OsStr::new).chain([path.as_os_str()]));
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let output =
+        binary::run(["intersect", "--tolerance", "0.1", "--with", "plane:0,0,0,1"].iter().map(OsStr::new).chain([path.as_os_str()]));
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+    let model = json!({ "shape": { "family": "mesh", "vertices": [[0, 0, 0]], "faces": [[0]] } });
+    let input = |name: &str| json!({ "name": name, "model": model });
+    let job = |inputs: Value, params: Value| json!({ "lacuna": 1, "kind": "intersect", "inputs": inputs, "params": params }).to_string();
+    let tolerance = json!({ "tolerance_mm": 0.1 });
+    let with = json!({ "tolerance_mm": 0.1, "with": { "point": [0, 0, 0] } });
+    let both = json!({ "tolerance_mm": 0.1, "with": { "point": [0, 0, 0], "ball": [0, 0, 0, 1] } });
+    let short = json!({ "tolerance_mm": 0.1, "with": { "plane": [0, 0, 1] } });
+    let union = json!({ "tolerance_mm": 0.1, "operation": "union" });
+    for (document, place) in [
+        (job(json!([input("a")]), tolerance.clone()), "/inputs"),
+        (job(json!([input("a"), input("b"), input("c")]), tolerance.clone()), "/inputs"),
+        (job(json!([input("a"), input("b")]), with.clone()), "/inputs"),
+        (job(json!([input("a")]), union), "/inputs"),
+        (job(json!([input("a")]), both), "/params/with/ball"),
+        (job(json!([input("a")]), short), "/params/with/plane"),
+    ] {
+        let faults = read_job(document.as_bytes(), &DocumentLimits::default()).unwrap_err();
+        assert!(faults.iter().any(|fault| fault.pointer == place), "{document}: {faults:?}");
+    }
+    for document in [job(json!([input("a"), input("b")]), tolerance), job(json!([input("a")]), with)] {
+        assert!(read_job(document.as_bytes(), &DocumentLimits::default()).is_ok(), "{document}");
+    }
+}
