@@ -38,7 +38,9 @@ fn segments_that_pass_each_other() {
     // They cross when the second is lifted to the first.
     let third = write(&folder, "c.json", &json!({ "family": "mesh", "vertices": [[0, -5, 0], [0, 5, 0]], "faces": [[0, 1]] }));
     let found = told(&["intersect", "--tolerance", "0.01"], &[&first, &third]);
-    assert_eq!((&found["contact"]["verdict"], found["contact"]["places"].as_array().unwrap().len()), (&json!("touching"), 1));
+    // That curves in one plane meet is not proven; how near they come is.
+    assert_eq!((&found["contact"]["verdict"], found["contact"]["places"].as_array().unwrap().len()), (&json!("near"), 1));
+    assert_within(&found["contact"]["distance_mm"], 0.0, 1e-9);
     // Each end is 5 from the other segment.
     let found = told(&["measure", "--tolerance", "0.01"], &[&first, &third]);
     assert_within(&found["hausdorff"]["distance_mm"], 5.0, 0.01);

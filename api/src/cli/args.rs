@@ -214,6 +214,8 @@ pub(super) enum OperationName {
     Intersection,
     /// What lies in the first input and in none of the others.
     Difference,
+    /// The convex hull of all inputs.
+    Hull,
 }
 
 #[derive(Debug, Args)]

@@ -58,6 +58,7 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
         OperationName::Union => Operation::Union,
         OperationName::Intersection => Operation::Intersection,
         OperationName::Difference => Operation::Difference,
+        OperationName::Hull => Operation::Hull,
     });
     let mut inputs: Vec<Input> = args.models.iter().map(|path| input_of(path)).collect::<Result<_, _>>()?;
     match args.radius.as_slice() {

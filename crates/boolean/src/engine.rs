@@ -15,6 +15,8 @@ pub enum Operation {
     Intersection,
     /// What lies in the first operand and in none of the others.
     Difference,
+    /// The convex hull of all operands.
+    Hull,
 }
 
 /// Combines closed, outward triangle meshes.

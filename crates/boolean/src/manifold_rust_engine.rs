@@ -71,6 +71,11 @@ fn watched<T: Send>(cancel: &CancelToken, work: impl FnOnce(&EngineToken) -> T) 
 }
 
 fn evaluate(operation: Operation, operands: &[&TriMesh], token: &EngineToken) -> Result<TriMesh, BooleanError> {
+    if operation == Operation::Hull {
+        let solids: Result<Vec<Manifold>, BooleanError> =
+            operands.iter().enumerate().map(|(index, mesh)| import(index, mesh).map(Manifold::from_impl)).collect();
+        return finished(&Manifold::hull_manifolds(&solids?));
+    }
     let mut leaves = Vec::with_capacity(operands.len());
     for (index, mesh) in operands.iter().enumerate() {
         leaves.push(CsgNode::leaf(import(index, mesh)?));
@@ -80,13 +85,16 @@ fn evaluate(operation: Operation, operands: &[&TriMesh], token: &EngineToken) ->
         }
     }
     let kind = match operation {
-        Operation::Union => OpType::Add,
+        Operation::Union | Operation::Hull => OpType::Add,
         Operation::Intersection => OpType::Intersect,
         Operation::Difference => OpType::Subtract,
     };
-    let result = Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token)));
+    finished(&Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token))))
+}
+
+fn finished(result: &Manifold) -> Result<TriMesh, BooleanError> {
     match result.status() {
-        Status::NoError => Ok(export(&result)),
+        Status::NoError => Ok(export(result)),
         Status::Cancelled => Ok(TriMesh::default()),
         Status::ResultTooLarge => Err(BooleanError::ResultTooLarge),
         status => Err(BooleanError::Engine(format!("{status:?}"))),

@@ -23,7 +23,7 @@ pub(crate) fn combine(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
             "intersect needs an operation: union, intersection or difference".into(),
         ));
     };
-    if job.inputs.len() < 2 {
+    if job.inputs.len() < 2 && operation != Operation::Hull {
         let message = format!("the job has {} inputs, and an operation takes two or more", job.inputs.len());
         return Err(JobError::new(Kind::Invalid, "job.inputs", message));
     }
@@ -38,7 +38,7 @@ pub(crate) fn combine(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     let combined = evaluate(operation, &operands, job, budget)?;
     if combined.triangles.is_empty() {
         let message = match operation {
-            Operation::Union => "the inputs have no volume",
+            Operation::Union | Operation::Hull => "the inputs have no volume",
             Operation::Intersection => "the result is empty: no point lies inside of all inputs, though surfaces may touch",
             Operation::Difference => "the result is empty: the other inputs cover all of the first",
         };
@@ -63,6 +63,7 @@ fn evaluate(operation: Operation, operands: &[Operand], job: &Job, budget: &Budg
         Operation::Union => lacuna_boolean::Operation::Union,
         Operation::Intersection => lacuna_boolean::Operation::Intersection,
         Operation::Difference => lacuna_boolean::Operation::Difference,
+        Operation::Hull => lacuna_boolean::Operation::Hull,
     };
     let at_fault = |error: BooleanError, first: &[usize]| match error {
         BooleanError::NotASolid { operand, fault } => {
@@ -76,7 +77,7 @@ fn evaluate(operation: Operation, operands: &[Operand], job: &Job, budget: &Budg
     // An input of several surfaces is joined first where that is not what the operation does with it anyway.
     let mut joined: Vec<Option<TriMesh>> = Vec::with_capacity(operands.len());
     for (index, operand) in operands.iter().enumerate() {
-        let alike = operation == Operation::Union || (operation == Operation::Difference && index > 0);
+        let alike = matches!(operation, Operation::Union | Operation::Hull) || (operation == Operation::Difference && index > 0);
         let whole = (!alike && operand.meshes.len() > 1).then(|| {
             let meshes: Vec<&TriMesh> = operand.meshes.iter().collect();
             ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| at_fault(error, &vec![index; meshes.len()]))

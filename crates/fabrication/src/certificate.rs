@@ -214,7 +214,7 @@ pub struct PlaceStatement {
     pub nearest: CellPairStatement,
 }
 
-/// How far two shapes are apart, and where they come within the tolerance of each other.
+/// How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for a solid is its surface here.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
@@ -244,7 +244,7 @@ pub struct DirectedStatement {
     pub near_mm: [f64; 3],
 }
 
-/// The Hausdorff distance of two shapes.
+/// The Hausdorff distance of two shapes. A model that stands for a solid is its surface here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
@@ -633,7 +633,8 @@ pub(crate) fn of_operation(
         outer_bound_mm: Some(outer),
         leaf_cells: operands.iter().map(|operand| operand.leaf_cells).sum(),
         bbox_mm: box_of(operation, operands),
-        volume_mm3: exact[1].is_finite().then_some([exact[0].max(0.0), exact[1]]),
+        // Hulls of sets differ by more than the sets do.
+        volume_mm3: (exact[1].is_finite() && operation != Operation::Hull).then_some([exact[0].max(0.0), exact[1]]),
         operation: Some(OperationStatement {
             operation,
             engine: engine.to_owned(),
@@ -666,7 +667,7 @@ fn box_of(operation: Operation, operands: &[Operand]) -> [[Interval; 3]; 2] {
     };
     let axis = |axis: usize| -> [Interval; 2] {
         match operation {
-            Operation::Union => [
+            Operation::Union | Operation::Hull => [
                 [fold(|b, k| b.low[k].low, axis, f64::min), fold(|b, k| b.low[k].high, axis, f64::min)],
                 [fold(|b, k| b.high[k].low, axis, f64::max), fold(|b, k| b.high[k].high, axis, f64::max)],
             ],

@@ -43,6 +43,8 @@ pub enum Operation {
     Intersection,
     /// What lies in the first input and in none of the others.
     Difference,
+    /// The convex hull of all inputs.
+    Hull,
 }
 
 /// Settings of a job. What a kind does not use must be absent.

@@ -185,7 +185,7 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
     let (count, Params { operation, with, .. }) = (document.inputs.len(), &document.params);
     let place = members.get("inputs").unwrap_or(members.place);
     let wanted = match (operation, with) {
-        (Some(_), _) if count < 2 => Some("two or more for an operation"),
+        (Some(operation), _) if count < 2 && *operation != Operation::Hull => Some("two or more for an operation"),
         (None, None) if count != 2 => Some("two to be held against each other; three or more need an \"operation\", one a \"with\""),
         (None, Some(_)) if count != 1 => Some("one to be held against what \"with\" says"),
         _ => None,

@@ -11,8 +11,12 @@ use super::{
 use crate::format::FORMATS;
 
 /// Operations by their words.
-pub(in super::super) const OPERATIONS: [(&str, Operation); 3] =
-    [("union", Operation::Union), ("intersection", Operation::Intersection), ("difference", Operation::Difference)];
+pub(in super::super) const OPERATIONS: [(&str, Operation); 4] = [
+    ("union", Operation::Union),
+    ("intersection", Operation::Intersection),
+    ("difference", Operation::Difference),
+    ("hull", Operation::Hull),
+];
 
 /// Kinds of jobs of the grammar that cannot be done yet.
 pub(in super::super) const LATER_KINDS: [&str; 5] = ["check", "sla", "cast", "panels", "convert"];
@@ -103,7 +107,7 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         ),
         optional(
             "operation",
-            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), or in the first and in none of the others (difference). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file.",
+            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), in the first and in none of the others (difference), or their convex hull (hull). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file.",
             || one_of_words(&OPERATIONS.map(|(word, _)| word)),
         ),
         optional("with", "What the one input of intersect is held against, where there is neither a second one nor an operation.", || {
