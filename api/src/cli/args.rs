@@ -330,7 +330,7 @@ pub(super) struct RunArgs {
     /// The job document.
     pub(super) job: PathBuf,
     /// Folder for the files; it is made if needed.
-    #[arg(short, long = "output", value_name = "DIR")]
+    #[arg(short = 'o', long = "output", value_name = "DIR")]
     pub(super) folder: PathBuf,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
@@ -450,6 +450,26 @@ mod tests {
     #[test]
     fn the_grammar_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    /// The examples of the pages parse: a command's short options are what they say.
+    #[test]
+    fn the_commands_of_the_pages_parse() {
+        let pages = [include_str!("../../README.md"), include_str!("../../../README.md")];
+        let commands = pages.iter().flat_map(|page| page.lines()).filter_map(|line| line.strip_prefix("$ lacuna "));
+        let mut count = 0;
+        for command in commands {
+            // Addresses are quoted; nothing else is.
+            let mut words = vec!["lacuna".to_owned()];
+            for (index, part) in command.split('"').enumerate() {
+                let plain = index % 2 == 0;
+                words.extend(if plain { part.split_whitespace().map(str::to_owned).collect() } else { vec![part.to_owned()] });
+            }
+            words.retain(|word| word != "&");
+            assert!(Cli::try_parse_from(&words).is_ok(), "{command}");
+            count += 1;
+        }
+        assert!(count > 10, "{count}");
     }
 
     #[test]

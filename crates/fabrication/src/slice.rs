@@ -62,8 +62,9 @@ pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<
             offset_mm: section.offset_mm,
             polygons: section.polygons.len() as u64,
             holes: section.polygons.iter().map(|polygon| polygon.holes.len() as u64).sum(),
-            area_mm2: section.area_mm2(),
-            perimeter_mm: section.perimeter_mm(),
+            // An empty sum is a negative zero.
+            area_mm2: section.area_mm2() + 0.0,
+            perimeter_mm: section.perimeter_mm() + 0.0,
         });
         Ok(())
     });
