@@ -87,11 +87,13 @@ fn what_cannot_be_compared_is_refused() {
     let both = json!({ "tolerance_mm": 0.1, "with": { "point": [0, 0, 0], "ball": [0, 0, 0, 1] } });
     let short = json!({ "tolerance_mm": 0.1, "with": { "plane": [0, 0, 1] } });
     let union = json!({ "tolerance_mm": 0.1, "operation": "union" });
+    let dilated = json!({ "tolerance_mm": 0.1, "radius_mm": 1 });
     for (document, place) in [
         (job(json!([input("a")]), tolerance.clone()), "/inputs"),
         (job(json!([input("a"), input("b"), input("c")]), tolerance.clone()), "/inputs"),
         (job(json!([input("a"), input("b")]), with.clone()), "/inputs"),
         (job(json!([input("a")]), union), "/inputs"),
+        (job(json!([input("a"), input("b")]), dilated), "/params"),
         (job(json!([input("a")]), both), "/params/with/ball"),
         (job(json!([input("a")]), short), "/params/with/plane"),
     ] {

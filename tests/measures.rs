@@ -87,8 +87,9 @@ fn dimensions_that_are_bounded() {
     assert_eq!(basis, DimensionBasis::Contraction);
     assert!(low <= high && high <= 3.0, "[{low}, {high}]");
     let bezier = r#"{"lacuna": 1, "shape": {"family": "bezier_curve", "control_points": [[0,0,0],[1,2,0],[3,1,1],[4,0,0]]}}"#;
-    let ([_, high], _) = dimension(document(bezier));
-    assert!((high - 1.0).abs() < 1e-6, "{high}");
+    // A smooth curve: 1, which the bound exceeds as far as that of the contraction, 1/2, is not sharp.
+    let ([low, high], _) = dimension(document(bezier));
+    assert!(low <= 1.0 && (1.0..1.05).contains(&high), "[{low}, {high}]");
 }
 
 #[test]

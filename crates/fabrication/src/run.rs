@@ -176,58 +176,53 @@ fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
-    if job.kind == JobKind::Intersect {
-        return if job.params.operation.is_some() {
-            boolean::combine(job, tolerance, budget)
-        } else {
-            contact::contact(job, tolerance, budget)
-        };
+    match job.kind {
+        JobKind::Evaluate => evaluate(&lower(job, budget)?.attractor, tolerance, job.params.normals, budget),
+        JobKind::Solidify => solidify(job, tolerance, budget),
+        JobKind::Measure if job.inputs.len() > 1 => contact::compare(job, tolerance, budget),
+        JobKind::Measure => measure(job, tolerance, budget),
+        JobKind::Intersect if job.params.operation.is_some() => boolean::combine(job, tolerance, budget),
+        JobKind::Intersect => contact::contact(job, tolerance, budget),
+        JobKind::Slice => slice::slice(job, tolerance, budget),
     }
-    if job.kind == JobKind::Measure && job.inputs.len() > 1 {
-        return contact::compare(job, tolerance, budget);
+}
+
+fn solidify(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+    let Some(radius) = radius(job)? else {
+        return Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()));
+    };
+    let attractor = &lower(job, budget)?.attractor;
+    let make = if job.params.simplify { dilate } else { dilate_unsimplified };
+    let dilation = make(attractor, radius, tolerance, budget)?;
+    let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+    if job.params.stability {
+        // Critical radii from half to twice the radius, and whether there are any within the bound that was reached.
+        let reached = Tolerance::new(certificate.achieved_bound_mm)?;
+        let found = stability(attractor, radius, reached, [0.5 * radius.mm(), 2.0 * radius.mm()], budget)?;
+        certificate.state_stability(&found, radius, reached);
     }
-    if job.kind == JobKind::Slice {
-        return slice::slice(job, tolerance, budget);
-    }
+    Ok(Outcome { geometry: Geometry::Solid(dilation.solid), certificate })
+}
+
+fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let radius = radius(job)?;
-    let lowered = lower(job, budget)?;
-    let attractor = &lowered.attractor;
-    match (job.kind, radius) {
-        (JobKind::Evaluate, _) => evaluate(attractor, tolerance, job.params.normals, budget),
-        (JobKind::Solidify, Some(radius)) => {
-            let make = if job.params.simplify { dilate } else { dilate_unsimplified };
-            let dilation = make(attractor, radius, tolerance, budget)?;
-            let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
-            if job.params.stability {
-                // Critical radii from half to twice the radius, and whether there are any within the bound that was reached.
-                let reached = Tolerance::new(certificate.achieved_bound_mm)?;
-                let found = stability(attractor, radius, reached, [0.5 * radius.mm(), 2.0 * radius.mm()], budget)?;
-                certificate.state_stability(&found, radius, reached);
-            }
-            Ok(Outcome { geometry: Geometry::Solid(dilation.solid), certificate })
+    let attractor = &lower(job, budget)?.attractor;
+    let Some(radius) = radius else {
+        let bounds = bounding_box(attractor, budget)?;
+        let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
+        certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
+        if let Some((mesh, true)) = mesh_of(attractor) {
+            certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
         }
-        (JobKind::Solidify, None) => {
-            Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()))
-        }
-        (JobKind::Measure | JobKind::Intersect | JobKind::Slice, Some(radius)) => {
-            let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
-            let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
-            let mesh = dilation.solid.mesh();
-            let difference = dilated_difference(volume(mesh), radius.mm(), dilation.inner_mm, dilation.outer_mm);
-            certificate.state_mass(mesh, difference, &dilation.bounds.grown(radius.mm() + dilation.outer_mm), job.params.density_g_cm3);
-            certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
-            Ok(Outcome { geometry: Geometry::None, certificate })
-        }
-        (JobKind::Measure | JobKind::Intersect | JobKind::Slice, None) => {
-            let bounds = bounding_box(attractor, budget)?;
-            let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
-            certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
-            if let Some((mesh, true)) = mesh_of(attractor) {
-                certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
-            }
-            Ok(Outcome { geometry: Geometry::None, certificate })
-        }
-    }
+        return Ok(Outcome { geometry: Geometry::None, certificate });
+    };
+    let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
+    let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+    let mesh = dilation.solid.mesh();
+    let difference = dilated_difference(volume(mesh), radius.mm(), dilation.inner_mm, dilation.outer_mm);
+    certificate.state_mass(mesh, difference, &dilation.bounds.grown(radius.mm() + dilation.outer_mm), job.params.density_g_cm3);
+    certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
+    Ok(Outcome { geometry: Geometry::None, certificate })
 }
 
 /// The box, and the share of the tolerance that single precision leaves.

@@ -177,26 +177,40 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
     Some(document)
 }
 
-/// What an intersect needs and makes: two inputs or more for an operation; two, or one and a primitive, and no file, without one.
+/// What depends on several members: an operation takes two inputs or more; two shapes, or one and a primitive, are held against each other as they are,
+/// and make no file.
 fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument) -> Option<()> {
-    if document.kind != JobKind::Intersect {
-        return Some(());
-    }
     let (count, Params { operation, with, .. }) = (document.inputs.len(), &document.params);
     let place = members.get("inputs").unwrap_or(members.place);
-    let wanted = match (operation, with) {
-        (Some(operation), _) if count < 2 && *operation != Operation::Hull => Some("two or more for an operation"),
-        (None, None) if count != 2 => Some("two to be held against each other; three or more need an \"operation\", one a \"with\""),
-        (None, Some(_)) if count != 1 => Some("one to be held against what \"with\" says"),
+    let wanted = match (document.kind, operation, with) {
+        (JobKind::Intersect, Some(operation), _) if count < 2 && *operation != Operation::Hull => Some("two or more for an operation"),
+        (JobKind::Intersect, None, None) if count != 2 => {
+            Some("two to be held against each other; three or more need an \"operation\", one a \"with\"")
+        }
+        (JobKind::Intersect, None, Some(_)) if count != 1 => Some("one to be held against what \"with\" says"),
         _ => None,
     };
     if let Some(wanted) = wanted {
         walker.fault(&place, code::WRONG_LENGTH, || format!("there are {count} inputs; expected {wanted}"));
         return None;
     }
-    if let (None, Some(place), false) = (operation, members.get("outputs"), document.outputs.is_empty()) {
+    let compares = match document.kind {
+        JobKind::Intersect => operation.is_none(),
+        JobKind::Measure => count > 1,
+        _ => false,
+    };
+    if !compares {
+        return Some(());
+    }
+    if let (Some(place), false) = (members.get("outputs"), document.outputs.is_empty()) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || "a comparison delivers numbers and no files; remove \"outputs\"".into());
+        return None;
+    }
+    let Params { radius_mm, density_g_cm3, .. } = document.params;
+    if radius_mm.is_some() || density_g_cm3.is_some() || document.inputs.iter().any(|input| input.radius_mm.is_some()) {
+        let place = members.get("params").unwrap_or(members.place);
         walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-            "without an \"operation\" intersect delivers numbers and no files; remove \"outputs\"".into()
+            "shapes are compared as they are: remove \"radius_mm\" and \"density_g_cm3\", or ask for an \"operation\"".into()
         });
         return None;
     }
