@@ -64,7 +64,7 @@ const STEPS: usize = 2_000;
 
 /// The dimension of an attractor: the largest of its root cells'. Roots of the same state and similar control points count once.
 ///
-/// Cost: linear in roots and transitions; for a state, two suprema over cells for each pair of at most [`MOST_SIBLINGS`] transitions.
+/// Cost: linear in roots and transitions; for a state, two suprema over cells for each pair of at most 64 transitions.
 ///
 /// # Errors
 /// [`Stopped`].

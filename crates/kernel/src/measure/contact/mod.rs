@@ -1,7 +1,7 @@
 //! Where two shapes come together, and how far they are apart: pairs of cells, refined where they are near.
 //!
-//! A pair of cells is refined, the larger cell first, unless it is proven farther apart than matters; see [`body`] for
-//! the bounds of a pair and [`search`] for the order. What remains are pairs of cells as small as the resolution, or of
+//! A pair of cells is refined, the larger cell first, unless it is proven farther apart than matters; see `body` for
+//! the bounds of a pair and `search` for the order. What remains are pairs of cells as small as the resolution, or of
 //! simplices, which are exact. A shape is its points: a model that stands for a solid is the solid's surface.
 
 mod body;
