@@ -12,6 +12,8 @@ use lacuna_tests::support::random::{Pieces, Random};
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::{binary, inside};
 
+use crate::properties::shape as pieces;
+
 const OPERATIONS: [Operation; 3] = [Operation::Union, Operation::Intersection, Operation::Difference];
 
 /// A box with outward faces.
@@ -24,17 +26,6 @@ fn cuboid(low: DVec3, high: DVec3) -> Shape {
 
 fn cube(at: [f64; 3], side: f64) -> Shape {
     cuboid(DVec3::from(at), DVec3::from(at) + side)
-}
-
-/// Points, segments and triangles that stand for themselves.
-fn pieces(pieces: &Pieces) -> Shape {
-    let mut mesh = PolygonMesh { interior: Interior::Surface, ..PolygonMesh::default() };
-    for piece in &pieces.0 {
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend(piece);
-        mesh.faces.push((first..first + piece.len() as u32).collect());
-    }
-    Shape::Mesh(mesh)
 }
 
 fn combine(operation: Operation, tolerance_mm: f64, inputs: Vec<(Shape, Option<f64>)>, budget: &Budget) -> Result<Outcome, JobError> {

@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-11;
 const TRIALS: u64 = 6;
 
 /// A set as a model.
-fn shape(pieces: &Pieces) -> Shape {
+pub(crate) fn shape(pieces: &Pieces) -> Shape {
     let mut mesh = PolygonMesh { interior: Interior::Surface, ..PolygonMesh::default() };
     for piece in &pieces.0 {
         let first = mesh.vertices.len() as u32;

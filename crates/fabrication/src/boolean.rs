@@ -4,38 +4,30 @@
 //! difference with its first and against the others; so the same operation of the inner solids lies in that of the M_i, and that in the one of the outer solids
 //! (for operands that are taken away, inner and outer change places). Moving the surface by d, as rounding does, adds d to each of these lengths.
 
-use lacuna_boolean::{BooleanEngine, BooleanError, ManifoldRust};
+use lacuna_boolean::{BooleanEngine, ManifoldRust};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::solid::TriMesh;
 use lacuna_kernel::tolerance::Tolerance;
 
-use crate::operand::{Operand, named, operand, predicted, rounded, share, sources};
-use crate::run::{JobError, Outcome, Plan};
+use crate::operand::{Operand, at_fault, operand, predicted, rounded, share, sources};
+use crate::run::{JobError, Outcome, Plan, wrong_inputs};
 use crate::{Geometry, Job, Operation, certificate};
 
 /// Does a job of kind `intersect` with an operation.
-pub(crate) fn combine(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
-    let Some(operation) = job.params.operation else {
-        return Err(JobError::new(
-            Kind::Invalid,
-            "bad-parameter",
-            "intersect needs an operation: union, intersection or difference".into(),
-        ));
-    };
+pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     if job.inputs.len() < 2 && operation != Operation::Hull {
-        let message = format!("the job has {} inputs, and an operation takes two or more", job.inputs.len());
-        return Err(JobError::new(Kind::Invalid, "job.inputs", message));
+        return Err(wrong_inputs(job, "an operation takes two or more"));
     }
     let sources = sources(job, budget)?;
     let share = share(&sources, tolerance)?;
     let mut operands = Vec::with_capacity(sources.len());
     for (index, source) in sources.iter().enumerate() {
-        operands.push(operand(source, share, budget).map_err(|error| named(error, job, index))?);
+        operands.push(operand(source, share, budget).map_err(|error| error.of_input(job, index))?);
     }
     drop(sources);
     budget.report("combine", 0.0, 0);
-    let combined = evaluate(operation, &operands, job, budget)?;
+    let combined = evaluate(operation, &mut operands, budget)?;
     if combined.triangles.is_empty() {
         let message = match operation {
             Operation::Union | Operation::Hull => "the inputs have no volume",
@@ -58,47 +50,30 @@ pub(crate) fn combine(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
 }
 
 /// Combines the inputs: an input of several surfaces is what lies in any of them.
-fn evaluate(operation: Operation, operands: &[Operand], job: &Job, budget: &Budget) -> Result<TriMesh, JobError> {
+fn evaluate(operation: Operation, operands: &mut [Operand], budget: &Budget) -> Result<TriMesh, JobError> {
     let engine_operation = match operation {
         Operation::Union => lacuna_boolean::Operation::Union,
         Operation::Intersection => lacuna_boolean::Operation::Intersection,
         Operation::Difference => lacuna_boolean::Operation::Difference,
         Operation::Hull => lacuna_boolean::Operation::Hull,
     };
-    let at_fault = |error: BooleanError, first: &[usize]| match error {
-        BooleanError::NotASolid { operand, fault } => {
-            let input = first.get(operand).copied().unwrap_or_default();
-            let message = format!("input '{}' is no solid: {fault}; mend the mesh, or give it a \"radius_mm\"", job.inputs[input].name);
-            JobError::new(Kind::Invalid, BooleanError::NotASolid { operand, fault }.code(), message)
-        }
-        BooleanError::Stopped(stopped) => stopped.into(),
-        other => JobError::new(other.kind(), other.code(), other.to_string()),
-    };
     // An input of several surfaces is joined first where that is not what the operation does with it anyway.
-    let mut joined: Vec<Option<TriMesh>> = Vec::with_capacity(operands.len());
-    for (index, operand) in operands.iter().enumerate() {
-        let alike = matches!(operation, Operation::Union | Operation::Hull) || (operation == Operation::Difference && index > 0);
-        let whole = (!alike && operand.meshes.len() > 1).then(|| {
-            let meshes: Vec<&TriMesh> = operand.meshes.iter().collect();
-            ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| at_fault(error, &vec![index; meshes.len()]))
-        });
-        joined.push(whole.transpose()?);
+    for (index, operand) in operands.iter_mut().enumerate() {
+        if operation == Operation::Intersection || (operation == Operation::Difference && index == 0) {
+            operand.join(budget)?;
+        }
     }
     let (mut meshes, mut owners) = (Vec::new(), Vec::new());
-    for (index, (operand, joined)) in operands.iter().zip(&joined).enumerate() {
-        let own: Vec<&TriMesh> = joined.as_ref().map_or_else(|| operand.meshes.iter().collect(), |mesh| vec![mesh]);
-        owners.resize(owners.len() + own.len(), index);
-        meshes.extend(own);
+    for operand in operands.iter() {
+        meshes.extend(&operand.meshes);
+        owners.resize(meshes.len(), operand.statement.name.as_str());
     }
-    ManifoldRust.combine(engine_operation, &meshes, &budget.cancel).map_err(|error| at_fault(error, &owners))
+    let combined = ManifoldRust.combine(engine_operation, &meshes, &budget.cancel);
+    combined.map_err(|error| at_fault(error, |operand| owners.get(operand).copied().unwrap_or_default()))
 }
 
 /// Predicts the cost of a job of kind `intersect`: that of its inputs, and of what the engine holds beside them.
 pub(crate) fn plan(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
-    if job.params.operation.is_none() {
-        // Nothing is made, and what a search costs shows in the search.
-        return Ok(Plan { leaf_cells: 0.0, triangles: 0.0, memory_bytes: 0.0, output_bytes: 0.0, lattice_pitch_mm: None });
-    }
     let plan = predicted(&sources(job, budget)?, tolerance, budget)?;
     Ok(Plan { memory_bytes: plan.memory_bytes + ENGINE_BYTES_PER_TRIANGLE * plan.triangles, ..plan })
 }

@@ -479,17 +479,17 @@ fn corners(bounds: &AxisBox) -> [[Interval; 3]; 2] {
     [bounds.low, bounds.high].map(|corner| corner.map(|end| [end.low, end.high]))
 }
 
-fn start(attractor: &Attractor, tolerance: Tolerance) -> Certificate {
+fn start(warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
     Certificate {
         requested_tolerance_mm: tolerance.mm(),
         kernel_version: env!("CARGO_PKG_VERSION").into(),
-        warnings: attractor.warnings().to_vec(),
+        warnings,
         ..Certificate::default()
     }
 }
 
-/// What is counted on a solid.
-fn of_solid(solid: &Solid, crossings: u64) -> Certificate {
+/// What is counted on a solid, after the warnings of what it was made from.
+fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
     let topology = solid.topology();
     let mut certificate = Certificate {
         vertices: topology.vertices,
@@ -512,7 +512,7 @@ fn of_solid(solid: &Solid, crossings: u64) -> Certificate {
         }),
         mesh_volume_mm3: Some(volume(solid.mesh())),
         mesh_area_mm2: Some(area(solid.mesh())),
-        ..Certificate::default()
+        ..start(warnings, tolerance)
     };
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
@@ -525,22 +525,20 @@ fn of_solid(solid: &Solid, crossings: u64) -> Certificate {
 
 /// What is proven of a dilated shape.
 pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Radius, tolerance: Tolerance) -> Certificate {
-    let counted = of_solid(&dilation.solid, dilation.crossings);
+    let mut counted = of_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
     let exact = dilated_volume(volume(dilation.solid.mesh()), radius.mm(), dilation.inner_mm, dilation.outer_mm);
     let exact_area = dilated_area(exact, radius.mm());
-    let mut warnings = attractor.warnings().to_vec();
-    warnings.extend(counted.warnings.clone());
     if dilation.crossings > 0 {
-        warnings.push(format!("{} pairs of triangles cross: ask for another tolerance, or for no simplification", dilation.crossings));
+        counted
+            .warnings
+            .push(format!("{} pairs of triangles cross: ask for another tolerance, or for no simplification", dilation.crossings));
     }
     if dilation.uncertain > 0 {
         let remark =
             "places where the radius is so close to a critical one that the topology there is not certain; another radius would do";
-        warnings.push(format!("{} {remark}", dilation.uncertain));
+        counted.warnings.push(format!("{} {remark}", dilation.uncertain));
     }
     Certificate {
-        requested_tolerance_mm: tolerance.mm(),
-        kernel_version: env!("CARGO_PKG_VERSION").into(),
         achieved_bound_mm: dilation.inner_mm.max(dilation.outer_mm),
         inner_bound_mm: Some(dilation.inner_mm),
         outer_bound_mm: Some(dilation.outer_mm),
@@ -550,51 +548,37 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         volume_mm3: Some([exact.low, exact.high]),
         area_mm2: Some([exact_area.low, exact_area.high]),
         lattice_pitch_mm: Some(dilation.pitch_mm),
-        warnings,
         ..counted
     }
 }
 
 /// What is proven of shapes that are compared: the box of all.
 pub(crate) fn of_shapes(shapes: &[(Attractor, AxisBox)], width: f64, tolerance: Tolerance) -> Certificate {
-    let whole = shapes.iter().map(|(_, bounds)| *bounds).reduce(|a, b| AxisBox {
-        low: std::array::from_fn(|axis| chosen(a.low[axis], b.low[axis], f64::min)),
-        high: std::array::from_fn(|axis| chosen(a.high[axis], b.high[axis], f64::max)),
-    });
-    Certificate {
-        requested_tolerance_mm: tolerance.mm(),
-        kernel_version: env!("CARGO_PKG_VERSION").into(),
-        achieved_bound_mm: width,
-        bbox_mm: whole.map(|bounds| corners(&bounds)).unwrap_or_default(),
-        warnings: shapes.iter().flat_map(|(shape, _)| shape.warnings().to_vec()).collect(),
-        ..Certificate::default()
-    }
+    let warnings = shapes.iter().flat_map(|(shape, _)| shape.warnings().to_vec()).collect();
+    let bbox_mm = box_of_all(shapes.iter().map(|(_, bounds)| bounds));
+    Certificate { achieved_bound_mm: width, bbox_mm, ..start(warnings, tolerance) }
 }
 
-/// The interval of the smaller, or the larger, of two numbers in intervals.
-fn chosen(
-    a: lacuna_kernel::measure::Interval,
-    b: lacuna_kernel::measure::Interval,
-    choose: fn(f64, f64) -> f64,
-) -> lacuna_kernel::measure::Interval {
-    lacuna_kernel::measure::Interval::new(choose(a.low, b.low), choose(a.high, b.high))
+/// The box of the union of shapes.
+fn box_of_all<'b>(boxes: impl Iterator<Item = &'b AxisBox>) -> [[Interval; 3]; 2] {
+    let chosen = |a: Interval, b: Interval, choose: fn(f64, f64) -> f64| [choose(a[0], b[0]), choose(a[1], b[1])];
+    let whole = boxes.map(corners).reduce(|a, b| {
+        let end = |end: usize, choose: fn(f64, f64) -> f64| std::array::from_fn(|axis| chosen(a[end][axis], b[end][axis], choose));
+        [end(0, f64::min), end(1, f64::max)]
+    });
+    whole.unwrap_or_default()
 }
 
 /// What is proven of one input as a solid.
 pub(crate) fn of_operand(rounded: &Rounded, operand: &Operand, tolerance: Tolerance) -> Certificate {
-    let counted = of_solid(&rounded.solid, rounded.crossings);
-    let mut warnings = operand.warnings.clone();
-    warnings.extend(counted.warnings.clone());
+    let counted = of_solid(&rounded.solid, rounded.crossings, operand.warnings.clone(), tolerance);
     let [inner, outer] = [operand.statement.inner_bound_mm, operand.statement.outer_bound_mm].map(|bound| bound + rounded.moved_mm);
     Certificate {
-        requested_tolerance_mm: tolerance.mm(),
-        kernel_version: env!("CARGO_PKG_VERSION").into(),
         achieved_bound_mm: inner.max(outer),
         inner_bound_mm: Some(inner),
         outer_bound_mm: Some(outer),
         leaf_cells: operand.leaf_cells,
         bbox_mm: corners(&operand.bounds),
-        warnings,
         ..counted
     }
 }
@@ -607,7 +591,8 @@ pub(crate) fn of_operation(
     rounded: &Rounded,
     tolerance: Tolerance,
 ) -> Certificate {
-    let counted = of_solid(&rounded.solid, rounded.crossings);
+    let warnings = operands.iter().flat_map(|operand| operand.warnings.clone()).collect();
+    let mut counted = of_solid(&rounded.solid, rounded.crossings, warnings, tolerance);
     let taken_away = |index: usize| operation == Operation::Difference && index > 0;
     let (mut inner, mut outer) = (0.0_f64, 0.0_f64);
     for (index, Operand { statement, .. }) in operands.iter().enumerate() {
@@ -620,14 +605,10 @@ pub(crate) fn of_operation(
     let difference = operands.iter().map(|operand| operand.volume_error).sum::<f64>() + swept(rounded.solid.mesh(), rounded.moved_mm);
     let enclosed = volume(rounded.solid.mesh());
     let exact = [(enclosed - difference) * (1.0 - ROUNDING), (enclosed + difference) * (1.0 + ROUNDING)];
-    let mut warnings: Vec<String> = operands.iter().flat_map(|operand| operand.warnings.clone()).collect();
-    warnings.extend(counted.warnings.clone());
     if rounded.crossings > 0 {
-        warnings.push(format!("{} pairs of triangles cross or touch where they are not joined", rounded.crossings));
+        counted.warnings.push(format!("{} pairs of triangles cross or touch where they are not joined", rounded.crossings));
     }
     Certificate {
-        requested_tolerance_mm: tolerance.mm(),
-        kernel_version: env!("CARGO_PKG_VERSION").into(),
         achieved_bound_mm: inner.max(outer),
         inner_bound_mm: Some(inner),
         outer_bound_mm: Some(outer),
@@ -640,7 +621,6 @@ pub(crate) fn of_operation(
             engine: engine.to_owned(),
             operands: operands.iter().map(|operand| operand.statement.clone()).collect(),
         }),
-        warnings,
         ..counted
     }
 }
@@ -662,28 +642,18 @@ fn swept(mesh: &TriMesh, length: f64) -> f64 {
 /// Intervals of the box of what an operation leaves of the exact solids, when it leaves something.
 fn box_of(operation: Operation, operands: &[Operand]) -> [[Interval; 3]; 2] {
     let boxes = || operands.iter().map(|operand| &operand.bounds);
-    let fold = |end: fn(&AxisBox, usize) -> f64, axis: usize, choose: fn(f64, f64) -> f64| {
-        boxes().map(|b| end(b, axis)).reduce(choose).unwrap_or(0.0)
-    };
-    let axis = |axis: usize| -> [Interval; 2] {
-        match operation {
-            Operation::Union | Operation::Hull => [
-                [fold(|b, k| b.low[k].low, axis, f64::min), fold(|b, k| b.low[k].high, axis, f64::min)],
-                [fold(|b, k| b.high[k].low, axis, f64::max), fold(|b, k| b.high[k].high, axis, f64::max)],
-            ],
-            Operation::Intersection => {
-                let ends = [fold(|b, k| b.low[k].low, axis, f64::max), fold(|b, k| b.high[k].high, axis, f64::min)];
-                let ends = [ends[0].min(ends[1]), ends[1].max(ends[0])];
-                [ends, ends]
-            }
-            Operation::Difference => {
-                let ends = operands.first().map_or([0.0; 2], |operand| [operand.bounds.low[axis].low, operand.bounds.high[axis].high]);
-                [ends, ends]
-            }
+    let same = |ends: [Interval; 3]| [ends, ends];
+    match operation {
+        Operation::Union | Operation::Hull => box_of_all(boxes()),
+        Operation::Intersection => same(std::array::from_fn(|axis| {
+            let low = boxes().map(|bounds| bounds.low[axis].low).fold(f64::NEG_INFINITY, f64::max);
+            let high = boxes().map(|bounds| bounds.high[axis].high).fold(f64::INFINITY, f64::min);
+            [low.min(high), low.max(high)]
+        })),
+        Operation::Difference => {
+            same(std::array::from_fn(|axis| boxes().next().map_or([0.0; 2], |bounds| [bounds.low[axis].low, bounds.high[axis].high])))
         }
-    };
-    let ends: [[Interval; 2]; 3] = std::array::from_fn(axis);
-    [ends.map(|ends| ends[0]), ends.map(|ends| ends[1])]
+    }
 }
 
 /// What is proven of an evaluation to points that were handed over.
@@ -693,7 +663,7 @@ pub(crate) fn of_points(attractor: &Attractor, points: u64, streamed: Streamed, 
         leaf_cells: streamed.leaf_cells,
         vertices: points,
         bbox_mm: corners(bounds),
-        ..start(attractor, tolerance)
+        ..start(attractor.warnings().to_vec(), tolerance)
     }
 }
 
@@ -713,7 +683,7 @@ pub(crate) fn of_evaluation(attractor: &Attractor, tessellation: &Tessellation, 
         boundary_edges: complex.map(|complex| complex.boundary_edges),
         boundary_loops: complex.map(|complex| complex.boundary_loops),
         bbox_mm: corners(bounds),
-        ..start(attractor, tolerance)
+        ..start(attractor.warnings().to_vec(), tolerance)
     }
 }
 
@@ -726,7 +696,7 @@ pub(crate) fn of_shape(attractor: &Attractor, bounds: &AxisBox, tolerance: Toler
         bbox_mm: corners(bounds),
         volume_mm3: exact.map(|(volume, _)| [volume.low, volume.high]),
         area_mm2: exact.map(|(_, area)| [area.low, area.high]),
-        ..start(attractor, tolerance)
+        ..start(attractor.warnings().to_vec(), tolerance)
     }
 }
 

@@ -2,16 +2,15 @@
 
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::Budget;
-use lacuna_kernel::error::Kind;
 use lacuna_kernel::measure::contact::{CellPair, Contact, ContactError, ContactQuery, Place, Verdict, intersect, intersect_primitive};
-use lacuna_kernel::measure::hausdorff::{Hausdorff, hausdorff};
+use lacuna_kernel::measure::hausdorff::{Directed, Hausdorff, hausdorff};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::{
     self, CellPairStatement, ContactStatement, ContactVerdict, DirectedStatement, HausdorffStatement, PlaceStatement,
 };
-use crate::run::{JobError, Outcome};
+use crate::run::{JobError, Outcome, lower_all, wrong_inputs};
 use crate::{Geometry, Job};
 
 /// Pairs of cells that a job lists at most: each place has a line in the certificate.
@@ -27,18 +26,8 @@ impl From<ContactError> for JobError {
 
 /// The shapes of a job's inputs, and their boxes.
 fn shapes(job: &Job, budget: &Budget) -> Result<Vec<(Attractor, AxisBox)>, JobError> {
-    let mut shapes = Vec::with_capacity(job.inputs.len());
-    for (index, input) in job.inputs.iter().enumerate() {
-        budget.report("validate", index as f64 / job.inputs.len() as f64, index as u64);
-        let lowered = input.model.lower().map_err(|findings| crate::operand::named(JobError::model(findings), job, index))?;
-        let bounds = bounding_box(&lowered.attractor, budget)?;
-        shapes.push((lowered.attractor, bounds));
-    }
-    Ok(shapes)
-}
-
-fn wrong_inputs(found: usize, expected: &str) -> JobError {
-    JobError::new(Kind::Invalid, "job.inputs", format!("the job has {found} inputs, and {expected}"))
+    let boxed = |attractor: Attractor| bounding_box(&attractor, budget).map(|bounds| (attractor, bounds)).map_err(JobError::from);
+    lower_all(job, budget)?.into_iter().map(|lowered| boxed(lowered.attractor)).collect()
 }
 
 /// Does a job of kind `intersect` without an operation: where two shapes, or a shape and a primitive, come together.
@@ -49,8 +38,8 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     let found = match (shapes.as_slice(), &job.params.with) {
         ([(first, _), (second, _)], None) => intersect(first, second, &query, budget)?,
         ([(shape, _)], Some(primitive)) => intersect_primitive(shape, primitive, &query, budget)?,
-        (shapes, None) => return Err(wrong_inputs(shapes.len(), "two are held against each other; more need an operation")),
-        (shapes, Some(_)) => return Err(wrong_inputs(shapes.len(), "one is held against what \"with\" says")),
+        (_, None) => return Err(wrong_inputs(job, "two are held against each other; more need an operation")),
+        (_, Some(_)) => return Err(wrong_inputs(job, "one is held against what \"with\" says")),
     };
     budget.report("intersect", 1.0, found.places.len() as u64);
     let mut certificate = certificate::of_shapes(&shapes, found.distance_mm.width(), tolerance);
@@ -70,7 +59,7 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
 pub(crate) fn compare(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let shapes = shapes(job, budget)?;
     let [(first, _), (second, _)] = shapes.as_slice() else {
-        return Err(wrong_inputs(shapes.len(), "measure takes one, or two to compare"));
+        return Err(wrong_inputs(job, "measure takes one, or two to compare"));
     };
     let found = hausdorff(first, second, tolerance, budget)?;
     let mut certificate = certificate::of_shapes(&shapes, found.distance_mm().width(), tolerance);
@@ -78,10 +67,8 @@ pub(crate) fn compare(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
         certificate.warnings.push("the search ended at a limit: the distance is not as narrow as the tolerance".into());
     }
     let Hausdorff { from_first, from_second, .. } = &found;
-    let directed = |found: &lacuna_kernel::measure::hausdorff::Directed| DirectedStatement {
-        distance_mm: [found.distance_mm.low, found.distance_mm.high],
-        near_mm: found.place.centre,
-    };
+    let directed =
+        |found: &Directed| DirectedStatement { distance_mm: [found.distance_mm.low, found.distance_mm.high], near_mm: found.place.centre };
     let distance = found.distance_mm();
     certificate.hausdorff = Some(HausdorffStatement {
         distance_mm: [distance.low, distance.high],

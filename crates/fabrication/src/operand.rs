@@ -1,11 +1,11 @@
 //! Inputs as solids: dilated by a ball, or what their closed surfaces bound.
 
 use glam::DVec3;
-use lacuna_boolean::{BooleanEngine, ManifoldRust};
+use lacuna_boolean::{BooleanEngine, BooleanError, ManifoldRust};
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{dilate, predict};
-use lacuna_kernel::error::{Kind, LimitFacts};
+use lacuna_kernel::error::Kind;
 use lacuna_kernel::measure::mass::{dilated_difference, volume};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried};
@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use crate::Job;
 use crate::certificate::OperandStatement;
 use crate::job::Input;
-use crate::run::{JobError, Plan, stl_bytes};
+use crate::run::{JobError, Plan, lower_all, not_carried, stl_bytes, wrong_inputs};
 
 /// An input as a solid.
 pub(crate) struct Operand {
@@ -41,22 +41,16 @@ pub(crate) struct Source<'a> {
 impl<'a> Source<'a> {
     /// The one input of a job.
     pub(crate) fn only(job: &'a Job, budget: &Budget) -> Result<Self, JobError> {
-        if job.inputs.len() != 1 {
-            let message = format!("the job has {} inputs, and this kind takes one", job.inputs.len());
-            return Err(JobError::new(Kind::Invalid, "job.inputs", message));
-        }
-        let source = sources(job, budget)?.pop();
-        source.ok_or_else(|| JobError::new(Kind::Defect, "internal", "an input was there".into()))
+        let one = || wrong_inputs(job, "this kind takes one");
+        if job.inputs.len() == 1 { sources(job, budget)?.pop().ok_or_else(one) } else { Err(one()) }
     }
 }
 
 /// All inputs of a job.
 pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a>>, JobError> {
     let mut sources = Vec::with_capacity(job.inputs.len());
-    for (index, input) in job.inputs.iter().enumerate() {
-        budget.cancel.check()?;
-        budget.report("validate", index as f64 / job.inputs.len() as f64, index as u64);
-        let attractor = input.model.lower().map_err(|findings| named(JobError::model(findings), job, index))?.attractor;
+    for (input, lowered) in job.inputs.iter().zip(lower_all(job, budget)?) {
+        let attractor = lowered.attractor;
         let radius_mm = input.radius_mm.or(job.params.radius_mm).unwrap_or(0.0);
         if radius_mm == 0.0 && !is_solid(&attractor) {
             let message = format!(
@@ -71,11 +65,6 @@ pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a
     Ok(sources)
 }
 
-/// An error of one input: it is named where there are several.
-pub(crate) fn named(error: JobError, job: &Job, index: usize) -> JobError {
-    if job.inputs.len() > 1 { error.of_input(&job.inputs[index].name, index) } else { error }
-}
-
 /// Whether closed surfaces are all that there is.
 fn is_solid(attractor: &Attractor) -> bool {
     attractor.roots().iter().all(|root| root.solid.is_some()) && !attractor.solids().is_empty()
@@ -87,14 +76,7 @@ pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tole
     let extent = sources.iter().map(|source| source.bounds.extent()).fold(0.0, f64::max) + tolerance.mm();
     let taken = carried(extent);
     if tolerance.mm() < 2.0 * taken {
-        let reachable = 2.0 * taken;
-        let message = format!(
-            "single-precision files cannot carry a tolerance of {} mm at coordinates up to {extent:.1} mm; {reachable:.3e} mm can be carried",
-            tolerance.mm()
-        );
-        let limit =
-            LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
-        return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) });
+        return Err(not_carried(tolerance, extent, 2.0 * taken));
     }
     Ok(Tolerance::new(tolerance.mm() - taken)?)
 }
@@ -125,7 +107,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
     Ok(Operand { statement, bounds: *bounds, volume_error, leaf_cells, warnings, meshes })
 }
 
-/// The closed surfaces of a shape. Corners at one place were one vertex of the model: placing it moved them alike.
+/// The closed surfaces of a shape, their vertices joined as the model has them.
 fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
     let mut meshes = Vec::with_capacity(attractor.solids().len());
     for surface in attractor.solids() {
@@ -146,16 +128,36 @@ fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
     meshes
 }
 
+impl Operand {
+    /// Makes one mesh of several: what lies in any of them.
+    pub(crate) fn join(&mut self, budget: &Budget) -> Result<(), JobError> {
+        if self.meshes.len() > 1 {
+            let meshes: Vec<&TriMesh> = self.meshes.iter().collect();
+            let joined = ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| at_fault(error, |_| &self.statement.name))?;
+            self.meshes = vec![joined];
+        }
+        Ok(())
+    }
+}
+
+/// The engine's error, by the name of the input that its operand belongs to.
+pub(crate) fn at_fault<'n>(error: BooleanError, owner: impl Fn(usize) -> &'n str) -> JobError {
+    let (kind, code) = (error.kind(), error.code());
+    match error {
+        BooleanError::NotASolid { operand, fault } => {
+            let message = format!("input '{}' is no solid: {fault}; mend the mesh, or give it a \"radius_mm\"", owner(operand));
+            JobError::new(kind, code, message)
+        }
+        BooleanError::Stopped(stopped) => stopped.into(),
+        other => JobError::new(kind, code, other.to_string()),
+    }
+}
+
 /// One input as one solid in single precision: several closed surfaces are joined.
 pub(crate) fn solid_of(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result<(Rounded, Operand), JobError> {
     let mut operand = operand(source, share(std::slice::from_ref(source), tolerance)?, budget)?;
-    let meshes = std::mem::take(&mut operand.meshes);
-    let mesh = if let [mesh] = meshes.as_slice() {
-        mesh.clone()
-    } else {
-        let meshes: Vec<&TriMesh> = meshes.iter().collect();
-        ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| JobError::new(error.kind(), error.code(), error.to_string()))?
-    };
+    operand.join(budget)?;
+    let mesh = operand.meshes.pop().unwrap_or_default();
     Ok((rounded(&mesh, budget)?, operand))
 }
 
@@ -174,7 +176,7 @@ pub(crate) fn rounded(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, JobErr
 /// Predicts the cost of making solids of the inputs.
 pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
     let share = share(sources, tolerance)?;
-    let mut plan = Plan { leaf_cells: 0.0, triangles: 0.0, memory_bytes: 0.0, output_bytes: 0.0, lattice_pitch_mm: None };
+    let mut plan = Plan::default();
     for source in sources {
         if source.radius_mm > 0.0 {
             let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, budget)?;

@@ -38,7 +38,7 @@ pub struct Outcome {
 }
 
 /// What a job is predicted to cost.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 pub struct Plan {
     /// Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that
@@ -115,9 +115,12 @@ impl JobError {
         Self { kind, code, message, limit: None, diagnostics: Vec::new(), input: None }
     }
 
-    /// The error of one of several inputs.
-    pub(crate) fn of_input(self, name: &str, index: usize) -> Self {
-        Self { message: format!("input '{name}': {}", self.message), input: Some(index), ..self }
+    /// An error of one input: it is named where there are several.
+    pub(crate) fn of_input(self, job: &Job, index: usize) -> Self {
+        if job.inputs.len() < 2 {
+            return self;
+        }
+        Self { message: format!("input '{}': {}", job.inputs[index].name, self.message), input: Some(index), ..self }
     }
 
     /// The first error speaks for all; every finding is listed.
@@ -154,16 +157,39 @@ impl From<DilationError> for JobError {
     }
 }
 
+/// The models of a job, lowered.
+pub(crate) fn lower_all(job: &Job, budget: &Budget) -> Result<Vec<Lowered>, JobError> {
+    let count = job.inputs.len();
+    let mut lowered = Vec::with_capacity(count);
+    for (index, input) in job.inputs.iter().enumerate() {
+        budget.cancel.check()?;
+        budget.report("validate", index as f64 / count as f64, index as u64);
+        lowered.push(input.model.lower().map_err(|findings| JobError::model(findings).of_input(job, index))?);
+    }
+    let states = lowered.iter().map(|lowered| lowered.attractor.automaton().states().len() as u64).sum();
+    budget.report("validate", 1.0, states);
+    Ok(lowered)
+}
+
 /// The one model of a job, lowered.
 fn lower(job: &Job, budget: &Budget) -> Result<Lowered, JobError> {
-    budget.report("validate", 0.0, 0);
-    let [input] = job.inputs.as_slice() else {
-        let message = format!("the job has {} inputs, and this kind takes one", job.inputs.len());
-        return Err(JobError::new(Kind::Invalid, "job.inputs", message));
-    };
-    let lowered = input.model.lower().map_err(JobError::model)?;
-    budget.report("validate", 1.0, lowered.attractor.automaton().states().len() as u64);
-    Ok(lowered)
+    let one = || wrong_inputs(job, "this kind takes one");
+    if job.inputs.len() == 1 { lower_all(job, budget)?.pop().ok_or_else(one) } else { Err(one()) }
+}
+
+/// A job has too few or too many inputs.
+pub(crate) fn wrong_inputs(job: &Job, expected: &str) -> JobError {
+    JobError::new(Kind::Invalid, "job.inputs", format!("the job has {} inputs, and {expected}", job.inputs.len()))
+}
+
+/// What single precision takes from a tolerance leaves nothing.
+pub(crate) fn not_carried(tolerance: Tolerance, extent_mm: f64, reachable: f64) -> JobError {
+    let message = format!(
+        "single-precision files cannot carry a tolerance of {} mm at coordinates up to {extent_mm:.1} mm; {reachable:.3e} mm can be carried",
+        tolerance.mm()
+    );
+    let limit = LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
+    JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) }
 }
 
 fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
@@ -181,8 +207,10 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         JobKind::Solidify => solidify(job, tolerance, budget),
         JobKind::Measure if job.inputs.len() > 1 => contact::compare(job, tolerance, budget),
         JobKind::Measure => measure(job, tolerance, budget),
-        JobKind::Intersect if job.params.operation.is_some() => boolean::combine(job, tolerance, budget),
-        JobKind::Intersect => contact::contact(job, tolerance, budget),
+        JobKind::Intersect => match job.params.operation {
+            Some(operation) => boolean::combine(job, operation, tolerance, budget),
+            None => contact::contact(job, tolerance, budget),
+        },
         JobKind::Slice => slice::slice(job, tolerance, budget),
     }
 }
@@ -232,15 +260,7 @@ fn share_of(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Res
     let share = tolerance.mm() - rounding;
     // Coordinates travel in single precision: what it takes from the tolerance must leave something.
     if share < rounding {
-        let reachable = 2.0 * rounding;
-        let message = format!(
-            "single-precision files cannot carry a tolerance of {} mm at coordinates up to {:.1} mm; {reachable:.3e} mm can be carried",
-            tolerance.mm(),
-            bounds.extent()
-        );
-        let limit =
-            LimitFacts { limit: "tolerance_mm", asked: tolerance.mm(), allowed: reachable, remedy: Some(("tolerance_mm", reachable)) };
-        return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) });
+        return Err(not_carried(tolerance, bounds.extent(), 2.0 * rounding));
     }
     Ok((bounds, Tolerance::new(share)?))
 }
@@ -332,21 +352,20 @@ const BYTES_PER_CELL: f64 = 64.0;
 /// As [`run`], for what shows before the work.
 pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
-    if job.kind == JobKind::Intersect {
-        return boolean::plan(job, tolerance, budget);
-    }
-    if job.kind == JobKind::Measure && job.inputs.len() > 1 {
-        return Ok(Plan { leaf_cells: 0.0, triangles: 0.0, memory_bytes: 0.0, output_bytes: 0.0, lattice_pitch_mm: None });
-    }
-    if job.kind == JobKind::Slice {
-        return slice::plan(job, tolerance, budget);
+    match job.kind {
+        JobKind::Intersect if job.params.operation.is_some() => return boolean::plan(job, tolerance, budget),
+        JobKind::Slice => return slice::plan(job, tolerance, budget),
+        // Nothing is made, and what a search costs shows in the search.
+        JobKind::Intersect => return Ok(Plan::default()),
+        JobKind::Measure if job.inputs.len() > 1 => return Ok(Plan::default()),
+        JobKind::Evaluate | JobKind::Solidify | JobKind::Measure => {}
     }
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;
     if job.kind == JobKind::Evaluate || radius.is_none() {
         let counted = if job.kind == JobKind::Evaluate { leaf_cells } else { 0.0 };
-        return Ok(Plan { leaf_cells, triangles: 0.0, memory_bytes: counted * BYTES_PER_CELL, output_bytes: 0.0, lattice_pitch_mm: None });
+        return Ok(Plan { leaf_cells, memory_bytes: counted * BYTES_PER_CELL, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
     let prediction = predict(&lowered.attractor, radius, tolerance, budget)?;

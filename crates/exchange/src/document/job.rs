@@ -342,16 +342,8 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         None => None,
     };
     let (operation, with) = operation(walker, &members, kind)?;
-    let density = members.get("density_g_cm3").map(|place| match kind {
-        Some(kind) if kind != JobKind::Measure => {
-            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-                "only measure takes \"density_g_cm3\"; remove it, or ask for the kind \"measure\"".into()
-            });
-            None
-        }
-        _ => walker.positive(place, "a density in g/cm3"),
-    });
-    let density_g_cm3 = stated(density)?;
+    let density = owned(walker, &members, kind, "density_g_cm3", (JobKind::Measure, "measure"))?;
+    let density_g_cm3 = stated(density.map(|place| walker.positive(place, "a density in g/cm3")))?;
     let planes = planes(walker, &members, kind)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
@@ -362,18 +354,10 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
 /// The operation and the primitive, which intersect alone takes, and of which one rules out the other.
 #[allow(clippy::type_complexity)]
 fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<(Option<Operation>, Option<Primitive>)> {
-    let mut legal = true;
-    for name in ["operation", "with"] {
-        if let (Some(place), Some(kind)) = (members.get(name), kind)
-            && kind != JobKind::Intersect
-        {
-            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-                format!("only intersect takes \"{name}\"; remove it, or ask for the kind \"intersect\"")
-            });
-            legal = false;
-        }
-    }
-    if let (Some(_), Some(place)) = (members.get("operation"), members.get("with")) {
+    let owner = (JobKind::Intersect, "intersect");
+    let places = [owned(walker, members, kind, "operation", owner), owned(walker, members, kind, "with", owner)];
+    let mut legal = places.iter().all(Option::is_some);
+    if let [Some(Some(_)), Some(Some(place))] = places {
         walker.fault(&place, code::CONFLICTING_MEMBERS, || {
             "an operation combines inputs, and takes no \"with\"; remove one of the two".into()
         });
@@ -388,12 +372,11 @@ fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKin
 /// The planes, which slice needs and no other kind takes.
 #[allow(clippy::option_option)]
 fn planes(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Option<Planes>> {
+    let mut legal = true;
+    for name in ["normal", "offsets_mm", "step_mm"] {
+        legal &= owned(walker, members, kind, name, (JobKind::Slice, "slice")).is_some();
+    }
     if kind != Some(JobKind::Slice) {
-        let mut legal = true;
-        for place in ["normal", "offsets_mm", "step_mm"].iter().filter_map(|name| members.get(name)) {
-            walker.fault(&place, code::CONFLICTING_MEMBERS, || "only slice has planes; remove it, or ask for the kind \"slice\"".into());
-            legal = false;
-        }
         return legal.then_some(None);
     }
     let normal = members.get("normal").map_or(Some(DVec3::Z), |place| {
@@ -421,14 +404,26 @@ fn flag_of(
     (owner, word): (JobKind, &str),
     absent: bool,
 ) -> Option<bool> {
-    let Some(place) = members.get(name) else { return Some(absent) };
+    owned(walker, members, kind, name, (owner, word))?.map_or(Some(absent), |place| walker.flag(place))
+}
+
+/// The place of a member that one kind of job takes, and what that kind is called: absent is legal, and so is every member while the kind is not known.
+#[allow(clippy::option_option)]
+fn owned<'m>(
+    walker: &mut Walker<'_>,
+    members: &'m Members<'_>,
+    kind: Option<JobKind>,
+    name: &str,
+    (owner, word): (JobKind, &str),
+) -> Option<Option<Place<'m>>> {
+    let Some(place) = members.get(name) else { return Some(None) };
     if kind.is_some_and(|kind| kind != owner) {
         walker.fault(&place, code::CONFLICTING_MEMBERS, || {
             format!("only {word} takes \"{name}\"; remove it, or ask for the kind \"{word}\"")
         });
         return None;
     }
-    walker.flag(place)
+    Some(Some(place))
 }
 
 fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Vec<String>> {

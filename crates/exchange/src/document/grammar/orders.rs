@@ -18,6 +18,10 @@ pub(in super::super) const OPERATIONS: [(&str, Operation); 4] = [
     ("hull", Operation::Hull),
 ];
 
+/// The members that name a model.
+const SOURCE: [Member; 2] =
+    [optional("model", "The model, in full.", || reference("EmbeddedModel")), optional("model_ref", "The id of a stored model.", text)];
+
 /// Kinds of jobs of the grammar that cannot be done yet.
 pub(in super::super) const LATER_KINDS: [&str; 5] = ["check", "sla", "cast", "panels", "convert"];
 
@@ -31,8 +35,8 @@ pub(in super::super) const JOB: Object = Object {
             "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), or slice (plane sections of a solid).",
             || one_of_words(&["evaluate", "solidify", "measure", "intersect", "slice"]),
         ),
-        optional("model", "The model, in full.", || reference("EmbeddedModel")),
-        optional("model_ref", "The id of a stored model.", text),
+        SOURCE[0],
+        SOURCE[1],
         optional("inputs", "Named models, for kinds of jobs with several.", || list(reference("JobInput"), 1)),
         required("params", "How to do it.", || reference("JobParams")),
         optional(
@@ -49,8 +53,8 @@ pub(in super::super) const SOLVE: Object = Object {
     about: "A model with unknown entries, and the values chosen for what its constraints leave free. Exactly one of model and model_ref is given.",
     members: &[
         Member { required: false, ..MODEL.members[0] },
-        optional("model", "The model, in full.", || reference("EmbeddedModel")),
-        optional("model_ref", "The id of a stored model.", text),
+        SOURCE[0],
+        SOURCE[1],
         optional(
             "values",
             "Values of free parameters by their names; those that are absent keep the value that the solver chooses.",
@@ -64,8 +68,8 @@ pub(in super::super) const JOB_INPUT: Object = Object {
     about: "A named model. Exactly one of model and model_ref is given.",
     members: &[
         required("name", "What the job calls the model.", text),
-        optional("model", "The model, in full.", || reference("EmbeddedModel")),
-        optional("model_ref", "The id of a stored model.", text),
+        SOURCE[0],
+        SOURCE[1],
         optional(
             "radius_mm",
             "For intersect alone: the radius of the ball that dilates this input, in mm; 0 takes the solids that its closed surfaces bound as they are; the radius_mm of params when absent, and 0 without one.",
@@ -156,8 +160,8 @@ pub(in super::super) const ADDRESS_QUESTION: Object = Object {
     about: "Where an address leads (at), or which addresses lead near a point (near). Exactly one of model and model_ref is given, and exactly one of at and near.",
     members: &[
         Member { required: false, ..MODEL.members[0] },
-        optional("model", "The model, in full.", || reference("EmbeddedModel")),
-        optional("model_ref", "The id of a stored model.", text),
+        SOURCE[0],
+        SOURCE[1],
         optional(
             "at",
             "An address: the root cell, a colon, the indices of transitions, and in parentheses those that repeat without end, for example `0: 1 2 (0 3)`.",
