@@ -147,6 +147,15 @@ pub(super) struct OutputArgs {
     pub(super) preview: Option<PathBuf>,
 }
 
+/// On which side of a surface a wall is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum SideName {
+    /// Inside: the solid becomes hollow.
+    Inward,
+    /// Outside: what the surface bounds becomes the hollow.
+    Outward,
+}
+
 #[derive(Debug, Args)]
 pub(super) struct SolidifyArgs {
     /// The model document.
@@ -154,9 +163,18 @@ pub(super) struct SolidifyArgs {
     /// Hausdorff bound on the result, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) tolerance: f64,
-    /// Radius of the ball, in mm.
+    /// Radius of the ball, in mm; not needed with --wall for a model that is a closed surface.
+    #[arg(long, value_name = "MM", value_parser = positive, required_unless_present = "wall")]
+    pub(super) radius: Option<f64>,
+    /// Fill gaps narrower than this, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive, requires = "radius", conflicts_with = "stability")]
+    pub(super) closing: Option<f64>,
+    /// Make a wall of this thickness along the surface of the solid instead, in mm: a hollow part.
     #[arg(long, value_name = "MM", value_parser = positive)]
-    pub(super) radius: f64,
+    pub(super) wall: Option<f64>,
+    /// On which side of the surface the wall is.
+    #[arg(long, value_enum, default_value_t = SideName::Inward, requires = "wall")]
+    pub(super) side: SideName,
     /// Leave all triangles of the lattice: quicker, and many times more triangles.
     #[arg(long)]
     pub(super) no_simplify: bool,

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use lacuna_exchange::format::{self, ReadLimits};
-use lacuna_fabrication::{Input, Job, JobKind, Operation, Outcome, Params, Planes};
+use lacuna_fabrication::{Input, Job, JobKind, Operation, Outcome, Params, Planes, WallOrder, WallSide};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 
 use super::args::{
-    EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SliceArgs, SolidifyArgs,
+    EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SideName, SliceArgs,
+    SolidifyArgs,
 };
 use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
@@ -27,8 +28,18 @@ pub(super) struct Manner {
 
 /// `lacuna solidify`.
 pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Problem> {
-    let params =
-        Params { radius_mm: Some(args.radius), simplify: !args.no_simplify, stability: args.stability, ..Params::new(args.tolerance) };
+    let side = match args.side {
+        SideName::Inward => WallSide::Inward,
+        SideName::Outward => WallSide::Outward,
+    };
+    let params = Params {
+        radius_mm: args.radius,
+        closing_mm: args.closing,
+        wall: args.wall.map(|thickness_mm| WallOrder { thickness_mm, side }),
+        simplify: !args.no_simplify,
+        stability: args.stability,
+        ..Params::new(args.tolerance)
+    };
     make(JobKind::Solidify, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
 }
 

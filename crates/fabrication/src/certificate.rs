@@ -1,15 +1,15 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
-use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
+use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict, Wall};
 use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
 use lacuna_kernel::solid::{Rounded, Solid, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 
-use crate::Operation;
 use crate::operand::Operand;
+use crate::{Operation, WallOrder, WallSide};
 
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,6 +106,12 @@ pub struct Certificate {
     /// How the result was combined, when it was: the bounds are then those of a sandwich.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub operation: Option<OperationStatement>,
+    /// How gaps were filled, when they were: all that is said of D is then said of its closing.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub closing: Option<ClosingStatement>,
+    /// The wall that was made instead of a solid, when one was: `inner_bound_mm` and `outer_bound_mm` are of the solid before.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub wall: Option<WallStatement>,
     /// Where two shapes come together: of an `intersect` without an operation.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub contact: Option<ContactStatement>,
@@ -366,6 +372,37 @@ pub struct OperandStatement {
     pub mesh_volume_mm3: f64,
 }
 
+/// How gaps were filled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct ClosingStatement {
+    /// Gaps narrower than this are filled.
+    pub width_mm: f64,
+    /// Half of that. C(X) is X and all points that no ball of this radius outside of X can reach. The result holds C(D(r - inner)) and lies in
+    /// C(D(r + outer)).
+    pub ball_radius_mm: f64,
+}
+
+/// A wall along the surface of a solid M that is written as a part of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct WallStatement {
+    /// On which side of M's surface.
+    pub side: WallSide,
+    /// The thickness that was asked.
+    pub thickness_mm: f64,
+    /// Points of that side as near to M's surface as the first belong to the wall, points farther than the second do not.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub reached_mm: Interval,
+    /// Volume that M's mesh encloses.
+    pub solid_volume_mm3: f64,
+    /// Volume of the hollow in the mesh as written: what an inward wall saves.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub hollow_volume_mm3: Option<f64>,
+}
+
 /// What happens to the topology when the radius grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
@@ -453,6 +490,49 @@ impl Certificate {
         }
         // 1 cm^3 is 1000 mm^3.
         self.mass_g = self.volume_mm3.zip(density_g_cm3).map(|(volume, density)| volume.map(|v| v * 1e-3 * density));
+    }
+
+    /// Says that gaps up to a width were filled. The volume and the area of the exact shape are not known then; its box is that of the dilation, as a closing
+    /// stays within the convex hull.
+    pub(crate) fn state_closing(&mut self, width_mm: f64) {
+        self.closing = Some(ClosingStatement { width_mm, ball_radius_mm: 0.5 * width_mm });
+        (self.volume_mm3, self.area_mm2) = (None, None);
+    }
+
+    /// Says that a wall was made along the surface of `solid`, of which this certificate told so far.
+    pub(crate) fn state_wall(&mut self, order: WallOrder, solid: &Solid, wall: &Wall, tolerance: Tolerance) {
+        let WallOrder { thickness_mm, side } = order;
+        let (solid_volume, wall_volume) = (volume(solid.mesh()), volume(wall.solid.mesh()));
+        let crossings = match self.self_intersections {
+            Checked::Found(SelfIntersections::Count(count)) => count,
+            _ => 0,
+        };
+        // What was counted on the solid is counted anew.
+        let counts = ["sealed voids", "separate pieces", "triangles cross"];
+        let own =
+            std::mem::take(&mut self.warnings).into_iter().filter(|warning| !counts.iter().any(|word| warning.contains(word))).collect();
+        let counted = of_solid(&wall.solid, crossings + wall.crossings, own, tolerance);
+        let grown = if side == WallSide::Outward { thickness_mm } else { 0.0 };
+        let moved = |end: usize| self.bbox_mm[end].map(|x| if end == 0 { x.map(|x| x - grown) } else { x.map(|x| x + grown) });
+        let reached_mm = [(thickness_mm - wall.inner_mm).max(0.0), thickness_mm + wall.outer_mm];
+        *self = Self {
+            achieved_bound_mm: self.achieved_bound_mm.max(wall.inner_mm).max(wall.outer_mm),
+            inner_bound_mm: self.inner_bound_mm,
+            outer_bound_mm: self.outer_bound_mm,
+            thickness_min_mm: Some(reached_mm[0]),
+            leaf_cells: self.leaf_cells + wall.leaf_cells,
+            bbox_mm: [moved(0), moved(1)],
+            lattice_pitch_mm: self.lattice_pitch_mm,
+            closing: self.closing,
+            wall: Some(WallStatement {
+                side,
+                thickness_mm,
+                reached_mm,
+                solid_volume_mm3: solid_volume,
+                hollow_volume_mm3: (side == WallSide::Inward).then_some(solid_volume - wall_volume),
+            }),
+            ..counted
+        };
     }
 
     /// Adds what was found of the topology at radii nearby, `reached` around the radius.

@@ -1,6 +1,7 @@
 //! What is ordered.
 
 use lacuna_kernel::budget::Limits;
+use lacuna_kernel::dilation::Side;
 use lacuna_kernel::measure::contact::Primitive;
 use lacuna_kernel::model::Model;
 
@@ -47,14 +48,47 @@ pub enum Operation {
     Hull,
 }
 
+/// On which side of a closed surface its wall is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum WallSide {
+    /// Inside: the solid becomes hollow.
+    Inward,
+    /// Outside: what the surface bounds becomes the hollow.
+    Outward,
+}
+
+impl From<WallSide> for Side {
+    fn from(side: WallSide) -> Self {
+        match side {
+            WallSide::Inward => Self::Inward,
+            WallSide::Outward => Self::Outward,
+        }
+    }
+}
+
+/// A wall along the surface of a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WallOrder {
+    /// How thick, in mm.
+    pub thickness_mm: f64,
+    /// On which side.
+    pub side: WallSide,
+}
+
 /// Settings of a job. What a kind does not use must be absent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params {
     /// Hausdorff bound on the result, in mm.
     pub tolerance_mm: f64,
-    /// Radius of the dilating ball, in mm: required by `solidify`, optional for `measure` (without
+    /// Radius of the dilating ball, in mm: required by `solidify` unless there is a wall, optional for `measure` (without
     /// it the shape itself is measured), for `intersect` and for `slice` (without it the inputs are solids themselves).
     pub radius_mm: Option<f64>,
+    /// Of a `solidify`: gaps narrower than this are filled, in mm: the solid is closed with a ball of half the size.
+    pub closing_mm: Option<f64>,
+    /// Of a `solidify`: the wall that is made instead of the solid.
+    pub wall: Option<WallOrder>,
     /// What an `intersect` leaves of its inputs.
     pub operation: Option<Operation>,
     /// What an `intersect` without an operation holds its one input against.
@@ -78,6 +112,8 @@ impl Params {
         Self {
             tolerance_mm,
             radius_mm: None,
+            closing_mm: None,
+            wall: None,
             operation: None,
             with: None,
             planes: None,

@@ -7,10 +7,11 @@ pub mod job;
 mod operand;
 pub mod run;
 mod slice;
+mod solidify;
 pub mod solve;
 
 pub use certificate::Certificate;
-pub use job::{Input, Job, JobKind, Operation, Params, Planes};
+pub use job::{Input, Job, JobKind, Operation, Params, Planes, WallOrder, WallSide};
 pub use run::{Geometry, JobError, Outcome, Plan, StreamError, Validation, plan, run, stream_points, validate};
 pub use slice::Stack;
 pub use solve::{SolutionSpace, SolveRefusal, Solved, solve};

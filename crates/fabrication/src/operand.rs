@@ -2,15 +2,18 @@
 
 use glam::DVec3;
 use lacuna_boolean::{BooleanEngine, BooleanError, ManifoldRust};
-use lacuna_kernel::attractor::Attractor;
+use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{dilate, predict};
 use lacuna_kernel::error::Kind;
-use lacuna_kernel::measure::mass::{dilated_difference, volume};
+use lacuna_kernel::measure::mass::{area, dilated_difference, volume};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
+use lacuna_kernel::model::CellKind;
 use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried};
+use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
 use crate::Job;
 use crate::certificate::OperandStatement;
@@ -52,17 +55,24 @@ pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a
     for (input, lowered) in job.inputs.iter().zip(lower_all(job, budget)?) {
         let attractor = lowered.attractor;
         let radius_mm = input.radius_mm.or(job.params.radius_mm).unwrap_or(0.0);
-        if radius_mm == 0.0 && !is_solid(&attractor) {
-            let message = format!(
-                "input '{}' encloses nothing: it is no closed surface; give it a \"radius_mm\", and it is dilated by a ball of that radius",
-                input.name
-            );
-            return Err(JobError::new(Kind::Invalid, "job.not-a-solid", message));
+        if radius_mm == 0.0 && !may_be_solid(&attractor) {
+            return Err(not_a_solid(&input.name, "it is no closed surface"));
         }
         let bounds = bounding_box(&attractor, budget)?.grown(radius_mm);
         sources.push(Source { input, attractor, radius_mm, bounds });
     }
     Ok(sources)
+}
+
+/// The refusal of an input that bounds nothing.
+fn not_a_solid(name: &str, fault: &str) -> JobError {
+    let message = format!("input '{name}' encloses nothing: {fault}; give it a \"radius_mm\", and it is dilated by a ball of that radius");
+    JobError::new(Kind::Invalid, "job.not-a-solid", message)
+}
+
+/// Whether a shape may bound something: it is all surface.
+fn may_be_solid(attractor: &Attractor) -> bool {
+    attractor.roots().iter().all(|root| attractor.automaton().state(root.state).kind == Some(CellKind::Face))
 }
 
 /// Whether closed surfaces are all that there is.
@@ -91,11 +101,18 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
             warnings.push(format!("{} pairs of triangles of input '{}' cross", dilation.crossings, input.name));
         }
         (vec![dilation.solid.mesh().clone()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
-    } else {
+    } else if is_solid(attractor) {
         (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
+    } else {
+        let (mesh, deviation, leaf_cells) = closed_surface(&input.name, attractor, tolerance, budget)?;
+        (vec![mesh], deviation, deviation, leaf_cells)
     };
     let volume: f64 = meshes.iter().map(volume).sum();
-    let volume_error = if *radius_mm > 0.0 { dilated_difference(volume, *radius_mm, inner, outer) } else { 0.0 };
+    let volume_error = match (*radius_mm > 0.0, inner > 0.0) {
+        (true, _) => dilated_difference(volume, *radius_mm, inner, outer),
+        (false, true) => meshes.iter().map(|mesh| neighbourhood(mesh, inner)).sum(),
+        (false, false) => 0.0,
+    };
     let statement = OperandStatement {
         name: input.name.clone(),
         radius_mm: *radius_mm,
@@ -105,6 +122,35 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         mesh_volume_mm3: volume,
     };
     Ok(Operand { statement, bounds: *bounds, volume_error, leaf_cells, warnings, meshes })
+}
+
+/// A closed surface of any family as a mesh, with its deviation and its cells.
+///
+/// The mesh bounds what the surface does but for points within the deviation d of the mesh: a cell and its triangle lie in a convex set within d of the triangle, so that the
+/// straight way from the surface to the mesh, on which no winding number changes where it does not pass, stays within d of the mesh.
+fn closed_surface(name: &str, attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(TriMesh, f64, u64), JobError> {
+    let Tessellation { vertices, points, segments, mut triangles, deviation_mm, leaf_cells, .. } = refine(attractor, tolerance, budget)?;
+    let mesh = |triangles| TriMesh { vertices: vertices.clone(), triangles };
+    if !(points.is_empty() && segments.is_empty()) {
+        return Err(not_a_solid(name, "some of it is no surface"));
+    }
+    if volume(&mesh(triangles.clone())) < 0.0 {
+        triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    }
+    match Solid::new(mesh(triangles), budget) {
+        Ok(solid) => Ok((solid.mesh().clone(), deviation_mm, leaf_cells)),
+        Err(SolidError::Stopped(stopped)) => Err(stopped.into()),
+        Err(other) => Err(not_a_solid(name, &format!("its surface does not close ({other})"))),
+    }
+}
+
+/// The volume within d of a mesh's triangles is at most this: the sum of Steiner's formula over all of them.
+fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
+    let corner = |index: u32| mesh.vertices[index as usize];
+    let perimeter = |&[a, b, c]: &[u32; 3]| corner(a).distance(corner(b)) + corner(b).distance(corner(c)) + corner(c).distance(corner(a));
+    let length: f64 = mesh.triangles.iter().map(perimeter).sum();
+    let balls = mesh.triangles.len() as f64 * 4.0 / 3.0 * PI * d.powi(3);
+    2.0 * d * area(mesh) + 0.5 * PI * d * d * length + balls
 }
 
 /// The closed surfaces of a shape, their vertices joined as the model has them.

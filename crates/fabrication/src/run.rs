@@ -2,7 +2,7 @@
 
 use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refine_with_normals, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
-use lacuna_kernel::dilation::{DilationError, dilate, dilate_unsimplified, predict, stability};
+use lacuna_kernel::dilation::{DilationError, dilate_unsimplified, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
@@ -13,7 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, contact, slice};
+use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, contact, slice, solidify};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -172,7 +172,7 @@ pub(crate) fn lower_all(job: &Job, budget: &Budget) -> Result<Vec<Lowered>, JobE
 }
 
 /// The one model of a job, lowered.
-fn lower(job: &Job, budget: &Budget) -> Result<Lowered, JobError> {
+pub(crate) fn lower(job: &Job, budget: &Budget) -> Result<Lowered, JobError> {
     let one = || wrong_inputs(job, "this kind takes one");
     if job.inputs.len() == 1 { lower_all(job, budget)?.pop().ok_or_else(one) } else { Err(one()) }
 }
@@ -192,7 +192,7 @@ pub(crate) fn not_carried(tolerance: Tolerance, extent_mm: f64, reachable: f64) 
     JobError { limit: Some(limit), ..JobError::new(Kind::Unreachable, "tolerance-unreachable", message) }
 }
 
-fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
+pub(crate) fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
     Ok(job.params.radius_mm.map(Radius::new).transpose()?)
 }
 
@@ -204,7 +204,7 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
         JobKind::Evaluate => evaluate(&lower(job, budget)?.attractor, tolerance, job.params.normals, budget),
-        JobKind::Solidify => solidify(job, tolerance, budget),
+        JobKind::Solidify => solidify::solidify(job, tolerance, budget),
         JobKind::Measure if job.inputs.len() > 1 => contact::compare(job, tolerance, budget),
         JobKind::Measure => measure(job, tolerance, budget),
         JobKind::Intersect => match job.params.operation {
@@ -213,23 +213,6 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         },
         JobKind::Slice => slice::slice(job, tolerance, budget),
     }
-}
-
-fn solidify(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
-    let Some(radius) = radius(job)? else {
-        return Err(JobError::new(Kind::Invalid, "bad-parameter", "solidify needs radius_mm, the radius of the ball in mm".into()));
-    };
-    let attractor = &lower(job, budget)?.attractor;
-    let make = if job.params.simplify { dilate } else { dilate_unsimplified };
-    let dilation = make(attractor, radius, tolerance, budget)?;
-    let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
-    if job.params.stability {
-        // Critical radii from half to twice the radius, and whether there are any within the bound that was reached.
-        let reached = Tolerance::new(certificate.achieved_bound_mm)?;
-        let found = stability(attractor, radius, reached, [0.5 * radius.mm(), 2.0 * radius.mm()], budget)?;
-        certificate.state_stability(&found, radius, reached);
-    }
-    Ok(Outcome { geometry: Geometry::Solid(dilation.solid), certificate })
 }
 
 fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
@@ -363,6 +346,11 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;
+    // A wall's other surface is made like the dilation of the first.
+    let radius = match (radius, job.params.wall) {
+        (None, Some(wall)) => Some(Radius::new(wall.thickness_mm)?),
+        (radius, _) => radius,
+    };
     if job.kind == JobKind::Evaluate || radius.is_none() {
         let counted = if job.kind == JobKind::Evaluate { leaf_cells } else { 0.0 };
         return Ok(Plan { leaf_cells, memory_bytes: counted * BYTES_PER_CELL, ..Plan::default() });

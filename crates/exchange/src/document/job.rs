@@ -4,12 +4,12 @@ use std::collections::HashSet;
 
 use glam::DVec3;
 
-use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params, Planes};
+use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params, Planes, WallOrder, WallSide};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::measure::contact::Primitive;
 use lacuna_kernel::model::Model;
 
-use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, OPERATIONS};
+use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, OPERATIONS, WALL_SIDES};
 use super::model::{model, version};
 use super::node::{Place, quoted};
 use super::walk::{Members, Walker, length, suggestion};
@@ -323,9 +323,9 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let tolerance = members.get("tolerance_mm").and_then(|place| walker.positive(place, "a tolerance in mm"));
     let radius = members.get("radius_mm").map(|place| walker.positive(place, "a radius in mm"));
     match (kind, members.get("radius_mm")) {
-        (Some(JobKind::Solidify), None) => {
+        (Some(JobKind::Solidify), None) if !members.has("wall_mm") => {
             walker.fault(&place, code::MISSING_MEMBER, || {
-                "solidify needs the member \"radius_mm\": the radius of the dilating ball, in mm".into()
+                "solidify needs the member \"radius_mm\", the radius of the dilating ball in mm, or \"wall_mm\", the thickness of a wall along a closed surface".into()
             });
             return None;
         }
@@ -348,7 +348,54 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
-    Some(Params { tolerance_mm: tolerance?, radius_mm, operation, with, planes, density_g_cm3, normals, simplify, stability })
+    let closing_mm = closing(walker, &members, kind, stability)?;
+    let wall = wall(walker, &members, kind)?;
+    Some(Params {
+        tolerance_mm: tolerance?,
+        radius_mm,
+        closing_mm,
+        wall,
+        operation,
+        with,
+        planes,
+        density_g_cm3,
+        normals,
+        simplify,
+        stability,
+    })
+}
+
+/// The width of gaps that are filled, which a dilation alone takes, and not together with an examination of its topology.
+#[allow(clippy::option_option)]
+fn closing(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>, stability: bool) -> Option<Option<f64>> {
+    let Some(place) = owned(walker, members, kind, "closing_mm", (JobKind::Solidify, "solidify"))? else { return Some(None) };
+    let width = walker.positive(place, "the width of a gap in mm")?;
+    let conflict = match (members.has("radius_mm"), stability) {
+        (false, _) => "\"closing_mm\" fills gaps of a dilated shape; add \"radius_mm\"",
+        (true, true) => "\"stability\" is of the dilation, which \"closing_mm\" changes; remove one of the two",
+        (true, false) => return Some(Some(width)),
+    };
+    walker.fault(&place, code::CONFLICTING_MEMBERS, || conflict.into());
+    None
+}
+
+/// The wall, which solidify alone takes.
+#[allow(clippy::option_option)]
+fn wall(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Option<WallOrder>> {
+    let owner = (JobKind::Solidify, "solidify");
+    let (thickness, side) = (owned(walker, members, kind, "wall_mm", owner)?, owned(walker, members, kind, "side", owner)?);
+    match (thickness, side) {
+        (None, None) => Some(None),
+        (None, Some(side)) => {
+            walker.fault(&side, code::CONFLICTING_MEMBERS, || "only a wall has a side; add \"wall_mm\"".into());
+            None
+        }
+        (Some(thickness), side) => {
+            let thickness = walker.positive(thickness, "a thickness in mm");
+            let side = side.map_or(Some(WallSide::Inward), |place| walker.word(place, "a side", &WALL_SIDES));
+            Some(Some(WallOrder { thickness_mm: thickness?, side: side? }))
+        }
+    }
 }
 
 /// The operation and the primitive, which intersect alone takes, and of which one rules out the other.

@@ -155,7 +155,10 @@ fn job() -> Value {
     let kind =
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
-        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"], "not": { "required": ["normals"] } } } })),
+        kind(
+            "solidify",
+            json!({ "properties": { "params": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["wall_mm"] }], "not": { "required": ["normals"] } } } })
+        ),
         kind(
             "evaluate",
             json!({ "properties": { "params": { "not": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["simplify"] }, { "required": ["stability"] }] } } } })

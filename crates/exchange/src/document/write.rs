@@ -260,6 +260,9 @@ object! {
     lacuna_fabrication::job::Params: |params, members| members
         .put("tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
+        .put_some("closing_mm", params.closing_mm.map(Number).as_ref())?
+        .put_some("wall_mm", params.wall.map(|wall| Number(wall.thickness_mm)).as_ref())?
+        .put_some("side", params.wall.map(|wall| wall.side).as_ref())?
         .put_some("operation", params.operation.as_ref())?
         .put_some("with", params.with.as_ref().map(with).as_ref())?
         .put_some("normal", params.planes.as_ref().map(|planes| planes.normal.to_array().map(Number)).as_ref())?

@@ -78,6 +78,17 @@ pub enum DilationError {
         "a closed mesh is taken as a solid, and crosses itself or has faces without area, so that its inside is not defined; mend it, or say \"interior\": \"surface\""
     )]
     Inside,
+    /// An inward wall meets itself everywhere.
+    #[error(
+        "a wall of {thickness_mm} mm leaves no hollow: the largest ball inside the solid has a radius between {:.4} and {:.4} mm, so that a wall up to {:.4} mm leaves one; the solid itself is what a thicker wall is",
+        .largest_mm[0], .largest_mm[1], .largest_mm[0]
+    )]
+    NoHollow {
+        /// What was asked.
+        thickness_mm: f64,
+        /// The radius of the largest ball inside, between these.
+        largest_mm: [f64; 2],
+    },
     /// Trimmed surfaces cannot be drawn as finely as their share of the tolerance asks.
     #[error("trimmed surfaces: {0}")]
     Trimmed(RefineError),
@@ -103,7 +114,7 @@ impl DilationError {
             Self::Stopped(stopped) => stopped.kind(),
             Self::Trimmed(error) => error.kind(),
             Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
-            Self::Precision { .. } => Kind::Unreachable,
+            Self::Precision { .. } | Self::NoHollow { .. } => Kind::Unreachable,
             Self::Inside => Kind::Invalid,
             Self::Defect(_) => Kind::Defect,
         }
@@ -119,6 +130,7 @@ impl DilationError {
             Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
             Self::Inside => "mesh.inside-undefined",
+            Self::NoHollow { .. } => "wall.no-hollow",
             Self::Depth { .. } => "limit-depth",
             Self::Cells { .. } => "limit-cells",
             Self::Defect(_) => "nonmanifold",
@@ -142,6 +154,10 @@ impl DilationError {
             Self::Triangles { asked, allowed, reachable_mm, .. } => Some(facts("triangles", asked, allowed as f64, reachable_mm)),
             Self::Memory { asked, allowed, reachable_mm, .. } => Some(facts("memory_bytes", asked, allowed as f64, reachable_mm)),
             Self::Precision { tolerance_mm, reachable_mm, .. } => Some(facts("tolerance_mm", tolerance_mm, reachable_mm, reachable_mm)),
+            Self::NoHollow { thickness_mm, largest_mm } => {
+                let (asked, allowed) = (thickness_mm, largest_mm[0]);
+                Some(LimitFacts { limit: "wall_mm", asked, allowed, remedy: Some(("wall_mm", 0.9 * allowed)) })
+            }
             Self::Depth { allowed, .. } => {
                 Some(LimitFacts { limit: "depth", asked: f64::from(allowed) + 1.0, allowed: f64::from(allowed), remedy: None })
             }

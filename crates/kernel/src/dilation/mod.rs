@@ -29,6 +29,7 @@ mod smooth;
 mod stability;
 mod stitch;
 mod tree;
+mod wall;
 
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::Budget;
@@ -38,6 +39,7 @@ use crate::tolerance::{Radius, Tolerance};
 pub use error::DilationError;
 use plan::Plan;
 pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
+pub use wall::{Side, Wall, close, wall};
 
 /// A dilated shape with what is proven of it. Lengths in mm.
 #[derive(Clone, Debug)]

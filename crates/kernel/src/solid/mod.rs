@@ -4,6 +4,7 @@ pub(crate) mod box_tree;
 pub(crate) mod contact;
 mod crossings;
 pub(crate) mod half_edges;
+pub(crate) mod inside;
 pub(crate) mod mend;
 pub(crate) mod topology;
 
@@ -11,6 +12,7 @@ use crate::budget::{Budget, Stopped};
 use crate::measure::mass::volume;
 pub use crossings::Crossings;
 use glam::DVec3;
+pub use inside::Inside;
 pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use lacuna_fabrication::job::Operation;
+use lacuna_fabrication::job::{Operation, WallSide};
 
 use super::super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
 use super::{
@@ -17,6 +17,9 @@ pub(in super::super) const OPERATIONS: [(&str, Operation); 4] = [
     ("difference", Operation::Difference),
     ("hull", Operation::Hull),
 ];
+
+/// Sides of walls by their words.
+pub(in super::super) const WALL_SIDES: [(&str, WallSide); 2] = [("inward", WallSide::Inward), ("outward", WallSide::Outward)];
 
 /// The members that name a model.
 const SOURCE: [Member; 2] =
@@ -106,8 +109,23 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         required("tolerance_mm", "The Hausdorff bound on the result, in mm, above zero.", positive),
         optional(
             "radius_mm",
-            "The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, intersect and slice, absent for evaluate.",
+            "The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm is there, optional for measure, intersect and slice, absent for evaluate.",
             positive,
+        ),
+        optional(
+            "closing_mm",
+            "Gaps of the dilated shape that are narrower than this are filled, in mm, above zero: by closing it with a ball of half the size. For solidify with radius_mm alone.",
+            positive,
+        ),
+        optional(
+            "wall_mm",
+            "The thickness of a wall along the surface of the solid, in mm, above zero, which is made instead of the solid: of the dilation where there is a radius_mm, else of what the model's closed surface bounds. For solidify alone.",
+            positive,
+        ),
+        optional(
+            "side",
+            "On which side of that surface the wall is: inward (the solid becomes hollow) or outward (what the surface bounds becomes the hollow); inward when absent.",
+            || one_of_words(&WALL_SIDES.map(|(word, _)| word)),
         ),
         optional(
             "operation",

@@ -1,0 +1,70 @@
+//! How often a closed mesh winds around a point, exactly.
+
+use super::TriMesh;
+use super::box_tree::{Box32, BoxTree};
+use glam::DVec3;
+use robust::{Coord, Coord3D, orient2d, orient3d};
+
+/// A closed mesh that tells which points it encloses.
+#[derive(Debug)]
+pub struct Inside<'a> {
+    mesh: &'a TriMesh,
+    tree: BoxTree,
+}
+
+impl<'a> Inside<'a> {
+    /// Prepares a mesh. Cost: n log n.
+    #[must_use]
+    pub fn new(mesh: &'a TriMesh) -> Self {
+        let mut tree = BoxTree::default();
+        let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize].to_array());
+        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(triangle))), true);
+        Self { mesh, tree }
+    }
+
+    /// The winding number of the surface around x: 1 inside a solid, 0 outside, and more where solids overlap. Meaningless on the surface itself. Exact: the
+    /// sum over all triangles above x of how often their projections to the plane z = 0 wind around that of x, where an edge is crossed by a ray along +x of that
+    /// plane if y of the ray is at least that of its lower end and less than that of its upper end, so that neighbours never count a ray twice. Cost: that of
+    /// the triangles whose boxes are above x.
+    #[must_use]
+    pub fn winding(&self, x: DVec3) -> i64 {
+        if self.mesh.triangles.is_empty() {
+            return 0;
+        }
+        let point = Box32::of(&[x.to_array()]);
+        let above = Box32 { low: point.low, high: [point.high[0], point.high[1], f32::INFINITY] };
+        let mut winding = 0;
+        self.tree.query(&above, 0, |leaf| {
+            for (&triangle, bounds) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)) {
+                if bounds.meets(&above) {
+                    winding += around(&self.mesh.triangles[triangle as usize].map(|corner| self.mesh.vertices[corner as usize]), x);
+                }
+            }
+            true
+        });
+        winding
+    }
+}
+
+/// How often the projection of a triangle winds around that of x, if the triangle is above.
+fn around(corners: &[DVec3; 3], x: DVec3) -> i64 {
+    let flat = |p: DVec3| Coord { x: p.x, y: p.y };
+    let mut turns = 0;
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        let (rises, falls) = (a.y <= x.y && x.y < b.y, b.y <= x.y && x.y < a.y);
+        // Whether x is left of the edge as it rises, so that a ray along +x meets it.
+        if rises && orient2d(flat(a), flat(b), flat(x)) > 0.0 {
+            turns += 1;
+        } else if falls && orient2d(flat(b), flat(a), flat(x)) > 0.0 {
+            turns -= 1;
+        }
+    }
+    if turns == 0 {
+        return 0;
+    }
+    let space = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
+    // Positive where x is on the side from which the corners run clockwise: below, if they wind counter-clockwise seen from above.
+    let side = orient3d(space(corners[0]), space(corners[1]), space(corners[2]), space(x));
+    if side * turns as f64 > 0.0 { turns } else { 0 }
+}
