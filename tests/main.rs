@@ -11,6 +11,7 @@
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
+//! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `service` | does the running service keep them? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |
@@ -29,3 +30,4 @@ mod measures;
 mod properties;
 mod service;
 mod slices;
+mod thickening;

@@ -604,10 +604,11 @@ fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tol
 }
 
 /// What is proven of a dilated shape.
-pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Radius, tolerance: Tolerance) -> Certificate {
+pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, tolerance: Tolerance) -> Certificate {
     let mut counted = of_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
-    let exact = dilated_volume(volume(dilation.solid.mesh()), radius.mm(), dilation.inner_mm, dilation.outer_mm);
-    let exact_area = dilated_area(exact, radius.mm());
+    let radius = dilation.least_radius_mm;
+    let exact = dilated_volume(volume(dilation.solid.mesh()), radius, dilation.inner_mm, dilation.outer_mm);
+    let exact_area = dilated_area(exact, radius);
     if dilation.crossings > 0 {
         counted
             .warnings
@@ -622,9 +623,9 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Ra
         achieved_bound_mm: dilation.inner_mm.max(dilation.outer_mm),
         inner_bound_mm: Some(dilation.inner_mm),
         outer_bound_mm: Some(dilation.outer_mm),
-        thickness_min_mm: Some((2.0 * (radius.mm() - dilation.inner_mm)).max(0.0)),
+        thickness_min_mm: Some((2.0 * (radius - dilation.inner_mm)).max(0.0)),
         leaf_cells: dilation.leaf_cells,
-        bbox_mm: corners(&dilation.bounds.grown(radius.mm())),
+        bbox_mm: corners(&dilation.bounds),
         volume_mm3: Some([exact.low, exact.high]),
         area_mm2: Some([exact_area.low, exact_area.high]),
         lattice_pitch_mm: Some(dilation.pitch_mm),

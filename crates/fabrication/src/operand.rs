@@ -58,7 +58,8 @@ pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a
         if radius_mm == 0.0 && !may_be_solid(&attractor) {
             return Err(not_a_solid(&input.name, "it is no closed surface"));
         }
-        let bounds = bounding_box(&attractor, budget)?.grown(radius_mm);
+        let largest = if radius_mm > 0.0 { attractor.radii(radius_mm)[1] } else { 0.0 };
+        let bounds = bounding_box(&attractor, budget)?.grown(largest);
         sources.push(Source { input, attractor, radius_mm, bounds });
     }
     Ok(sources)
@@ -94,12 +95,13 @@ pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tole
 /// One input as a solid, within a tolerance.
 pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result<Operand, JobError> {
     let Source { input, attractor, radius_mm, bounds } = source;
-    let mut warnings = attractor.warnings().to_vec();
+    let (mut warnings, mut bounds) = (attractor.warnings().to_vec(), *bounds);
     let (meshes, inner, outer, leaf_cells) = if *radius_mm > 0.0 {
         let dilation = dilate(attractor, Radius::new(*radius_mm)?, tolerance, budget)?;
         if dilation.crossings > 0 {
             warnings.push(format!("{} pairs of triangles of input '{}' cross", dilation.crossings, input.name));
         }
+        bounds = dilation.bounds;
         (vec![dilation.solid.mesh().clone()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
     } else if is_solid(attractor) {
         (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
@@ -109,7 +111,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
     };
     let volume: f64 = meshes.iter().map(volume).sum();
     let volume_error = match (*radius_mm > 0.0, inner > 0.0) {
-        (true, _) => dilated_difference(volume, *radius_mm, inner, outer),
+        (true, _) => dilated_difference(volume, attractor.radii(*radius_mm)[0], inner, outer),
         (false, true) => meshes.iter().map(|mesh| neighbourhood(mesh, inner)).sum(),
         (false, false) => 0.0,
     };
@@ -121,7 +123,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         triangles: meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
         mesh_volume_mm3: volume,
     };
-    Ok(Operand { statement, bounds: *bounds, volume_error, leaf_cells, warnings, meshes })
+    Ok(Operand { statement, bounds, volume_error, leaf_cells, warnings, meshes })
 }
 
 /// A closed surface of any family as a mesh, with its deviation and its cells.

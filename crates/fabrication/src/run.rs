@@ -228,10 +228,10 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         return Ok(Outcome { geometry: Geometry::None, certificate });
     };
     let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
-    let mut certificate = certificate::of_dilation(attractor, &dilation, radius, tolerance);
+    let mut certificate = certificate::of_dilation(attractor, &dilation, tolerance);
     let mesh = dilation.solid.mesh();
-    let difference = dilated_difference(volume(mesh), radius.mm(), dilation.inner_mm, dilation.outer_mm);
-    certificate.state_mass(mesh, difference, &dilation.bounds.grown(radius.mm() + dilation.outer_mm), job.params.density_g_cm3);
+    let difference = dilated_difference(volume(mesh), dilation.least_radius_mm, dilation.inner_mm, dilation.outer_mm);
+    certificate.state_mass(mesh, difference, &dilation.bounds.grown(dilation.outer_mm), job.params.density_g_cm3);
     certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
     Ok(Outcome { geometry: Geometry::None, certificate })
 }

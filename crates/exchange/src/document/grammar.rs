@@ -853,12 +853,44 @@ pub(super) const BORDER: Object = Object {
 pub(super) const PART_MEMBERS: &[Member] = &[
     optional("name", "What the author calls the part.", text),
     optional("transform", "Where the part is put; as it is when absent.", || reference("AffineMap")),
+    optional(
+        "radius_mm",
+        "The radius of the ball that dilates the part, in mm, above zero, instead of the job's. At most one of radius_mm, radii_mm and radius_by_level is given.",
+        positive,
+    ),
+    optional(
+        "radii_mm",
+        "Radii in mm, above zero, at the control points or vertices of the part's shape, one for each in their order. Between them the radius is what the shape makes of such numbers, and nowhere less than the least of them.",
+        || json!({ "type": "array", "items": positive(), "minItems": 1 }),
+    ),
+    optional("radius_by_level", "Radii that shrink along the part's recursion.", || reference("RadiusByLevel")),
 ];
+
+pub(super) const RADIUS_BY_LEVEL: Object = Object {
+    title: "a radius by level",
+    about: "r = max(least_mm, first_mm ratio^k) for cells that leave the recursion of the part's root cells at level k, the number of transitions taken within it; least_mm for the limit of the recursion itself.",
+    members: &[
+        required("first_mm", "The radius at level 0, above zero.", positive),
+        required(
+            "ratio",
+            "From one level to the next: between 0 and 1.",
+            || json!({ "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 }),
+        ),
+        required("least_mm", "No radius is less: above zero.", positive),
+    ],
+};
 
 pub(super) const PART: Object = Object {
     title: "a part",
     about: "A shape with an optional name and place, the shape as a member.",
-    members: &[PART_MEMBERS[0], PART_MEMBERS[1], required("shape", "The shape of the part.", || reference("Shape"))],
+    members: &[
+        PART_MEMBERS[0],
+        PART_MEMBERS[1],
+        PART_MEMBERS[2],
+        PART_MEMBERS[3],
+        PART_MEMBERS[4],
+        required("shape", "The shape of the part.", || reference("Shape")),
+    ],
 };
 
 /// The families, with the schema's name.

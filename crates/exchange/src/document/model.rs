@@ -1,10 +1,12 @@
 //! Reads models: version, name, unit, and a shape of one of the families.
 
-use lacuna_kernel::model::{Group, Model, Part, Shape};
+use lacuna_kernel::model::{Group, Model, Part, PartRadius, Shape};
 
 use super::bcifs::bcifs;
 use super::curve::{bezier_curve, corner_cutting};
-use super::grammar::{BEZIER_SURFACE, EMBEDDED_MODEL, FAMILIES, GROUP, MODEL, Member, NURBS_SURFACE, NURBS_VOLUME, PART, PART_MEMBERS};
+use super::grammar::{
+    BEZIER_SURFACE, EMBEDDED_MODEL, FAMILIES, GROUP, MODEL, Member, NURBS_SURFACE, NURBS_VOLUME, PART, PART_MEMBERS, RADIUS_BY_LEVEL,
+};
 use super::ifs::ifs;
 use super::join::join;
 use super::mesh::mesh;
@@ -123,5 +125,31 @@ fn part(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Part> {
         Some(place) => affine_map(walker, place).map(Some),
         None => Some(None),
     };
-    Some(Part { name: name?, transform: transform?, shape: shape? })
+    let constant = find("radius_mm").map(|place| Some(PartRadius::Constant(walker.positive(place, "a radius in mm")?)));
+    let at_points = find("radii_mm").map(|place| {
+        let radii = walker.each_of(place, 1, "an array of radii in mm", |walker, place| walker.positive(place, "a radius in mm"));
+        Some(PartRadius::AtPoints(radii?))
+    });
+    let by_level = find("radius_by_level").map(|place| radius_by_level(walker, place));
+    let mut stated = [constant, at_points, by_level].into_iter().flatten();
+    let radius = stated.next();
+    if stated.next().is_some() {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "\"radius_mm\", \"radii_mm\" and \"radius_by_level\" exclude each other; keep one".into()
+        });
+        return None;
+    }
+    let radius = match radius {
+        Some(radius) => Some(radius?),
+        None => None,
+    };
+    Some(Part { name: name?, transform: transform?, shape: shape?, radius })
+}
+
+fn radius_by_level(walker: &mut Walker<'_>, place: Place<'_>) -> Option<PartRadius> {
+    let members = walker.object(place, &RADIUS_BY_LEVEL)?;
+    let first = members.get("first_mm").and_then(|place| walker.positive(place, "a radius in mm"));
+    let ratio = members.get("ratio").and_then(|place| walker.positive(place, "a ratio below 1"));
+    let least = members.get("least_mm").and_then(|place| walker.positive(place, "a radius in mm"));
+    Some(PartRadius::ByLevel { first: first?, ratio: ratio?, least: least? })
 }

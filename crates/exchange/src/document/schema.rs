@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 use super::grammar::{
     ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
     INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
-    RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, WITH, control_point_schema, matrix_schema,
-    reference, trim_point_schema,
+    RADIUS_BY_LEVEL, RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, WITH,
+    control_point_schema, matrix_schema, reference, trim_point_schema,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -84,6 +84,7 @@ fn named_schemas() -> Vec<(String, Value)> {
         "Part".into(),
         any_of("A shape with an optional name and place: beside the shape's own members, or with the shape as a member.", parts),
     ));
+    schemas.push(("RadiusByLevel".into(), object(&RADIUS_BY_LEVEL, &[])));
     let maps = [object(&LINEAR_MAP, &[]), object(&TURNED_MAP, &[])];
     schemas.push(("AffineMap".into(), any_of("An affine map of space.", maps.into_iter())));
     schemas.push(("ControlPoint".into(), control_point_schema()));

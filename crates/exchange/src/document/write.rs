@@ -11,7 +11,8 @@ use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, CellKind, Coefficients, ControlNet, Corner,
     CornerCutting, Crease, Curve, CurveScheme, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Parametrization, Part,
-    PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase, Trim, TrimCurve,
+    PartRadius, PolygonMesh, Primitive, Relation, RootCell, Shape, Side, Subdivision, Sum, TensorProduct, Terrain, TerrainBase, Trim,
+    TrimCurve,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
@@ -86,6 +87,15 @@ impl<M: SerializeMap> Members<M> {
 
     fn put_if(&mut self, present: bool, name: &'static str, value: &impl Serialize) -> Result<&mut Self, M::Error> {
         if present { self.put(name, value) } else { Ok(self) }
+    }
+
+    fn put_radius(&mut self, radius: Option<&PartRadius>) -> Result<&mut Self, M::Error> {
+        match radius {
+            None => Ok(self),
+            Some(PartRadius::Constant(radius)) => self.put("radius_mm", &Number(*radius)),
+            Some(PartRadius::AtPoints(radii)) => self.put("radii_mm", &radii.iter().copied().map(Number).collect::<Vec<_>>()),
+            Some(levels @ PartRadius::ByLevel { .. }) => self.put("radius_by_level", &Wire(levels)),
+        }
     }
 
     fn put_some(&mut self, name: &'static str, value: Option<&impl Serialize>) -> Result<&mut Self, M::Error> {
@@ -203,7 +213,14 @@ object! {
     Part: |part, members| members
         .put_some("name", part.name.as_ref())?
         .put_some("transform", part.transform.as_ref().map(Wire).as_ref())?
+        .put_radius(part.radius.as_ref())?
         .put("shape", &Wire(&part.shape))?;
+    PartRadius: |radius, members| match radius {
+        PartRadius::ByLevel { first, ratio, least } => {
+            members.put("first_mm", &Number(*first))?.put("ratio", &Number(*ratio))?.put("least_mm", &Number(*least))?
+        }
+        other => members.put_radius(Some(other))?,
+    };
     AffineMap: |map, members| members.put("linear", &Wire(&map.linear))?.put("translation", &Wire(&map.translation))?;
     Primitive: |primitive, members| match primitive {
         Primitive::Points(points) => members.put("points", &list(points))?,

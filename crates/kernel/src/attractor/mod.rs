@@ -13,6 +13,7 @@ mod invariant;
 mod near;
 mod needle;
 mod precision;
+mod radii;
 mod refine;
 pub(crate) mod sites;
 mod tangent;
@@ -31,6 +32,7 @@ pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
 pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use precision::LinearPrecision;
+pub use radii::OwnRadius;
 pub use refine::{RefineError, Streamed, count_cells, refine, refine_with_normals, stream};
 use std::sync::Arc;
 pub use tangent::{NoTangentPlane, TangentPlanes};
@@ -87,6 +89,8 @@ pub struct Attractor {
     /// Surfaces that are cut along loops, and for every root which of them it belongs to.
     trimmed: Vec<TrimmedSurface>,
     trims: Vec<Option<u32>>,
+    /// Of every root, the radius of its own; empty where none has one.
+    radii: Vec<Option<OwnRadius>>,
 }
 
 /// Why an automaton has no attractor that can be evaluated.
@@ -229,6 +233,7 @@ impl Attractor {
             seam_mm: 0.0,
             trimmed: Vec::new(),
             trims: Vec::new(),
+            radii: Vec::new(),
         };
         attractor.check_roots()?;
         Ok(attractor)
@@ -275,8 +280,8 @@ impl Attractor {
     /// [`RefineError`], of drawing them.
     pub(crate) fn resolved(&self, tolerance: Tolerance, budget: &Budget) -> Result<(Self, f64), RefineError> {
         let drawn = trim::refine(self, tolerance, budget)?;
-        let mut roots: Vec<Root> =
-            (0..self.roots.len()).filter(|&root| self.trim_of(root).is_none()).map(|root| self.roots[root].clone()).collect();
+        let uncut: Vec<usize> = (0..self.roots.len()).filter(|&root| self.trim_of(root).is_none()).collect();
+        let mut roots: Vec<Root> = uncut.iter().map(|&root| self.roots[root].clone()).collect();
         let triangle = |state: &State| state.leaf == LeafPrimitive::Simplex && state.dimension == 3;
         let state = self.automaton.states().iter().position(triangle).map(StateId::new);
         let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
@@ -291,7 +296,10 @@ impl Attractor {
             solid.first_root -= (0..solid.first_root).filter(|&root| self.trim_of(root).is_some()).count();
         }
         let trims = vec![None; roots.len()];
-        Ok((Self { roots, solids, brep: None, trimmed: Vec::new(), trims, ..self.clone() }, deviation))
+        // Cut surfaces have the radius that is asked for: the lowering sees to it.
+        let radii = (0..roots.len()).map(|root| uncut.get(root).and_then(|&root| self.own_radius(root)).cloned()).collect();
+        let resolved = Self { roots, solids, brep: None, trimmed: Vec::new(), trims, radii: Vec::new(), ..self.clone() };
+        Ok((resolved.with_radii(radii), deviation))
     }
 
     /// The trimmed surface that a root belongs to.

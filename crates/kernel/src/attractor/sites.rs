@@ -1,7 +1,7 @@
 //! What stands for cells in a dilation: for every state the kind of site that allows the largest cells.
 
-use super::Attractor;
 use super::cell::{Cell, ControlPoint, Point, Site, child_points, dot, frame_columns, subtract, times};
+use super::{Attractor, OwnRadius};
 use crate::automaton::{Automaton, LeafPrimitive, StateId};
 
 /// Errors of replacing a cell of A by its sites S, in mm: d(x, A) <= d(x, S) + outer, and
@@ -49,6 +49,8 @@ pub(crate) struct SiteRule<'a> {
     choices: Vec<Choice>,
     /// States that roots reach.
     used: Vec<usize>,
+    /// Of every root, how much less the square of its own radius is than that of `radius`; empty where all have this one.
+    deficits: Vec<f64>,
 }
 
 /// The share of r^2 - (r - e)^2 that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
@@ -58,7 +60,7 @@ const SITE_SHARE: f64 = 0.3;
 const OUTER_SHARE: f64 = 0.5;
 
 impl<'a> SiteRule<'a> {
-    /// The rule for a dilation by `radius` to `tolerance`, both in mm.
+    /// The rule for a dilation by `radius`, the largest of the roots' own, to `tolerance`, both in mm.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
         let mut starts: Vec<usize> = attractor.roots().iter().map(|root| root.state.index()).collect();
         starts.sort_unstable();
@@ -66,7 +68,12 @@ impl<'a> SiteRule<'a> {
         let mut used: Vec<usize> = starts.iter().flat_map(|&state| reachable(attractor.automaton(), StateId::new(state))).collect();
         used.sort_unstable();
         used.dedup();
-        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new(), used };
+        let deficit = |root: usize| match attractor.own_radius(root) {
+            Some(OwnRadius::Constant(own)) => (radius * radius - own * own).max(0.0),
+            _ => 0.0,
+        };
+        let deficits = if attractor.has_own_radii() { (0..attractor.roots().len()).map(deficit).collect() } else { Vec::new() };
+        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new(), used, deficits };
         choose(&mut rule);
         rule
     }
@@ -74,6 +81,19 @@ impl<'a> SiteRule<'a> {
     /// The share of r^2 - (r - e)^2 that is the lattice's: all of it where sites are cells themselves, without error.
     pub(crate) fn lattice_share(&self) -> f64 {
         if self.is_exact() { 1.0 } else { 1.0 - SITE_SHARE }
+    }
+
+    /// Whether roots have different radii.
+    pub(crate) fn is_graded(&self) -> bool {
+        !self.deficits.is_empty()
+    }
+
+    /// What is added to the square of the distance from a root's cells, so that one radius serves all: a ball of radius s in space is the section of one of radius r in four
+    /// dimensions whose centre is sqrt(r^2 - s^2) off, and squared distances from there are larger by r^2 - s^2. They are convex functions that differ from |x|^2 by concave
+    /// ones, and the distances grow by no more than the way, as those of points in space do.
+    #[inline]
+    pub(crate) fn deficit(&self, root: u32) -> f64 {
+        self.deficits.get(root as usize).copied().unwrap_or(0.0)
     }
 
     /// Whether sites are the attractor itself.
@@ -146,7 +166,7 @@ impl<'a> SiteRule<'a> {
         self.attractor
     }
 
-    /// Distance of x from the sites of a leaf, squared, with the closest point.
+    /// Distance of x from the sites of a leaf, squared, in space.
     pub(crate) fn nearest(&self, x: &Point, cell: &Cell, points: &[ControlPoint]) -> f64 {
         let mut nearest = f64::INFINITY;
         self.emit(cell, points, &mut |site| nearest = nearest.min(site.distance_squared(x)));

@@ -16,7 +16,7 @@ use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::tree::{Candidates, Hit, NodeId, SiteId, Tree};
+use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::{SiteError, SiteRule};
@@ -884,9 +884,10 @@ pub(super) fn place(positions: &[Point; 4], weights: &[f64; 4]) -> Point {
     std::array::from_fn(|axis| (0..4).map(|k| weights[k] * positions[k][axis]).sum())
 }
 
-/// What a site is called in every block: its coordinates, mixed. Sites with the same coordinates are one.
-fn name_of(site: &Site) -> u64 {
-    let add = |code: u64, point: &Point| point.iter().fold(code, |code, x| mix(code.rotate_left(5) ^ x.to_bits()));
+/// What a site is called in every block: its coordinates and its deficit, mixed. Sites where these are the same are one.
+fn name_of(Weighted { site, deficit }: &Weighted) -> u64 {
+    let own = deficit.to_bits();
+    let add = |code: u64, point: &Point| point.iter().fold(code ^ own, |code, x| mix(code.rotate_left(5) ^ x.to_bits()));
     match site {
         Site::Point(a) => add(1, a),
         Site::Segment(ends) => ends.iter().fold(2, add),

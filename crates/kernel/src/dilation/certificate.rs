@@ -1,7 +1,7 @@
 //! The certificate of a changed surface: which sites are near, how far it stays from them, and that they cover what it swept.
 
 use super::block::NameHasher;
-use super::tree::{NodeId, SiteId, Tree};
+use super::tree::{NodeId, SiteId, Tree, Weighted, in_space};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_on_triangle;
 use std::collections::HashMap;
@@ -22,7 +22,8 @@ const HALVINGS: usize = 16;
 /// A direction that shows that a triangle is farther than `least` from a convex site. For closest candidates p of the site and q of the
 /// triangle, the plane across q - p parts them: distance >= min over corners t of (t - p') . u, u the unit vector and p' the site's
 /// extreme point along u. Alternating projections converge to the closest pair.
-pub(super) fn parting(triangle: &[Point; 3], site: &Site, least: f64) -> Option<Direction> {
+pub(super) fn parting(triangle: &[Point; 3], weighted: &Weighted, least: f64) -> Option<Direction> {
+    let (site, least) = (&weighted.site, weighted.in_space(least));
     let mut q: Point = std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0);
     for _ in 0..STEPS {
         let p = site.closest(&q);
@@ -32,7 +33,7 @@ pub(super) fn parting(triangle: &[Point; 3], site: &Site, least: f64) -> Option<
             return None;
         }
         let direction = Direction::new(offset.map(|part| part / length), triangle);
-        if direction.parts(site, least) {
+        if direction.is_beyond(site, least) {
             return Some(direction);
         }
         q = closest_on_triangle(&p, &triangle[0], &triangle[1], &triangle[2]);
@@ -53,9 +54,14 @@ impl Direction {
         Self { unit, lowest: triangle.iter().map(|corner| dot(corner, &unit)).fold(f64::INFINITY, f64::min) }
     }
 
-    /// Whether it shows that the triangle is farther from a site than `least`.
+    /// Whether it shows that the triangle is farther from a site than `least`, the deficit included.
     #[inline]
-    fn parts(&self, site: &Site, least: f64) -> bool {
+    fn parts(&self, weighted: &Weighted, least: f64) -> bool {
+        self.is_beyond(&weighted.site, weighted.in_space(least))
+    }
+
+    #[inline]
+    fn is_beyond(&self, site: &Site, least: f64) -> bool {
         self.lowest - highest(site, &self.unit) > least
     }
 }
@@ -136,12 +142,14 @@ struct View {
     /// as far from the site as they differ, at least.
     normal: Point,
     highest: f64,
+    deficit: f64,
 }
 
 impl View {
     /// Whether the plane across the view shows that a triangle is farther from the site than `least`.
     #[inline]
     fn parts(&self, triangle: &[Point; 3], least: f64) -> bool {
+        let least = in_space(least, self.deficit);
         triangle.iter().all(|point| dot(&self.normal, point) - self.highest > least)
     }
 }
@@ -224,12 +232,13 @@ impl Nearby {
         let first = self.views.len();
         let views = &mut self.views;
         places.visit(tree, x, square.sqrt() - self.reach, self.reach, |site, closest, square| {
-            let length = square.sqrt();
-            let normal = if length > 0.0 { subtract(x, closest).map(|part| part / length) } else { [0.0; 3] };
-            views.push(View { site, square, normal, highest: f64::INFINITY });
+            views.push(View { site, square, normal: *closest, highest: f64::INFINITY, deficit: 0.0 });
         });
         for view in &mut views[first..] {
-            view.highest = highest(&tree.site(view.site), &view.normal);
+            let Weighted { site, deficit } = tree.site(view.site);
+            let length = in_space(view.square.sqrt(), deficit);
+            view.normal = if length > 0.0 { subtract(x, &view.normal).map(|part| part / length) } else { [0.0; 3] };
+            (view.highest, view.deficit) = (highest(&site, &view.normal), deficit);
         }
         let views = &mut views[first..];
         let nearer = |a: &View, b: &View| a.square.total_cmp(&b.square).then_with(|| a.site.cmp(&b.site));
@@ -288,17 +297,19 @@ impl Nearby {
         self.marked.push(Marked { at, mask, distance });
     }
 
-    /// The point of the sites that is closest to a vertex at x, if all sites within reach have the same: there the distance is smooth.
-    pub(super) fn foot(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point) -> Option<Point> {
+    /// The point of the sites that is closest to a vertex at x, if all sites within reach have the same, and the nearest site's deficit: there the distance is smooth.
+    pub(super) fn foot(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point) -> Option<(Point, f64)> {
         self.see(tree, places, vertex, x, self.square);
-        let mut foot: Option<Point> = None;
+        let mut foot: Option<(Point, f64)> = None;
         for view in self.views(vertex).iter().filter(|view| view.square <= self.square) {
-            let length = view.square.sqrt();
+            let length = in_space(view.square.sqrt(), view.deficit);
             let closest = std::array::from_fn(|axis| x[axis] - length * view.normal[axis]);
-            if foot.is_some_and(|known| distance_squared(&known, &closest) > 1e-12 * self.square) {
+            if foot.is_some_and(|(known, _)| distance_squared(&known, &closest) > 1e-12 * self.square) {
                 return None;
             }
-            foot = Some(closest);
+            // The views of a vertex are in the order of their distances.
+            let deficit = foot.map_or(view.deficit, |(_, deficit)| deficit);
+            foot = Some((closest, deficit));
         }
         foot
     }
@@ -405,8 +416,8 @@ impl Nearby {
     }
 
     /// The nearest site of those that cover a point.
-    fn nearest(&self, tree: &Tree<'_>, marked: &Marked) -> Option<Site> {
-        let with_square = |site: Site| (site.distance_squared(&marked.at), site);
+    fn nearest(&self, tree: &Tree<'_>, marked: &Marked) -> Option<Weighted> {
+        let with_square = |site: Weighted| (site.distance_squared(&marked.at), site);
         bits(marked.mask).map(|bit| with_square(tree.site(self.sites[bit]))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
     }
 

@@ -49,6 +49,8 @@ impl Affine {
 pub(super) struct Critical {
     /// Points whose hull holds the closest points of active sites.
     closest: Vec<Point>,
+    /// Closest points of all sites, with their squared distances.
+    weighted: Vec<(f64, Point)>,
     /// Corners of what the sites leave.
     rest: Vec<Point>,
     /// What sites cover, what V's cover, and the tetrahedron itself.
@@ -92,7 +94,7 @@ impl Critical {
         for nearby in nearby {
             if least(&nearby.half_space.values) <= band {
                 active += 1;
-                add_closest(&tree.site(nearby.site), &frame.positions, &mut self.closest);
+                add_closest(&tree.site(nearby.site).site, &frame.positions, &mut self.closest);
             }
         }
         if active < 2 {
@@ -153,9 +155,13 @@ impl Critical {
         if self.weights.iter().any(below) || self.sites.iter().any(below) {
             return true;
         }
-        self.closest.clear();
-        self.closest.extend(nearby.iter().map(|nearby| tree.site(nearby.site).closest(x)));
-        let distance = self.closest.iter().map(|point| distance_squared(x, point)).fold(f64::INFINITY, f64::min).sqrt();
+        self.weighted.clear();
+        self.weighted.extend(nearby.iter().map(|nearby| {
+            let site = tree.site(nearby.site);
+            let closest = site.closest(x);
+            (distance_squared(x, &closest) + site.deficit, closest)
+        }));
+        let distance = self.weighted.iter().map(|(square, _)| *square).fold(f64::INFINITY, f64::min).sqrt();
         if distance - around > setting.outer
             || (distance + around <= setting.reach && self.functions.iter().any(below))
             || (distance - around > setting.reach && self.functions.iter().all(above) && self.sites.iter().all(above))
@@ -164,7 +170,8 @@ impl Critical {
         }
         // Closest points of other points of the ball are within `around` of these.
         let most = (distance + 2.0 * around).powi(2);
-        self.closest.retain(|point| distance_squared(x, point) <= most);
+        self.closest.clear();
+        self.closest.extend(self.weighted.iter().filter(|(square, _)| *square <= most).map(|(_, closest)| *closest));
         is_farther(x, &self.closest, 2.0 * around)
     }
 }

@@ -57,7 +57,7 @@ fn is_dust<'a>(
     tree: &mut Option<(Tree<'a>, Vec<u32>)>,
 ) -> bool {
     let width = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(f64::INFINITY, f64::min);
-    if width >= 2.0 * (setting.least - 2.0 * setting.rounding) {
+    if width >= 2.0 * (setting.thinnest - 2.0 * setting.rounding) {
         return false;
     }
     if shell.volume > 0.0 {

@@ -1,6 +1,5 @@
 //! Why there is no solid.
 
-use super::TRIM_SHARE;
 use super::plan::Setting;
 use crate::attractor::RefineError;
 use crate::budget::Stopped;
@@ -89,9 +88,14 @@ pub enum DilationError {
         /// The radius of the largest ball inside, between these.
         largest_mm: [f64; 2],
     },
-    /// Trimmed surfaces cannot be drawn as finely as their share of the tolerance asks.
-    #[error("trimmed surfaces: {0}")]
-    Trimmed(RefineError),
+    /// Trimmed surfaces, or parts whose radius varies, cannot be drawn as finely as their share of the tolerance asks.
+    #[error("trimmed surfaces and parts whose radius varies are drawn within a share of {share} of the tolerance: {error}")]
+    Drawn {
+        /// What happened.
+        error: RefineError,
+        /// The share.
+        share: f64,
+    },
     /// The mesh is no closed manifold: our bug.
     #[error("the extracted surface is not a closed manifold: {0}")]
     Defect(SolidError),
@@ -112,7 +116,7 @@ impl DilationError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
-            Self::Trimmed(error) => error.kind(),
+            Self::Drawn { error, .. } => error.kind(),
             Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } | Self::NoHollow { .. } => Kind::Unreachable,
             Self::Inside => Kind::Invalid,
@@ -125,7 +129,7 @@ impl DilationError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Stopped(stopped) => stopped.code(),
-            Self::Trimmed(error) => error.code(),
+            Self::Drawn { error, .. } => error.code(),
             Self::Triangles { .. } => "limit-triangles",
             Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
@@ -142,9 +146,9 @@ impl DilationError {
     pub fn limit(&self) -> Option<LimitFacts> {
         let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
         match *self {
-            Self::Trimmed(ref error) => error.limit().map(|facts| LimitFacts {
-                // What was asked of the trimmed surfaces is a share of the tolerance.
-                remedy: facts.remedy.map(|(name, value)| (name, if name == "tolerance_mm" { value / TRIM_SHARE } else { value })),
+            Self::Drawn { ref error, share } => error.limit().map(|facts| LimitFacts {
+                // What was asked of them is a share of the tolerance.
+                remedy: facts.remedy.map(|(name, value)| (name, if name == "tolerance_mm" { value / share } else { value })),
                 ..facts
             }),
             Self::Stopped(_) | Self::Defect(_) | Self::Inside => None,

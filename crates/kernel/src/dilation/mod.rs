@@ -33,11 +33,11 @@ mod wall;
 
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::Budget;
-use crate::measure::bounds::{AxisBox, bounding_box};
+use crate::measure::bounds::{AxisBox, bounding_box, dilated_box};
 use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
 pub use error::DilationError;
-use plan::Plan;
+use plan::{Balls, Plan};
 pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
 pub use wall::{Side, Wall, close, wall};
 
@@ -46,7 +46,7 @@ pub use wall::{Side, Wall, close, wall};
 pub struct Dilation {
     /// The solid; its coordinates are single-precision numbers.
     pub solid: Solid,
-    /// D(r - inner) is inside the solid.
+    /// D(r - inner) is inside the solid, whatever radius r parts have of their own.
     pub inner_mm: f64,
     /// The solid is inside D(r + outer).
     pub outer_mm: f64,
@@ -56,8 +56,10 @@ pub struct Dilation {
     pub leaf_cells: u64,
     /// Pairs of triangles that meet elsewhere than where they are joined.
     pub crossings: u64,
-    /// The box of the attractor, not dilated.
+    /// The box of the exact dilation.
     pub bounds: AxisBox,
+    /// The least radius: the one asked for, unless parts have their own.
+    pub least_radius_mm: f64,
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain. Not counted where points stand for
     /// cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
@@ -89,44 +91,68 @@ pub fn dilate_unsimplified(
 }
 
 fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
-    let Some(Resolved { attractor: resolved, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
-        return Plan::new(attractor, radius, tolerance, simplify, budget)?.run(budget);
+    let Some(resolved) = resolve(attractor, radius, tolerance, budget)? else {
+        return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.run(budget);
     };
-    let dilation = Plan::new(&resolved, radius, rest, simplify, budget)?.run(budget)?;
-    Ok(Dilation {
-        inner_mm: dilation.inner_mm + deviation_mm,
-        outer_mm: dilation.outer_mm + deviation_mm,
-        bounds: bounding_box(attractor, budget)?,
-        ..dilation
-    })
+    let Resolved { attractor: changed, balls, deviation_mm, rest } = &resolved;
+    let dilation = Plan::new(changed, *balls, *rest, simplify, budget)?.run(budget)?;
+    let bounds = if attractor.has_own_radii() {
+        dilated_box(changed, budget)?.widened(*deviation_mm)
+    } else {
+        bounding_box(attractor, budget)?.grown(radius.mm())
+    };
+    Ok(Dilation { inner_mm: dilation.inner_mm + deviation_mm, outer_mm: dilation.outer_mm + deviation_mm, bounds, ..dilation })
 }
 
 /// Share of the tolerance that triangles which stand for trimmed surfaces may use.
 const TRIM_SHARE: f64 = 0.1;
 
-/// An attractor whose trimmed surfaces are triangles.
+/// Share of the tolerance by which radii may be off where they vary.
+const GRADE_SHARE: f64 = 0.4;
+
+/// An attractor whose trimmed surfaces are triangles, and whose roots have one radius each.
 struct Resolved {
     attractor: Attractor,
-    /// Its Hausdorff distance from the one asked for, at most.
+    balls: Balls,
+    /// Its dilation's distance from the one asked for, at most.
     deviation_mm: f64,
     /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
     /// in D(r + d), so that d adds to both bounds.
     rest: Tolerance,
 }
 
-/// Draws trimmed surfaces to their share of the tolerance; `None` when there are none.
+/// Draws trimmed surfaces to their share of the tolerance, and splits roots whose radius varies; `None` when there are none.
 fn resolve(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Option<Resolved>, DilationError> {
-    if attractor.trimmed().is_empty() {
+    let is_trimmed = !attractor.trimmed().is_empty();
+    if !is_trimmed && !attractor.has_own_radii() {
         return Ok(None);
     }
-    let aimed = tolerance.mm().min(0.5 * radius.mm());
-    let length = |mm: f64| Tolerance::new(mm).expect("a share of a positive length is positive");
-    let share = length((TRIM_SHARE * aimed).max(f64::MIN_POSITIVE));
-    let (attractor, deviation_mm) = attractor.resolved(share, budget).map_err(|error| match error {
+    let length = |mm: f64| Tolerance::new(mm).unwrap_or(tolerance);
+    let [least, most] = attractor.radii(radius.mm());
+    let balls = Balls { least, most };
+    let aimed = tolerance.mm().min(0.5 * balls.least);
+    let (mut changed, mut deviation_mm) = (attractor.clone(), 0.0);
+    if is_trimmed {
+        (changed, deviation_mm) = attractor.resolved(length(TRIM_SHARE * aimed), budget).map_err(|error| drawn(error, TRIM_SHARE))?;
+    }
+    if attractor.has_own_radii() {
+        let graded = changed.graded(radius.mm(), GRADE_SHARE * aimed, budget).map_err(|error| drawn(error, GRADE_SHARE))?;
+        deviation_mm += graded.deviation_mm;
+        let least = graded.radii.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = graded.radii.iter().copied().fold(0.0, f64::max);
+        let rest = length(aimed - deviation_mm);
+        return Ok(Some(Resolved { attractor: graded.attractor, balls: Balls { least, most }, deviation_mm, rest }));
+    }
+    let rest = length(aimed - deviation_mm);
+    Ok(Some(Resolved { attractor: changed, balls, deviation_mm, rest }))
+}
+
+/// The error of a stage that draws within a share of the tolerance.
+fn drawn(error: RefineError, share: f64) -> DilationError {
+    match error {
         RefineError::Stopped(stopped) => DilationError::Stopped(stopped),
-        other => DilationError::Trimmed(other),
-    })?;
-    Ok(Some(Resolved { attractor, deviation_mm, rest: length((aimed - deviation_mm).max(f64::MIN_POSITIVE)) }))
+        error => DilationError::Drawn { error, share },
+    }
 }
 
 /// What a dilation is predicted to cost.
@@ -146,6 +172,8 @@ pub struct Prediction {
 /// As [`dilate`], for what shows before the work.
 pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Prediction, DilationError> {
     let resolved = resolve(attractor, radius, tolerance, budget)?;
-    let (attractor, tolerance) = resolved.as_ref().map_or((attractor, tolerance), |resolved| (&resolved.attractor, resolved.rest));
-    Plan::new(attractor, radius, tolerance, true, budget)?.predict(budget)
+    let one = Balls { least: radius.mm(), most: radius.mm() };
+    let (attractor, balls, tolerance) =
+        resolved.as_ref().map_or((attractor, one, tolerance), |resolved| (&resolved.attractor, resolved.balls, resolved.rest));
+    Plan::new(attractor, balls, tolerance, true, budget)?.predict(budget)
 }

@@ -5,7 +5,7 @@ use super::DilationError;
 use super::block::{BlockSurface, SIDE, Workshop, signed_side};
 use super::lattice::Grading;
 use super::plan::Setting;
-use super::tree::{Candidate, Candidates};
+use super::tree::{Candidate, Candidates, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, child_points, distance_squared};
 use crate::attractor::sites::SiteRule;
@@ -142,8 +142,9 @@ impl<'a> Pass<'a> {
         for ((lower, _), candidate) in brackets.iter().zip(&expanded.cells) {
             let solid = self.attractor.roots()[candidate.cell.root as usize].solid;
             let own = solid.map_or(f64::NEG_INFINITY, |solid| reaches[solid as usize]);
-            if *lower <= threshold || *lower <= own {
-                lowest = lowest.min(*lower);
+            let weighted = with_deficit(*lower, self.rule.deficit(candidate.cell.root));
+            if weighted <= threshold || *lower <= own {
+                lowest = lowest.min(weighted);
                 kept.push(candidate.cell, expanded.points_of(self.attractor, candidate), candidate.leaf);
             }
         }
@@ -151,7 +152,7 @@ impl<'a> Pass<'a> {
         Ok((lowest <= self.setting.reach + self.setting.gap + half + slack).then_some((kept, still_open)))
     }
 
-    /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances.
+    /// Expands a candidate until its cells are as small as the cube asks, and brackets their distances in space.
     #[allow(clippy::too_many_arguments)]
     fn expand(
         &self,
@@ -168,18 +169,19 @@ impl<'a> Pass<'a> {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }
         let points = from.points_of(self.attractor, candidate);
+        let deficit = self.rule.deficit(candidate.cell.root);
         let ball = candidate.cell.ball;
         let distance = distance_squared(middle, &ball.centre).sqrt();
         if candidate.leaf {
             let nearest = self.rule.nearest(middle, &candidate.cell, points).sqrt();
-            *upper = upper.min(nearest + self.setting.slack);
+            *upper = upper.min(with_deficit(nearest, deficit) + self.setting.slack);
             brackets.push((nearest - self.setting.slack, nearest));
             to.push(candidate.cell, points, true);
             return Ok(());
         }
         let in_solid = self.attractor.roots()[candidate.cell.root as usize].solid.is_some();
         if ball.radius <= size || (distance - ball.radius > horizon && !in_solid) {
-            *upper = upper.min(distance + ball.radius + self.setting.slack);
+            *upper = upper.min(with_deficit(distance + ball.radius, deficit) + self.setting.slack);
             brackets.push((distance - ball.radius - self.setting.slack, distance + ball.radius));
             to.push(candidate.cell, points, false);
             return Ok(());

@@ -16,7 +16,7 @@ use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::mend::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
-use crate::tolerance::{Radius, Tolerance};
+use crate::tolerance::Tolerance;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Mutex;
@@ -38,6 +38,8 @@ pub(crate) struct Setting {
     pub(super) far: i64,
     /// The surface is nowhere nearer to a site than this: sqrt(theta - R^2) or less, what simplification may use of the tolerance.
     pub(super) least: f64,
+    /// `least` in space, for the sites whose balls are the smallest.
+    pub(super) thinnest: f64,
     /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
     pub(super) outer: f64,
     /// f less theta where a gap was closed: the surface passes near the vertex.
@@ -63,7 +65,7 @@ pub(crate) struct Setting {
     pub(super) close: f64,
     /// Whether simplification only removes what cannot be a solid.
     pub(super) clean_only: bool,
-    /// What was asked.
+    /// What was asked, of the smallest balls.
     pub(super) tolerance: f64,
     /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
     pub(super) cells: usize,
@@ -115,6 +117,7 @@ impl Setting {
             sight: (2.0 * WITNESS * radius).max(horizon + radius) * 1.001,
             far: integer((radius + 1.001 * pitch).powi(2) - theta),
             least: least(radius, pitch),
+            thinnest: least(radius, pitch),
             outer,
             filled_value: -1,
             bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing * 0.25_f64.powi(level as i32))),
@@ -176,10 +179,51 @@ struct Space {
     candidates: Candidates,
 }
 
+/// The radii of the balls: one, or several that one serves, see [`SiteRule::deficit`]. A length e at the largest, r, is one at the smallest, s, of the same difference of squares:
+/// (s - e')^2 - s^2 = (r - e)^2 - r^2. At those between it is less than e'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Balls {
+    pub(super) least: f64,
+    pub(super) most: f64,
+}
+
+impl Balls {
+    /// What a bound from within at the largest is at the smallest.
+    fn inner(self, e: f64) -> f64 {
+        if self.least == self.most {
+            return e;
+        }
+        let square = self.least * self.least - e * (2.0 * self.most - e);
+        (self.least - square.max(0.0).sqrt()) * (1.0 + 1e-12)
+    }
+
+    /// What a bound from without at the largest is at the smallest.
+    fn outer(self, e: f64) -> f64 {
+        if self.least == self.most {
+            return e;
+        }
+        ((self.least * self.least + e * (2.0 * self.most + e)).sqrt() - self.least) * (1.0 + 1e-12)
+    }
+
+    /// What both bounds may be at the largest, so that they are at most e at the smallest.
+    fn share(self, e: f64) -> f64 {
+        if self.least == self.most {
+            return e;
+        }
+        let within = e * (2.0 * self.least - e);
+        // r - sqrt(r^2 - d) = d / (r + sqrt(r^2 - d)), without cancellation.
+        within / (self.most + (self.most * self.most - within).sqrt()) * (1.0 - 1e-9)
+    }
+}
+
 /// Pitch and bounds of a dilation before it begins.
 pub(super) struct Plan<'a> {
+    balls: Balls,
+    /// The largest of them.
     radius: f64,
     /// The tolerance that is aimed at: smaller than asked when the radius is.
+    aimed: f64,
+    /// What it is at the largest radius.
     tolerance: f64,
     pitch: f64,
     /// How near to a site the surface may be.
@@ -194,30 +238,31 @@ pub(super) struct Plan<'a> {
 impl<'a> Plan<'a> {
     pub(super) fn new(
         attractor: &'a Attractor,
-        radius: Radius,
+        balls: Balls,
         tolerance: Tolerance,
         simplify: bool,
         budget: &Budget,
     ) -> Result<Self, DilationError> {
         let bounds = bounding_box(attractor, budget)?;
-        let radius = radius.mm();
+        let radius = balls.most;
         // A tolerance of the radius' order would allow an empty result.
-        let aimed = tolerance.mm().min(0.5 * radius);
+        let of_least = tolerance.mm().min(0.5 * balls.least);
+        let aimed = balls.share(of_least);
         let rounding = rounding(extent(&bounds, 3.0 * radius));
         check_depth(attractor, aimed, tolerance, budget)?;
         // The unit of values is below 8 r^2 / MOST, and noise of 32 units moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^16.
         let extra = carried(extent(&bounds, 3.0 * radius)) + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
-        let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * radius);
+        let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * balls.least);
         let least = least(radius, pitch);
         let pitch = if rule.is_dense() { pitch.min(CLOSE * (aimed - extra - rule.outer_reserve())) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let share = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
-            let reachable_mm = 1.01 * (2.0 * extra).max(share + extra);
+            let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { radius, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
+        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -231,8 +276,10 @@ impl<'a> Plan<'a> {
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
         // The lattice's own error is the inner end of the band; the outer one is the tolerance's, less what sums of such lengths lose to rounding.
         let outer = self.radius + (self.tolerance - self.extra - self.rule.outer_reserve()) * (1.0 - 1e-12);
-        let setting = Setting::new(self.radius, outer.max(self.radius), self.tolerance, pitch, cells, &self.bounds);
-        let setting = Setting { least: setting.least.min(self.least), ..setting };
+        let setting = Setting::new(self.radius, outer.max(self.radius), self.aimed, pitch, cells, &self.bounds);
+        let least = setting.least.min(self.least);
+        let thinnest = self.balls.least - self.balls.inner(self.radius - least);
+        let setting = Setting { least, thinnest, ..setting };
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
@@ -257,7 +304,7 @@ impl<'a> Plan<'a> {
             ..budget.clone()
         };
         let prediction = |triangles: f64| Prediction { triangles, memory_bytes: triangles * BYTES_PER_TRIANGLE, pitch_mm: self.pitch };
-        let coarsest = (COARSEST * self.radius).max(self.pitch);
+        let coarsest = (COARSEST * self.balls.least).max(self.pitch);
         let mut pitch = coarsest;
         loop {
             let setting = self.setting(pitch, &unlimited);
@@ -372,7 +419,8 @@ impl<'a> Plan<'a> {
             let leaf = self.rule.leaf(&cell, &root.points).is_some();
             // Points, segments and triangles that are stated again add nothing; triangles of a solid tell its sides.
             let is_stated = leaf && root.solid.is_none() && attractor.state_of(&cell).leaf == LeafPrimitive::Simplex;
-            if is_stated && !met.insert(root.points.iter().flatten().map(|x| x.to_bits()).collect()) {
+            let deficit = self.rule.deficit(index as u32);
+            if is_stated && !met.insert(root.points.iter().flatten().chain([&deficit]).map(|x| x.to_bits()).collect()) {
                 continue;
             }
             candidates.push(cell, &root.points, leaf);
@@ -408,11 +456,12 @@ impl<'a> Plan<'a> {
         Ok(Dilation {
             solid,
             crossings,
-            inner_mm: inner,
-            outer_mm: outer,
+            inner_mm: self.balls.inner(inner),
+            outer_mm: self.balls.outer(outer),
+            least_radius_mm: self.balls.least,
             pitch_mm: setting.lattice.pitch,
             leaf_cells,
-            bounds: self.bounds,
+            bounds: self.bounds.grown(self.radius),
             uncertain,
         })
     }

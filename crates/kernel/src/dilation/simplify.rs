@@ -16,7 +16,7 @@
 use super::block::BlockSurface;
 use super::certificate::{Nearby, Places};
 use super::plan::Setting;
-use super::tree::{Candidates, Tree};
+use super::tree::{Candidates, Tree, in_space};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::solid::half_edges::{HalfEdges, NONE};
@@ -185,12 +185,12 @@ impl<'a> Simplifier<'a> {
         }
         let count = self.mender.star.ring.len();
         let from = mesh.points[vertex as usize];
-        let Some(foot) = self.nearby.foot(&mut self.tree, &mut self.places, vertex, &from) else { return false };
-        let length = distance_squared(&from, &foot).sqrt();
-        let to: Point = std::array::from_fn(|axis| f64::from((foot[axis] + (from[axis] - foot[axis]) * (setting.outer / length)) as f32));
+        let Some((foot, deficit)) = self.nearby.foot(&mut self.tree, &mut self.places, vertex, &from) else { return false };
+        let share = in_space(setting.outer, deficit) / distance_squared(&from, &foot).sqrt();
+        let to: Point = std::array::from_fn(|axis| f64::from((foot[axis] + (from[axis] - foot[axis]) * share) as f32));
         let moved = distance_squared(&from, &to).sqrt();
         // No height of a swept tetrahedron is more than the way.
-        let worth = moved > LEAST_LIFT * (setting.outer - setting.least) && count as f64 * moved < 1.9 * setting.least;
+        let worth = moved > LEAST_LIFT * (setting.outer - setting.least) && count as f64 * moved < 1.9 * setting.thinnest;
         if self.tree.exhausted || !worth || !core.contains(&to) {
             return false;
         }
@@ -301,7 +301,7 @@ impl<'a> Simplifier<'a> {
             }
             let cost = largest + LENGTH_SHARE * length;
             // The planks of the module's comment; a share is left for rounding.
-            let planks = sum < 1.9 * setting.least;
+            let planks = sum < 1.9 * setting.thinnest;
             let tiny = length <= TINY * setting.rounding;
             if planks && (tiny || (cost > lower && cost <= upper)) {
                 choices.push((if tiny { length * 1e-6 } else { cost }, m));

@@ -71,6 +71,45 @@ pub(super) enum SiteId {
     Listed(u32),
 }
 
+/// A site with its deficit: see [`SiteRule::deficit`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weighted {
+    pub(super) site: Site,
+    pub(super) deficit: f64,
+}
+
+impl Weighted {
+    /// The squared distance of x, the deficit included.
+    #[inline]
+    pub(super) fn distance_squared(&self, x: &Point) -> f64 {
+        self.site.distance_squared(x) + self.deficit
+    }
+
+    /// The point of the site closest to x.
+    #[inline]
+    pub(super) fn closest(&self, x: &Point) -> Point {
+        self.site.closest(x)
+    }
+
+    /// The distance in space where that with the deficit is `distance`.
+    #[inline]
+    pub(super) fn in_space(&self, distance: f64) -> f64 {
+        in_space(distance, self.deficit)
+    }
+}
+
+/// The distance in space where that with a deficit is `distance`.
+#[inline]
+pub(super) fn in_space(distance: f64, deficit: f64) -> f64 {
+    if deficit > 0.0 { (distance * distance - deficit).max(0.0).sqrt() } else { distance }
+}
+
+/// The distance with a deficit where that in space is `distance`.
+#[inline]
+pub(super) fn with_deficit(distance: f64, deficit: f64) -> f64 {
+    if deficit > 0.0 { (distance.max(0.0).powi(2) + deficit).sqrt() } else { distance }
+}
+
 /// The nearest site of a query.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
@@ -87,6 +126,9 @@ pub(super) struct Tree<'a> {
     /// Whether a node was left closed because there were too many: answers are then worthless.
     pub(super) exhausted: bool,
     nodes: Vec<Node>,
+    /// The least deficit below every node, and the deficits of sites; empty where there are none.
+    deficits: Vec<f64>,
+    site_deficits: [Vec<f64>; 2],
     cells: Vec<Cell>,
     points: Vec<ControlPoint>,
     sites: Vec<Site>,
@@ -107,6 +149,8 @@ impl<'a> Tree<'a> {
             most_nodes,
             exhausted: false,
             nodes: Vec::new(),
+            deficits: Vec::new(),
+            site_deficits: [Vec::new(), Vec::new()],
             cells: Vec::new(),
             points: Vec::new(),
             sites: Vec::new(),
@@ -122,6 +166,8 @@ impl<'a> Tree<'a> {
     /// candidates of one solid, or of none.
     pub(super) fn reset(&mut self, candidates: &Candidates) -> Vec<NodeId> {
         self.nodes.clear();
+        self.deficits.clear();
+        self.site_deficits.iter_mut().for_each(Vec::clear);
         self.cells.clear();
         self.points.clear();
         self.sites.clear();
@@ -160,6 +206,9 @@ impl<'a> Tree<'a> {
         let centre: Point = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
         let radius = nodes.map(|node| distance_squared(&node.centre, &centre).sqrt() + node.radius).fold(0.0, f64::max);
         self.nodes.push(Node { centre, radius: radius * (1.0 + 1e-12), content: Content::Open(children[0], children.len() as u32) });
+        if self.rule.is_graded() {
+            self.deficits.push(children.iter().map(|&id| self.deficits[id as usize]).fold(f64::INFINITY, f64::min));
+        }
         self.cells.push(self.cells[children[0] as usize]);
         self.nodes.len() as NodeId - 1
     }
@@ -187,6 +236,12 @@ impl<'a> Tree<'a> {
             Content::Closed(first)
         };
         self.nodes.push(Node { centre: cell.ball.centre, radius: cell.ball.radius + self.slack, content });
+        if self.rule.is_graded() {
+            let deficit = self.rule.deficit(cell.root);
+            self.deficits.push(deficit);
+            self.site_deficits[0].resize(self.point_sites.len(), deficit);
+            self.site_deficits[1].resize(self.sites.len(), deficit);
+        }
         self.cells.push(cell);
     }
 
@@ -215,11 +270,24 @@ impl<'a> Tree<'a> {
     }
 
     /// A site by its id.
-    pub(super) fn site(&self, id: SiteId) -> Site {
-        match id {
-            SiteId::Point(index) => Site::Point(self.point_sites[index as usize]),
-            SiteId::Listed(index) => self.sites[index as usize],
-        }
+    pub(super) fn site(&self, id: SiteId) -> Weighted {
+        let (site, kind, index) = match id {
+            SiteId::Point(index) => (Site::Point(self.point_sites[index as usize]), 0, index),
+            SiteId::Listed(index) => (self.sites[index as usize], 1, index),
+        };
+        Weighted { site, deficit: self.site_deficits[kind].get(index as usize).copied().unwrap_or(0.0) }
+    }
+
+    /// The least deficit below a node.
+    #[inline]
+    fn deficit(&self, id: NodeId) -> f64 {
+        if self.deficits.is_empty() { 0.0 } else { self.deficits[id as usize] }
+    }
+
+    /// How far from a node's ball x may be, if a site of it is within `distance`.
+    #[inline]
+    fn threshold(&self, id: NodeId, distance: f64) -> f64 {
+        in_space(distance, self.deficit(id)) + self.nodes[id as usize].radius + self.slack
     }
 
     /// The root cell that a node descends from.
@@ -253,7 +321,7 @@ impl<'a> Tree<'a> {
         while let Some(id) = stack.pop() {
             let node = &self.nodes[id as usize];
             let square = distance_squared(x, &node.centre);
-            let threshold = best.distance + node.radius + self.slack;
+            let threshold = self.threshold(id, best.distance);
             if square > threshold * threshold {
                 continue;
             }
@@ -281,7 +349,7 @@ impl<'a> Tree<'a> {
         for id in first..first + count {
             let node = &self.nodes[id as usize];
             let square = distance_squared(x, &node.centre);
-            let threshold = best.distance + node.radius + self.slack;
+            let threshold = self.threshold(id, best.distance);
             if square <= threshold * threshold {
                 stack.push(id);
                 // One pass keeps the nearest on top; full sorting costs more than it saves.
@@ -299,17 +367,18 @@ impl<'a> Tree<'a> {
 
     #[inline]
     fn visit_sites(&self, x: &Point, id: NodeId, best: &mut Best) {
+        let deficit = self.deficit(id);
         match self.nodes[id as usize].content {
             Content::Points(first, count) => {
                 for index in first..first + count {
                     let point = &self.point_sites[index as usize];
-                    best.offer(self, distance_squared(x, point), point, SiteId::Point(index), id);
+                    best.offer(self, distance_squared(x, point) + deficit, point, SiteId::Point(index), id);
                 }
             }
             Content::Sites(first, count) => {
                 for index in first..first + count {
                     let closest = self.sites[index as usize].closest(x);
-                    best.offer(self, distance_squared(x, &closest), &closest, SiteId::Listed(index), id);
+                    best.offer(self, distance_squared(x, &closest) + deficit, &closest, SiteId::Listed(index), id);
                 }
             }
             Content::Open(..) | Content::Closed(_) => {}
@@ -330,15 +399,16 @@ impl<'a> Tree<'a> {
         let limit = (reach + self.slack).powi(2);
         while let Some(id) = stack.pop() {
             let node = &self.nodes[id as usize];
-            let threshold = reach + node.radius + self.slack;
+            let threshold = self.threshold(id, reach);
             if distance_squared(x, &node.centre) > threshold * threshold {
                 continue;
             }
+            let deficit = self.deficit(id);
             match node.content {
                 Content::Points(first, count) => {
                     for index in first..first + count {
                         let point = &self.point_sites[index as usize];
-                        let square = distance_squared(x, point);
+                        let square = distance_squared(x, point) + deficit;
                         if square <= limit {
                             visit(SiteId::Point(index), point, square);
                         }
@@ -347,7 +417,7 @@ impl<'a> Tree<'a> {
                 Content::Sites(first, count) => {
                     for index in first..first + count {
                         let closest = self.sites[index as usize].closest(x);
-                        let square = distance_squared(x, &closest);
+                        let square = distance_squared(x, &closest) + deficit;
                         if square <= limit {
                             visit(SiteId::Listed(index), &closest, square);
                         }
@@ -366,9 +436,8 @@ impl<'a> Tree<'a> {
     /// Nodes that may hold a site within `reach` of x: as small as possible without becoming many.
     pub(super) fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
         let may = |tree: &Self, id: NodeId| {
-            let node = &tree.nodes[id as usize];
-            let threshold = reach + node.radius + tree.slack;
-            distance_squared(x, &node.centre) <= threshold * threshold
+            let threshold = tree.threshold(id, reach);
+            distance_squared(x, &tree.nodes[id as usize].centre) <= threshold * threshold
         };
         found.clear();
         found.extend(starts.iter().copied().filter(|&id| may(self, id)));
@@ -461,7 +530,7 @@ impl Best {
 /// Whether the site of an equal distance goes before: by its closest point, then by its own coordinates.
 fn is_first(tree: &Tree<'_>, (closest, site): (&Point, SiteId), hit: &Hit) -> bool {
     let before = |a: &Point, b: &Point| a.iter().zip(b).map(|(p, q)| p.total_cmp(q)).find(|order| order.is_ne());
-    let corners = |id: SiteId| match tree.site(id) {
+    let corners = |id: SiteId| match tree.site(id).site {
         Site::Point(a) => [a; 3],
         Site::Segment([a, b]) => [a, b, b],
         Site::Triangle(corners) => corners,

@@ -103,8 +103,8 @@ pub fn close(
     let half = |mm: f64| Tolerance::new(mm).unwrap_or(tolerance);
     let grown = Radius::new(radius.mm() + ball.mm()).unwrap_or(radius);
     // The solid that is left is as thin as r, and its error must stay below that.
-    let aimed = tolerance.mm().min(0.5 * radius.mm());
-    let swollen = make(attractor, grown, half(0.5 * aimed), budget)?;
+    let aimed = tolerance.mm().min(0.5 * attractor.radii(radius.mm())[0]);
+    let swollen = make(&attractor.with_grown_radii(ball.mm()), grown, half(0.5 * aimed), budget)?;
     let surface = surface_of(swollen.solid.mesh());
     let around = make(&surface, ball, half(aimed - swollen.inner_mm.max(swollen.outer_mm)), budget)?;
     let inside = Inside::new(swollen.solid.mesh());
@@ -114,10 +114,12 @@ pub fn close(
         solid: Solid::new(left, budget)?,
         inner_mm: swollen.inner_mm + around.outer_mm,
         outer_mm: swollen.outer_mm + around.inner_mm,
+        least_radius_mm: swollen.least_radius_mm - ball.mm(),
         pitch_mm: swollen.pitch_mm.min(around.pitch_mm),
         leaf_cells: swollen.leaf_cells + around.leaf_cells,
         crossings: around.crossings,
-        bounds: swollen.bounds,
+        // A closing stays within the convex hull.
+        bounds: swollen.bounds.grown(-ball.mm()),
         uncertain: swollen.uncertain + around.uncertain,
     })
 }

@@ -3,7 +3,7 @@
 
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, dot};
 use crate::attractor::trim::{TrimmedSurface, Window};
-use crate::attractor::{Attractor, StateBound};
+use crate::attractor::{Attractor, OwnRadius, StateBound};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
@@ -26,6 +26,13 @@ impl AxisBox {
     pub fn grown(&self, length: f64) -> Self {
         let moved = |interval: Interval, by: f64| Interval::new(interval.low + by, interval.high + by);
         Self { low: self.low.map(|x| moved(x, -length)), high: self.high.map(|x| moved(x, length)) }
+    }
+
+    /// The box whose intervals are wider by `length` at both ends.
+    #[must_use]
+    pub(crate) fn widened(&self, length: f64) -> Self {
+        let wider = |interval: Interval| Interval::new(interval.low - length, interval.high + length);
+        Self { low: self.low.map(wider), high: self.high.map(wider) }
     }
 
     /// Largest absolute coordinate.
@@ -98,6 +105,40 @@ pub fn bounding_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, S
         *end = Interval::new(sign * support.low, sign * support.high);
     }
     Ok(AxisBox { low: [ends[0], ends[2], ends[4]], high: [ends[1], ends[3], ends[5]] })
+}
+
+/// The box of the union of all roots' cells, each dilated by the ball of its own constant radius.
+///
+/// # Errors
+/// [`Stopped`] when the budget's token was fired.
+pub(crate) fn dilated_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, Stopped> {
+    let mut ends = [Interval { low: f64::NEG_INFINITY, high: f64::NEG_INFINITY }; 6];
+    for (index, root) in attractor.roots().iter().enumerate() {
+        let radius = match attractor.own_radius(index) {
+            Some(OwnRadius::Constant(radius)) => *radius,
+            _ => 0.0,
+        };
+        for (end, best) in ends.iter_mut().enumerate() {
+            let direction = std::array::from_fn(|axis| {
+                if axis != end / 2 {
+                    0.0
+                } else if end % 2 == 0 {
+                    -1.0
+                } else {
+                    1.0
+                }
+            });
+            let cell = attractor.root_cell(index);
+            // What cannot be the farthest is not looked at.
+            if dot(&direction, &cell.ball.centre) + cell.ball.radius + radius <= best.low {
+                continue;
+            }
+            let found = support_of_cell(attractor, cell, root.points.clone(), &direction, budget)?;
+            *best = Interval { low: best.low.max(found.low + radius), high: best.high.max(found.high + radius) };
+        }
+    }
+    let lower = |end: Interval| Interval { low: -end.high, high: -end.low };
+    Ok(AxisBox { low: [0, 2, 4].map(|end| lower(ends[end])), high: [1, 3, 5].map(|end| ends[end]) })
 }
 
 /// [least, largest] of x . direction over the attractor, each an interval that contains it, in mm for a direction of length 1.

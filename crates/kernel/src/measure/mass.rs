@@ -38,7 +38,9 @@ const ROUNDING: f64 = 1e-10;
 ///
 /// V(s) / s^3 does not increase with s (Kneser, "Ueber den Rand von Parallelkoerpern", Math. Nachr. 5,
 /// 1951: a union of balls loses volume when its centres contract), so V(r) <= (r / (r - inner))^3 V(r - inner)
-/// <= (r / (r - inner))^3 V(M), and V(r) >= (r / (r + outer))^3 V(M).
+/// <= (r / (r - inner))^3 V(M), and V(r) >= (r / (r + outer))^3 V(M). Where radii differ, r is the least: the dilation whose radii are all t times those of D_r is
+/// t times a union of the same balls with their centres contracted by t, which continuously moving together loses volume (B. Csikos, "On the volume of the union
+/// of balls", Discrete Comput. Geom. 20, 1998), so V(t) / t^3 does not increase; and that with t = 1 - inner / r lies in M.
 #[must_use]
 pub fn dilated_volume(mesh_volume: f64, radius: f64, inner: f64, outer: f64) -> Interval {
     let low = mesh_volume * (radius / (radius + outer)).powi(3) * (1.0 - ROUNDING);
@@ -48,7 +50,7 @@ pub fn dilated_volume(mesh_volume: f64, radius: f64, inner: f64, outer: f64) -> 
 
 /// Area of the boundary of D_r, from an interval of its volume.
 ///
-/// S(s) / s^2 does not increase (Kneser again, S = V'), so V(r) >= integral of S(r) (s / r)^2 = S(r) r / 3; and no
+/// S(s) / s^2 does not increase (Kneser again, S = V'; where radii differ, V' = the integral of the radii over the boundary is at most 3 V and at least r S), so V(r) >= integral of S(r) (s / r)^2 = S(r) r / 3; and no
 /// set of volume V has less area than the ball: S >= (36 pi V^2)^(1/3).
 #[must_use]
 pub fn dilated_area(volume: Interval, radius: f64) -> Interval {

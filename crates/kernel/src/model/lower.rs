@@ -2,9 +2,10 @@
 //! [`Attractor`] once.
 
 use super::join::{self, Borders};
+use super::radius::Before;
 use super::{AffineMap, CellKind, Model, Shape};
 use crate::attractor::trim::TrimmedSurface;
-use crate::attractor::{Attractor, AttractorError, Gluing, Root, SolidSurface};
+use crate::attractor::{Attractor, AttractorError, Gluing, OwnRadius, Root, SolidSurface};
 use crate::automaton::topology::{Declared, Topology, TopologyError};
 use crate::automaton::{Automaton, Boundary, LeafPrimitive, Smooth, State, StateId, SubdivisionOperator};
 use std::collections::BTreeMap;
@@ -39,6 +40,8 @@ pub(super) struct Draft {
     pub(super) states: Vec<State>,
     pub(super) roots: Vec<Root>,
     pub(super) solids: Vec<SolidSurface>,
+    /// Radii of the roots' own; may be shorter than the roots.
+    pub(super) radii: Vec<Option<OwnRadius>>,
     /// Surfaces that loops cut.
     pub(super) trimmed: Vec<TrimmedSurface>,
     pub(super) findings: Vec<Finding>,
@@ -137,7 +140,7 @@ impl Draft {
         self.findings.iter().any(|finding| !finding.warning)
     }
 
-    fn shape(&mut self, shape: &Shape) {
+    pub(super) fn shape(&mut self, shape: &Shape) {
         match shape {
             Shape::Ifs(ifs) => ifs.lower(self),
             Shape::Bcifs(bcifs) => bcifs.lower(self),
@@ -175,6 +178,11 @@ impl Draft {
                 self.place = format!("{place}/parts/{index}");
                 self.trimmed[first_trimmed..].iter_mut().for_each(|surface| surface.transform(|point| moved(map, point)));
                 self.transform(map, first_root, first_solid);
+            }
+            if let Some(radius) = &part.radius {
+                self.place = format!("{place}/parts/{index}");
+                let before = Before { roots: first_root, solids: first_solid, trimmed: first_trimmed };
+                radius.lower(&part.shape, before, self);
             }
         }
         self.place = place;
@@ -223,6 +231,13 @@ impl Model {
         if draft.has_errors() {
             return Err(draft.findings);
         }
+        if draft.radii.iter().any(Option::is_some) {
+            draft.radii.resize(draft.roots.len(), None);
+            // Sites of cells whose radius varies become roots.
+            (1..=3).for_each(|corners| {
+                super::mesh::simplex(&mut draft, corners);
+            });
+        }
         let origins = std::mem::take(&mut draft.origins);
         let fail = |mut findings: Vec<Finding>, error: &AttractorError| {
             // One map that does not contract is named; a longer cycle is everybody's fault.
@@ -253,7 +268,7 @@ impl Model {
         };
         match attractor.with_topology(topology, &draft.gluings, &draft.collapsed, draft.seam_mm) {
             Ok(attractor) => Ok(Lowered {
-                attractor: attractor.with_trimmed(draft.trimmed),
+                attractor: attractor.with_trimmed(draft.trimmed).with_radii(draft.radii),
                 findings: draft.findings,
                 constraint_residual: draft.constraint_residual,
             }),

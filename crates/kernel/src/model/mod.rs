@@ -10,6 +10,7 @@ mod ifs;
 mod join;
 mod lower;
 mod mesh;
+mod radius;
 mod scheme;
 pub mod solve;
 mod subdivision;
@@ -20,7 +21,7 @@ pub use bcifs::{
 };
 pub use bezier::BezierCurve;
 pub use corner_cutting::CornerCutting;
-pub use group::{Group, Part};
+pub use group::{Group, Part, PartRadius};
 pub use half_edge::{HalfEdge, HalfEdgeMesh, MeshFault};
 pub use ifs::{AffineMap, Ifs, Primitive};
 pub use join::{Border, BorderPath, Join};
