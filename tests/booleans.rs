@@ -117,7 +117,7 @@ fn a_bore_through_a_plate_and_through_two_surfaces_of_one_input() {
     let two = Shape::Group(lacuna_kernel::model::Group {
         parts: [plate(), cuboid(DVec3::new(-5.0, -5.0, 1.0), DVec3::new(5.0, 5.0, 3.0))]
             .into_iter()
-            .map(|shape| lacuna_kernel::model::Part { name: None, transform: None, shape })
+            .map(|shape| lacuna_kernel::model::Part { name: None, transform: None, shape, radius: None })
             .collect(),
         joins: Vec::new(),
     });

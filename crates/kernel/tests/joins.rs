@@ -37,7 +37,7 @@ fn join(between: [Border; 2]) -> Join {
 }
 
 fn group(shapes: Vec<Shape>, joins: Vec<Join>) -> Shape {
-    let parts = shapes.into_iter().map(|shape| Part { name: None, transform: None, shape }).collect();
+    let parts = shapes.into_iter().map(|shape| Part { name: None, transform: None, shape, radius: None }).collect();
     Shape::Group(Group { parts, joins })
 }
 

@@ -389,7 +389,7 @@ fn a_hundred_thousand_trim_curves_are_drawn_in_time() {
 fn a_trimmed_part_moves_with_its_group_and_stands_beside_others() {
     let trim = Trim { outer: None, inner: vec![circle([0.5, 0.5], [0.2, 0.2])] };
     let moved = lacuna_kernel::model::AffineMap { linear: glam::DMat3::from_rotation_x(1.0), translation: DVec3::new(0.0, 0.0, 50.0) };
-    let part = |shape: Shape, transform| Part { name: None, transform, shape };
+    let part = |shape: Shape, transform| Part { name: None, transform, shape, radius: None };
     let group = Shape::Group(Group { parts: vec![part(sphere(3.0, None), None), part(plane(10.0, trim), Some(moved))], joins: Vec::new() });
     let mesh = drawn(group, 0.01);
     let complex = mesh.complex.as_ref().unwrap();

@@ -103,15 +103,16 @@ impl<'a> SiteRule<'a> {
 
     /// Whether some sites are points that stand for cells: there are many of them then, close to each other.
     pub(crate) fn is_dense(&self) -> bool {
-        let states = self.attractor.automaton().states();
-        self.used.iter().any(|&index| {
-            let sparse = match states[index].leaf {
-                LeafPrimitive::Simplex | LeafPrimitive::Chord(_) | LeafPrimitive::Drawn(_) => true,
-                LeafPrimitive::Polygon(_) => self.attractor.precision(StateId::new(index)).is_some(),
-                LeafPrimitive::Centre | LeafPrimitive::Star(_) => false,
-            };
-            self.choices[index] != Choice::Drawn || !sparse
-        })
+        self.used.iter().any(|&index| self.is_dense_state(index))
+    }
+
+    fn is_dense_state(&self, index: usize) -> bool {
+        let sparse = match self.attractor.automaton().states()[index].leaf {
+            LeafPrimitive::Simplex | LeafPrimitive::Chord(_) | LeafPrimitive::Drawn(_) => true,
+            LeafPrimitive::Polygon(_) => self.attractor.precision(StateId::new(index)).is_some(),
+            LeafPrimitive::Centre | LeafPrimitive::Star(_) => false,
+        };
+        self.choices[index] != Choice::Drawn || !sparse
     }
 
     /// How far sites may be from the attractor.
@@ -139,9 +140,26 @@ impl<'a> SiteRule<'a> {
             }
         };
         let least = self.radius - self.tolerance;
-        let square = (least + error.inner).powi(2) + error.inner_square;
         let allowed = least * least + SITE_SHARE * (self.radius * self.radius - least * least);
-        (square <= allowed && error.outer <= OUTER_SHARE * self.tolerance).then_some(SiteError { square, ..error })
+        let deficit = self.deficit(cell.root);
+        if deficit == 0.0 {
+            let square = (least + error.inner).powi(2) + error.inner_square;
+            return (square <= allowed && error.outer <= OUTER_SHARE * self.tolerance).then_some(SiteError { square, ..error });
+        }
+        // The same in space, for the root's own radius: x within `outer` of the sites and o farther from the cell has
+        // (d + o)^2 + deficit <= outer^2 + 2 d o + o^2, d^2 = outer^2 - deficit, which is (outer + o')^2 at most.
+        let in_space = |distance: f64| (distance * distance - deficit).max(0.0).sqrt();
+        let square = (in_space(least) + error.inner).powi(2) + error.inner_square + deficit;
+        let farthest = in_space(self.radius + self.tolerance);
+        let outer = (2.0 * farthest * error.outer + error.outer * error.outer) / (2.0 * self.radius);
+        (square <= allowed && outer <= OUTER_SHARE * self.tolerance).then_some(SiteError { square, outer, ..error })
+    }
+
+    /// The largest of the roots' own radii, as far as points stand for their cells.
+    pub(crate) fn largest_dense(&self) -> f64 {
+        let dense = |root: &usize| self.attractor.roots()[*root].state.index();
+        let own = |root: usize| (self.radius * self.radius - self.deficit(root as u32)).max(0.0).sqrt();
+        (0..self.attractor.roots().len()).filter(|root| self.is_dense_state(dense(root))).map(own).fold(0.0, f64::max)
     }
 
     /// Emits the sites of a leaf.

@@ -16,7 +16,7 @@ use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted};
+use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::{SiteError, SiteRule};
@@ -131,15 +131,36 @@ impl Frame {
     /// Whether the tetrahedron is so small that what is filled of it is within `outer`.
     ///
     /// Where the interpolant of squares d(v)^2 with weights w is at most s^2, the mean of d(v) is at most s, and that of |x - v| at most R, the radius of a ball around the
-    /// tetrahedron: d(x) <= s + R, the distance growing by no more than the way. s is r, or r + gap where the value of a vertex in a gap was lowered.
-    fn is_close(&self, setting: &Setting) -> bool {
+    /// tetrahedron: d(x) <= s + R, the distance growing by no more than the way. s is r, or r + gap where the value of a vertex in a gap was lowered. All that holds for
+    /// the distance whose square is less by the least deficit of the nearest sites, too, among sites with no smaller deficit, and r in space.
+    fn is_close(&self, setting: &Setting, tree: &Tree<'_>) -> bool {
+        if setting.close_in_space > setting.close && self.is_around_a_site(setting, tree) {
+            return true;
+        }
+        let deficit = self.values.iter().filter(|value| value.square.is_finite()).map(|value| tree.site(value.site).deficit);
+        let deficit = deficit.fold(f64::INFINITY, f64::min);
+        let close = if self.values.iter().all(|value| value.square.is_finite()) && deficit > 0.0 {
+            in_space(setting.outer, deficit) - in_space(setting.reach, deficit)
+        } else {
+            setting.close
+        };
         let edges = (0..4).flat_map(|p| (0..p).map(move |q| (p, q)));
         let longest = edges.map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q])).fold(0.0, f64::max).sqrt();
         let is_filled = |value: &Value| value.least < 0 && value.square > setting.reach * setting.reach;
         let gap = if self.values.iter().any(is_filled) { setting.gap } else { 0.0 };
         // At level 0 the lattice's own bound is sharper.
         let around = (JUNG * longest).min(ENCLOSING * setting.lattice.pitch);
-        around + gap + setting.slack < setting.close
+        around + gap + setting.slack < close
+    }
+
+    /// Whether the nearest site of some vertex is so near to it that the whole tetrahedron is close to that site in space: the distance grows by no more than the way.
+    fn is_around_a_site(&self, setting: &Setting, tree: &Tree<'_>) -> bool {
+        (0..4).filter(|&k| self.values[k].square.is_finite()).any(|k| {
+            let site = tree.site(self.values[k].site);
+            let beyond = site.in_space(self.values[k].square.sqrt()) - site.in_space(setting.reach);
+            let way = self.positions.iter().map(|x| distance_squared(x, &self.positions[k])).fold(0.0, f64::max).sqrt();
+            beyond + way + setting.slack < setting.close_in_space
+        })
     }
 
     /// The cubes of its level that have their centres among its vertices.
@@ -547,8 +568,11 @@ impl<'a> Workshop<'a> {
     /// gap and is held by the vertex; where it comes to rest before, it is in a neck between two parts of the
     /// outside, which stays open if it is wide enough for the lattice.
     fn in_gap(&mut self, setting: &Setting, x: &Point, hit: &Hit) -> bool {
-        let free = setting.reach + setting.gap;
-        if hit.distance_squared > free * free {
+        // In space, for the nearest site's own radius.
+        let deficit = self.tree.site(hit.site).deficit;
+        let reach = in_space(setting.reach, deficit);
+        let free = reach + setting.gap;
+        if hit.distance_squared - deficit > free * free {
             return false;
         }
         let (mut y, mut nearest) = (*x, hit.closest);
@@ -561,9 +585,11 @@ impl<'a> Workshop<'a> {
             let length = dot(&offset, &offset).sqrt();
             let share = if length > setting.gap { setting.gap / length } else { 1.0 };
             y = std::array::from_fn(|axis| x[axis] + share * offset[axis]);
-            let Some(hit) = self.tree.nearest(&y, &self.near, Some(hit.node), free * (1.0 - 1e-3), 0.0) else { return false };
+            let Some(hit) = self.tree.nearest(&y, &self.near, Some(hit.node), with_deficit(free * (1.0 - 1e-3), deficit), 0.0) else {
+                return false;
+            };
             nearest = hit.closest;
-            clearance = hit.distance_squared.sqrt() - setting.reach;
+            clearance = in_space(hit.distance_squared.sqrt(), deficit) - reach;
             held = share < 1.0;
         }
         held || clearance < setting.neck
@@ -574,7 +600,7 @@ impl<'a> Workshop<'a> {
         if frame.covered == 0 {
             return;
         }
-        if frame.is_close(setting) || self.is_served(setting, frame) {
+        if frame.is_close(setting, &self.tree) || self.is_served(setting, frame) {
             self.march(frame, surface);
         } else {
             surface.critical.extend(frame.cubes());

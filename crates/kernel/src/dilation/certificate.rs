@@ -248,7 +248,9 @@ impl Nearby {
         }
         let sorted = views.len().min(MOST_COVERING);
         views[..sorted].sort_unstable_by(nearer);
-        self.ranges[vertex as usize] = Range { first: first as u32, count: views.len() as u32, square };
+        let count = views.len() as u32;
+        // What begins nowhere ends nowhere, even after other views are gone.
+        self.ranges[vertex as usize] = Range { first: if count > 0 { first as u32 } else { 0 }, count, square };
     }
 
     #[inline]

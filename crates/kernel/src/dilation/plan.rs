@@ -63,6 +63,8 @@ pub(crate) struct Setting {
     pub(super) neck: f64,
     /// outer - r.
     pub(super) close: f64,
+    /// How far beyond the balls in space the solid may reach, whatever their radii: at least `close`.
+    pub(super) close_in_space: f64,
     /// Whether simplification only removes what cannot be a solid.
     pub(super) clean_only: bool,
     /// What was asked, of the smallest balls.
@@ -76,9 +78,10 @@ const COARSEST: f64 = 1.0;
 /// Radius of the closing ball in units of the pitch. Without closing, Koch curves and Sierpinski tetrahedra come out with
 /// false tunnels at most pitches, with 0.5 at few, with 0.55 and necks of 0.36 at none of sixteen tried. This is measured, not proven.
 const CLOSING: f64 = 0.55;
-/// The pitch among dense sites, in units of outer - r: below 1 / 0.559, so that tetrahedra without filled vertices are close, and so far below that all
-/// are at the finest level.
-const CLOSE: f64 = 1.75;
+/// The edge of the finest cubes among dense sites, in units of outer - r: below 1 / 0.612, so that their tetrahedra without filled vertices are close.
+const CLOSE: f64 = 1.6;
+/// Cubes may be so many levels larger where one site serves their tetrahedra.
+const COARSER: u32 = 1;
 /// How far the surface passes from filled vertices, in units of the ball's radius.
 const FILLED_CUT: f64 = 0.25;
 /// The ball around a tetrahedron has at most this radius, in units of its longest edge: sqrt(3 / 8) (Jung, 1901).
@@ -130,6 +133,7 @@ impl Setting {
             gap: 0.0,
             neck: 0.0,
             close: outer - radius,
+            close_in_space: outer - radius,
             clean_only: false,
             tolerance,
             cells,
@@ -144,6 +148,17 @@ impl Setting {
         let value = (scaled + 0.5_f64.copysign(scaled)) as i64;
         if value == 0 { 1 } else { value }
     }
+}
+
+/// How much longer the radius s of a ball in space is when the one in four dimensions, r of which is a section with radius s, is longer by e.
+fn in_space_between(radius: f64, e: f64, section: f64) -> f64 {
+    if section < radius { (section * section + e.max(0.0) * (2.0 * radius + e)).sqrt() - section } else { e }
+}
+
+/// The pitch among dense sites: as many times the edge of the finest cubes as levels allow, and no more than what one site would be marched with.
+fn coarsened(edge: f64, most: f64) -> f64 {
+    let doubled = (0..COARSER).fold(edge, |edge, _| if 2.0 * edge <= most { 2.0 * edge } else { edge });
+    doubled.min(most)
 }
 
 /// sqrt(theta - R^2), rounded down.
@@ -256,7 +271,8 @@ impl<'a> Plan<'a> {
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius).min(COARSEST * balls.least);
         let least = least(radius, pitch);
-        let pitch = if rule.is_dense() { pitch.min(CLOSE * (aimed - extra - rule.outer_reserve())) } else { pitch };
+        let close = in_space_between(radius, aimed - extra - rule.outer_reserve(), rule.largest_dense());
+        let pitch = if rule.is_dense() { coarsened(CLOSE * close, pitch) } else { pitch };
         if aimed <= 2.0 * extra || pitch < LEAST_ROUNDINGS * rounding {
             let share = (LEAST_ROUNDINGS * rounding).powi(2) * ENCLOSING.powi(2) / (1.5 * radius * rule.lattice_share());
             let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
@@ -279,11 +295,13 @@ impl<'a> Plan<'a> {
         let setting = Setting::new(self.radius, outer.max(self.radius), self.aimed, pitch, cells, &self.bounds);
         let least = setting.least.min(self.least);
         let thinnest = self.balls.least - self.balls.inner(self.radius - least);
-        let setting = Setting { least, thinnest, ..setting };
+        let taken = self.balls.outer(self.extra) + self.balls.outer(self.rule.outer_reserve());
+        let close_in_space = setting.close.max(self.aimed - taken);
+        let setting = Setting { least, thinnest, close_in_space, ..setting };
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
-        let edge = pitch.min(CLOSE * setting.close);
+        let edge = pitch.min(CLOSE * in_space_between(self.radius, setting.close, self.rule.largest_dense()));
         let gap = CLOSING * edge;
         Setting {
             dense: true,
@@ -457,7 +475,8 @@ impl<'a> Plan<'a> {
             solid,
             crossings,
             inner_mm: self.balls.inner(inner),
-            outer_mm: self.balls.outer(outer),
+            // What is close in space reaches as far as is aimed at.
+            outer_mm: self.balls.outer(outer).max(if setting.close_in_space > setting.close { self.aimed } else { 0.0 }),
             least_radius_mm: self.balls.least,
             pitch_mm: setting.lattice.pitch,
             leaf_cells,

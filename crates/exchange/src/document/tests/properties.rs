@@ -3,8 +3,8 @@
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, BoundarySpec, CellKind, Coefficients, Corner,
-    CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Part, PolygonMesh, Primitive, Relation,
-    RootCell, Scheme, Shape, Side, Subdivision, Terrain, TerrainBase, TransitionSpec,
+    CornerCutting, Crease, Entry, Glue, Group, Ifs, Incidence, Interior, Join, Matrix, Model, Part, PartRadius, PolygonMesh, Primitive,
+    Relation, RootCell, Scheme, Shape, Side, Subdivision, Terrain, TerrainBase, TransitionSpec,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -189,13 +189,26 @@ fn terrain() -> impl Strategy<Value = Shape> {
         .prop_map(|(base, roughness, levels, random_seed)| Shape::Terrain(Terrain { base, roughness, levels, random_seed }))
 }
 
+fn radius() -> impl Strategy<Value = PartRadius> {
+    prop_oneof![
+        positive().prop_map(PartRadius::Constant),
+        vec(positive(), 1..4).prop_map(PartRadius::AtPoints),
+        [positive(), positive(), positive()].prop_map(|[first, ratio, least]| PartRadius::ByLevel { first, ratio, least }),
+    ]
+}
+
 fn shape() -> impl Strategy<Value = Shape> {
     let corner_cutting = (vec(point(), 3..6), number(), number(), any::<bool>())
         .prop_map(|(control_points, a, b, closed)| Shape::CornerCutting(CornerCutting { control_points, a, b, closed }));
     let interior = proptest::sample::select(vec![Interior::Auto, Interior::Solid, Interior::Surface]);
     let mesh = (mesh_data(), interior).prop_map(|((vertices, faces), interior)| Shape::Mesh(PolygonMesh { vertices, faces, interior }));
     prop_oneof![ifs(), bcifs(), bezier(), corner_cutting, subdivision(), mesh, terrain()].prop_recursive(3, 8, 3, |shape| {
-        let part = (option::of(name()), option::of(map()), shape).prop_map(|(name, transform, shape)| Part { name, transform, shape });
+        let part = (option::of(name()), option::of(map()), shape, option::of(radius())).prop_map(|(name, transform, shape, radius)| Part {
+            name,
+            transform,
+            shape,
+            radius,
+        });
         let side = (0..2_usize, any::<bool>()).prop_map(|(direction, last)| BorderPath::Side { direction, last });
         let vertices = vec(0..99_u32, 1..4).prop_map(BorderPath::Vertices);
         let boundaries = vec((0..9_usize, 0..4_usize), 1..4).prop_map(BorderPath::Boundaries);
