@@ -1,15 +1,21 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
+use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
+use lacuna_kernel::error::Kind;
+use lacuna_kernel::levels::SolidLevel;
 use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
-use lacuna_kernel::solid::{Rounded, Solid, TriMesh};
+use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
-use lacuna_kernel::tolerance::{Radius, Tolerance};
+use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 
-use crate::Operation;
+use crate::level::LevelStatement;
 use crate::operand::Operand;
+use crate::run::{JobError, not_carried};
+use crate::split::SplitStatement;
+use crate::{Operation, Part};
 
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -112,6 +118,12 @@ pub struct Certificate {
     /// How far two shapes are from being the same: of a `measure` of two.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub hausdorff: Option<HausdorffStatement>,
+    /// Which level of a system the result is, when it is one: the bounds are then those of that level.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub level: Option<LevelStatement>,
+    /// The parts of the result, when it was split.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub split: Option<SplitStatement>,
     /// The sections of the solid, when it was cut.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub sections: Option<SectionsStatement>,
@@ -517,15 +529,81 @@ fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tol
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
     }
-    if topology.components > 1 {
-        certificate.warnings.push(format!("{} separate pieces: they will not hold together", topology.components));
+    certificate
+}
+
+/// As [`of_solid`], for what is made in one piece.
+fn of_one_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
+    let mut certificate = of_solid(solid, crossings, warnings, tolerance);
+    let components = solid.topology().components;
+    if components > 1 {
+        certificate.warnings.push(format!("{components} separate pieces: they will not hold together"));
     }
     certificate
 }
 
+/// What is proven of a level of a system; a tolerance of 0 is none, and what is reached is then what was asked.
+pub(crate) fn of_level(attractor: &Attractor, found: &SolidLevel, statement: LevelStatement, tolerance: f64) -> Result<Certificate, JobError> {
+    let reached = found.moved_mm;
+    let requested = Tolerance::new(if tolerance > 0.0 { tolerance } else { reached.max(*LENGTHS_MM.start()) })?;
+    if reached > requested.mm() {
+        return Err(not_carried(requested, found.bounds.extent(), reached));
+    }
+    let mut counted = of_one_solid(&found.solid, found.contacts, attractor.warnings().to_vec(), requested);
+    if found.doubled_vertices > 0 {
+        counted.warnings.push(format!(
+            "parts touch along edges or at corners without being joined: {} corners are doubled, and {} pairs of triangles touch; a dilation joins them",
+            found.doubled_vertices, found.contacts
+        ));
+    }
+    Ok(Certificate {
+        achieved_bound_mm: reached,
+        inner_bound_mm: Some(reached),
+        outer_bound_mm: Some(reached),
+        bbox_mm: corners(&found.bounds),
+        volume_mm3: Some([found.volume.low, found.volume.high]),
+        area_mm2: Some([found.area.low, found.area.high]),
+        level: Some(statement),
+        ..counted
+    })
+}
+
+/// What is proven of a solid in parts: its bounds, and the counts of all parts together.
+pub(crate) fn of_split(
+    parts: &[Part],
+    crossings: u64,
+    moved_mm: f64,
+    operand: &Operand,
+    statement: SplitStatement,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Certificate, JobError> {
+    let mut all = TriMesh::default();
+    for Part { solid, .. } in parts {
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(&solid.mesh().vertices);
+        all.triangles.extend(solid.mesh().triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
+    }
+    let all = Solid::new(all, budget).map_err(|error| match error {
+        SolidError::Stopped(stopped) => JobError::from(stopped),
+        other => JobError::new(Kind::Defect, "internal", format!("parts together are no solid: {other}")),
+    })?;
+    let counted = of_solid(&all, crossings, operand.warnings.clone(), tolerance);
+    let [inner, outer] = [operand.statement.inner_bound_mm, operand.statement.outer_bound_mm].map(|bound| bound + moved_mm);
+    Ok(Certificate {
+        achieved_bound_mm: inner.max(outer),
+        inner_bound_mm: Some(inner),
+        outer_bound_mm: Some(outer),
+        leaf_cells: operand.leaf_cells,
+        bbox_mm: corners(&operand.bounds),
+        split: Some(statement),
+        ..counted
+    })
+}
+
 /// What is proven of a dilated shape.
 pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, radius: Radius, tolerance: Tolerance) -> Certificate {
-    let mut counted = of_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
+    let mut counted = of_one_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
     let exact = dilated_volume(volume(dilation.solid.mesh()), radius.mm(), dilation.inner_mm, dilation.outer_mm);
     let exact_area = dilated_area(exact, radius.mm());
     if dilation.crossings > 0 {
@@ -571,7 +649,7 @@ fn box_of_all<'b>(boxes: impl Iterator<Item = &'b AxisBox>) -> [[Interval; 3]; 2
 
 /// What is proven of one input as a solid.
 pub(crate) fn of_operand(rounded: &Rounded, operand: &Operand, tolerance: Tolerance) -> Certificate {
-    let counted = of_solid(&rounded.solid, rounded.crossings, operand.warnings.clone(), tolerance);
+    let counted = of_one_solid(&rounded.solid, rounded.crossings, operand.warnings.clone(), tolerance);
     let [inner, outer] = [operand.statement.inner_bound_mm, operand.statement.outer_bound_mm].map(|bound| bound + rounded.moved_mm);
     Certificate {
         achieved_bound_mm: inner.max(outer),
@@ -592,7 +670,7 @@ pub(crate) fn of_operation(
     tolerance: Tolerance,
 ) -> Certificate {
     let warnings = operands.iter().flat_map(|operand| operand.warnings.clone()).collect();
-    let mut counted = of_solid(&rounded.solid, rounded.crossings, warnings, tolerance);
+    let mut counted = of_one_solid(&rounded.solid, rounded.crossings, warnings, tolerance);
     let taken_away = |index: usize| operation == Operation::Difference && index > 0;
     let (mut inner, mut outer) = (0.0_f64, 0.0_f64);
     for (index, Operand { statement, .. }) in operands.iter().enumerate() {
@@ -650,7 +728,7 @@ fn box_of(operation: Operation, operands: &[Operand]) -> [[Interval; 3]; 2] {
             let high = boxes().map(|bounds| bounds.high[axis].high).fold(f64::INFINITY, f64::min);
             [low.min(high), low.max(high)]
         })),
-        Operation::Difference => {
+        Operation::Difference | Operation::Trim | Operation::Split => {
             same(std::array::from_fn(|axis| boxes().next().map_or([0.0; 2], |bounds| [bounds.low[axis].low, bounds.high[axis].high])))
         }
     }

@@ -4,13 +4,15 @@ mod boolean;
 pub mod certificate;
 mod contact;
 pub mod job;
+pub mod level;
 mod operand;
 pub mod run;
 mod slice;
 pub mod solve;
+pub mod split;
 
 pub use certificate::Certificate;
-pub use job::{Input, Job, JobKind, Operation, Params, Planes};
-pub use run::{Geometry, JobError, Outcome, Plan, StreamError, Validation, plan, run, stream_points, validate};
+pub use job::{CutPlane, Input, Job, JobKind, Operation, Params, Planes, Split, SplitKey};
+pub use run::{Geometry, JobError, Outcome, Part, Plan, StreamError, Validation, plan, run, stream_points, validate};
 pub use slice::Stack;
 pub use solve::{SolutionSpace, SolveRefusal, Solved, solve};

@@ -13,19 +13,30 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, contact, slice};
+use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, level, slice, split};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// A printable solid.
     Solid(Solid),
+    /// Printable solids that lie apart.
+    Parts(Vec<Part>),
     /// An evaluation.
     Tessellation(Tessellation),
     /// A solid and planes that cut it.
     Sections(Box<Stack>),
     /// Numbers only.
     None,
+}
+
+/// A solid and its name in files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Its name.
+    pub name: String,
+    /// Itself.
+    pub solid: Solid,
 }
 
 /// What a job made.
@@ -172,7 +183,7 @@ pub(crate) fn lower_all(job: &Job, budget: &Budget) -> Result<Vec<Lowered>, JobE
 }
 
 /// The one model of a job, lowered.
-fn lower(job: &Job, budget: &Budget) -> Result<Lowered, JobError> {
+pub(crate) fn lower(job: &Job, budget: &Budget) -> Result<Lowered, JobError> {
     let one = || wrong_inputs(job, "this kind takes one");
     if job.inputs.len() == 1 { lower_all(job, budget)?.pop().ok_or_else(one) } else { Err(one()) }
 }
@@ -201,6 +212,9 @@ fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 /// # Errors
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
+    if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
+        return level::solidify(job, level, budget);
+    }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
         JobKind::Evaluate => evaluate(&lower(job, budget)?.attractor, tolerance, job.params.normals, budget),
@@ -208,11 +222,18 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         JobKind::Measure if job.inputs.len() > 1 => contact::compare(job, tolerance, budget),
         JobKind::Measure => measure(job, tolerance, budget),
         JobKind::Intersect => match job.params.operation {
+            Some(Operation::Split) => split::split(job, &split_of(job)?, tolerance, budget),
             Some(operation) => boolean::combine(job, operation, tolerance, budget),
             None => contact::contact(job, tolerance, budget),
         },
         JobKind::Slice => slice::slice(job, tolerance, budget),
     }
+}
+
+/// How a job splits its input.
+fn split_of(job: &Job) -> Result<Split, JobError> {
+    let missing = || JobError::new(Kind::Invalid, "bad-parameter", "split needs volume_mm, the size that parts must fit, or cuts_mm".into());
+    job.params.split.clone().ok_or_else(missing)
 }
 
 fn solidify(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
@@ -351,8 +372,12 @@ const BYTES_PER_CELL: f64 = 64.0;
 /// # Errors
 /// As [`run`], for what shows before the work.
 pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
+    if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
+        return level::plan(job, level, budget);
+    }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
+        JobKind::Intersect if job.params.operation == Some(Operation::Split) => return split::plan(job, tolerance, budget),
         JobKind::Intersect if job.params.operation.is_some() => return boolean::plan(job, tolerance, budget),
         JobKind::Slice => return slice::plan(job, tolerance, budget),
         // Nothing is made, and what a search costs shows in the search.
