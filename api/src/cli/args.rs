@@ -151,12 +151,16 @@ pub(super) struct OutputArgs {
 pub(super) struct SolidifyArgs {
     /// The model document.
     pub(super) model: PathBuf,
-    /// Hausdorff bound on the result, in mm.
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    pub(super) tolerance: f64,
+    /// Hausdorff bound on the result, in mm; a level needs none, for it is exact but for the single precision of the files.
+    #[arg(long, value_name = "MM", value_parser = positive, required_unless_present = "level")]
+    pub(super) tolerance: Option<f64>,
     /// Radius of the ball, in mm.
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    pub(super) radius: f64,
+    #[arg(long, value_name = "MM", value_parser = positive, required_unless_present = "level")]
+    pub(super) radius: Option<f64>,
+    /// Of an ifs, instead of a dilation: the union of all copies of its primitive along addresses of this length, as an exact solid. The primitive is the
+    /// model's solid, or else the box of its attractor.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(0..=64), conflicts_with_all = ["radius", "no_simplify", "stability"])]
+    pub(super) level: Option<u32>,
     /// Leave all triangles of the lattice: quicker, and many times more triangles.
     #[arg(long)]
     pub(super) no_simplify: bool,
@@ -216,6 +220,10 @@ pub(super) enum OperationName {
     Difference,
     /// The convex hull of all inputs.
     Hull,
+    /// What of one input lies behind a plane.
+    Trim,
+    /// One input in parts between planes across the axes.
+    Split,
 }
 
 #[derive(Debug, Args)]
@@ -230,6 +238,21 @@ pub(super) struct IntersectArgs {
     /// ball:X,Y,Z,RADIUS, in mm.
     #[arg(long, value_name = "WHAT:NUMBERS", value_parser = primitive, conflicts_with = "operation")]
     pub(super) with: Option<Primitive>,
+    /// With `--operation trim`: the plane, by its normal and its offset along that in mm. What the normal points to is taken away.
+    #[arg(long, value_name = "NX,NY,NZ,OFFSET", value_parser = cut_plane, allow_hyphen_values = true)]
+    pub(super) plane: Option<[f64; 4]>,
+    /// With `--operation split`: the build volume that every part fits, in mm.
+    #[arg(long, value_name = "XxYxZ", value_parser = volume)]
+    pub(super) volume: Option<[f64; 3]>,
+    /// With `--operation split`: where to cut across an axis, in mm; may be given several times.
+    #[arg(long = "cut", value_name = "AXIS=MM", value_parser = axis_cut)]
+    pub(super) cuts: Vec<(usize, f64)>,
+    /// With `--operation split`: width and length of pegs that stand in sockets of neighbouring parts, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive, requires = "clearance")]
+    pub(super) key: Option<f64>,
+    /// Distance between the faces of a peg and of its socket, in mm.
+    #[arg(long, value_name = "MM", value_parser = distance, requires = "key")]
+    pub(super) clearance: Option<f64>,
     /// Hausdorff bound on every solid, in mm; without an operation, how near shapes must come.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) tolerance: f64,
@@ -426,9 +449,33 @@ fn distance(text: &str) -> Result<f64, String> {
     }
 }
 
+/// So many finite numbers with a character between.
+fn numbers<const N: usize>(text: &str, between: char) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> = text.split(between).map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok())
+}
+
 fn point(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
-    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+    numbers(text, ',').ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+}
+
+fn cut_plane(text: &str) -> Result<[f64; 4], String> {
+    let plane: Option<[f64; 4]> = numbers(text, ',').filter(|[x, y, z, _]| [x, y, z].iter().any(|part| **part != 0.0));
+    plane.ok_or_else(|| "a normal with a length and an offset are expected, for example 0,0,1,5".to_owned())
+}
+
+fn volume(text: &str) -> Result<[f64; 3], String> {
+    let volume: Option<[f64; 3]> = numbers(text, 'x').filter(|sides: &[f64; 3]| sides.iter().all(|side| *side > 0.0));
+    volume.ok_or_else(|| "three positive lengths are expected, for example 200x200x180".to_owned())
+}
+
+fn axis_cut(text: &str) -> Result<(usize, f64), String> {
+    let cut = text.split_once('=').and_then(|(name, offset)| {
+        let axis = ["x", "y", "z"].iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()))?;
+        let [offset] = numbers(offset, ',')?;
+        Some((axis, offset))
+    });
+    cut.ok_or_else(|| "an axis and an offset are expected, for example x=50".to_owned())
 }
 
 fn bytes(text: &str) -> Result<u64, String> {

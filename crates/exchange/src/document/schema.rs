@@ -155,7 +155,15 @@ fn job() -> Value {
     let kind =
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
-        kind("solidify", json!({ "properties": { "params": { "required": ["radius_mm"], "not": { "required": ["normals"] } } } })),
+        { "if": { "properties": { "params": { "required": ["level"] } } }, "else": { "properties": { "params": { "required": ["tolerance_mm"] } } } },
+        kind(
+            "solidify",
+            json!({ "properties": { "params": {
+                "oneOf": [{ "required": ["radius_mm"] }, { "required": ["level"] }],
+                "not": { "required": ["normals"] },
+                "dependentSchemas": { "level": { "not": { "anyOf": [{ "required": ["simplify"] }, { "required": ["stability"] }] } } },
+            } } })
+        ),
         kind(
             "evaluate",
             json!({ "properties": { "params": { "not": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["simplify"] }, { "required": ["stability"] }] } } } })
