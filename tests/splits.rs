@@ -11,7 +11,8 @@ use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::{binary, inside};
 
 fn cuboid(low: [f64; 3], high: [f64; 3]) -> Shape {
-    let vertices = (0..8).map(|code| DVec3::from_array(std::array::from_fn(|axis| if code >> axis & 1 == 1 { high[axis] } else { low[axis] })));
+    let vertices =
+        (0..8).map(|code| DVec3::from_array(std::array::from_fn(|axis| if code >> axis & 1 == 1 { high[axis] } else { low[axis] })));
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     Shape::Mesh(PolygonMesh { vertices: vertices.collect(), faces: faces.map(|face| face.to_vec()).to_vec(), interior: Interior::Auto })
 }
@@ -94,7 +95,10 @@ fn a_block_in_parts_with_keys() {
     // Two parts along x and y: four faces, two keys each. 100 + 6 in two of 53, so the cut is at 47 from the start; 60 + 6 in two of 33.
     assert_eq!((stated.parts.len(), stated.keys), (4, 8));
     assert_eq!(stated.cuts_mm, [vec![44.0], vec![29.0], vec![]]);
-    assert_eq!(stated.parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>(), ["part-1-1-1", "part-1-2-1", "part-2-1-1", "part-2-2-1"]);
+    assert_eq!(
+        stated.parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>(),
+        ["part-1-1-1", "part-1-2-1", "part-2-1-1", "part-2-2-1"]
+    );
     assert_eq!(outcome.certificate.components, Some(4));
     // Where they belong, no point is in two parts, and what is in none lies in a clearance around the cuts.
     let back: Vec<(Vec<DVec3>, &[[u32; 3]])> = parts(&outcome)
@@ -130,7 +134,11 @@ fn chosen_cuts_and_faces_without_room() {
     let outcome = split(plate, Split { cuts_mm: [vec![70.0, 30.0, 30.0], vec![], vec![]], key, ..Split::default() }).unwrap();
     check(&outcome, 15_000.0);
     assert_eq!(outcome.certificate.split.as_ref().unwrap().cuts_mm[0], [30.0, 70.0]);
-    assert!(outcome.certificate.warnings.iter().any(|warning| warning.contains("too small for a key")), "{:?}", outcome.certificate.warnings);
+    assert!(
+        outcome.certificate.warnings.iter().any(|warning| warning.contains("too small for a key")),
+        "{:?}",
+        outcome.certificate.warnings
+    );
     // A plate across the cut: wide faces, but the material behind them is thin.
     let shallow = cuboid([0.0; 3], [50.0, 50.0, 8.0]);
     let outcome = split(shallow, Split { cuts_mm: [vec![], vec![], vec![4.0]], key, ..Split::default() }).unwrap();
@@ -140,7 +148,10 @@ fn chosen_cuts_and_faces_without_room() {
     let wrong = |split_: Split| split(body(), split_).unwrap_err().code;
     assert_eq!(wrong(Split { cuts_mm: [vec![100.0], vec![], vec![]], ..Split::default() }), "split.cut-outside");
     assert_eq!(wrong(Split { volume_mm: Some([5.0, 90.0, 90.0]), key, ..Split::default() }), "split.volume-too-small");
-    assert_eq!(wrong(Split { volume_mm: Some([40.0, 90.0, 90.0]), cuts_mm: [vec![50.0], vec![], vec![]], ..Split::default() }), "split.too-large");
+    assert_eq!(
+        wrong(Split { volume_mm: Some([40.0, 90.0, 90.0]), cuts_mm: [vec![50.0], vec![], vec![]], ..Split::default() }),
+        "split.too-large"
+    );
     assert_eq!(wrong(Split { volume_mm: Some([1e-3, 1e-3, 90.0]), ..Split::default() }), "limit.parts");
     // It fits: one part.
     let outcome = split(body(), Split { volume_mm: Some([100.0, 90.0, 90.0]), ..Split::default() }).unwrap();
@@ -159,7 +170,11 @@ fn random_solids_add_up() {
         let params = Params {
             operation: Some(Operation::Split),
             radius_mm: Some(4.0),
-            split: Some(Split { volume_mm: Some([20.0, 20.0, 20.0]), key: Some(SplitKey { width_mm: 1.5, clearance_mm: 0.1 }), ..Split::default() }),
+            split: Some(Split {
+                volume_mm: Some([20.0, 20.0, 20.0]),
+                key: Some(SplitKey { width_mm: 1.5, clearance_mm: 0.1 }),
+                ..Split::default()
+            }),
             ..Params::new(0.2)
         };
         let outcome = done(shape, params, &Budget::default()).unwrap();
@@ -186,11 +201,13 @@ fn a_stopped_split_ends() {
 fn parts_are_objects_of_a_file() {
     let folder = Scratch::new();
     let (model, file, other) = (folder.join("block.json"), folder.join("parts.3mf"), folder.join("parts.stl"));
-    let corners: Vec<[f64; 3]> = (0..8).map(|code| [f64::from(code & 1) * 40.0, f64::from(code >> 1 & 1) * 30.0, f64::from(code >> 2) * 30.0]).collect();
+    let corners: Vec<[f64; 3]> =
+        (0..8).map(|code| [f64::from(code & 1) * 40.0, f64::from(code >> 1 & 1) * 30.0, f64::from(code >> 2) * 30.0]).collect();
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let shape = serde_json::json!({ "family": "mesh", "vertices": corners, "faces": faces });
     std::fs::write(&model, serde_json::json!({ "lacuna": 1, "shape": shape }).to_string()).unwrap();
-    let words = ["intersect", "--operation", "split", "--volume", "30x30x30", "--key", "4", "--clearance", "0.15", "--tolerance", "0.01", "-o"];
+    let words =
+        ["intersect", "--operation", "split", "--volume", "30x30x30", "--key", "4", "--clearance", "0.15", "--tolerance", "0.01", "-o"];
     let paths = [file.as_os_str(), "-o".as_ref(), other.as_os_str(), model.as_os_str()];
     binary::succeed(words.into_iter().map(std::ffi::OsStr::new).chain(paths));
     let told: serde_json::Value = serde_json::from_slice(&binary::succeed(["inspect".as_ref(), file.as_os_str()])).unwrap();

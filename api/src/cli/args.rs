@@ -194,7 +194,7 @@ pub(super) struct MeasureArgs {
     /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
     pub(super) model: PathBuf,
     /// Another one: tell the Hausdorff distance of both instead.
-    #[arg(conflicts_with_all = ["radius", "density"])]
+    #[arg(conflicts_with_all = ["radius", "density", "oriented_box", "thickness"])]
     pub(super) other: Option<PathBuf>,
     /// Hausdorff bound on what is measured, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
@@ -202,6 +202,12 @@ pub(super) struct MeasureArgs {
     /// Radius of the ball, in mm: measure the solid instead of the shape itself.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: Option<f64>,
+    /// Find the smallest box, whatever way it is turned.
+    #[arg(long)]
+    pub(super) oriented_box: bool,
+    /// Find the least thickness of walls and gaps.
+    #[arg(long)]
+    pub(super) thickness: bool,
     /// Density of the material, in g/cm3: the mass is told too.
     #[arg(long, value_name = "G/CM3", value_parser = positive)]
     pub(super) density: Option<f64>,
@@ -451,7 +457,8 @@ fn distance(text: &str) -> Result<f64, String> {
 
 /// So many finite numbers with a character between.
 fn numbers<const N: usize>(text: &str, between: char) -> Option<[f64; N]> {
-    let numbers: Option<Vec<f64>> = text.split(between).map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    let numbers: Option<Vec<f64>> =
+        text.split(between).map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
     numbers.and_then(|numbers| numbers.try_into().ok())
 }
 

@@ -27,8 +27,7 @@ pub(super) struct Manner {
 
 /// `lacuna solidify`.
 pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Problem> {
-    let params =
-        Params {
+    let params = Params {
         level: args.level,
         radius_mm: args.radius,
         simplify: !args.no_simplify,
@@ -46,7 +45,13 @@ pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Proble
 
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { radius_mm: args.radius, density_g_cm3: args.density, ..Params::new(args.tolerance) };
+    let params = Params {
+        radius_mm: args.radius,
+        oriented_box: args.oriented_box,
+        thickness: args.thickness,
+        density_g_cm3: args.density,
+        ..Params::new(args.tolerance)
+    };
     let inputs = std::iter::once(&args.model).chain(&args.other).map(|path| input_of(path)).collect::<Result<_, _>>()?;
     tell(JobKind::Measure, inputs, params, &args.limits, manner)
 }

@@ -30,7 +30,8 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
     }
     drop(sources);
     budget.report("combine", 0.0, 0);
-    let combined = if operation == Operation::Trim { trim(job, &mut operands, budget)? } else { evaluate(operation, &mut operands, budget)? };
+    let combined =
+        if operation == Operation::Trim { trim(job, &mut operands, budget)? } else { evaluate(operation, &mut operands, budget)? };
     if combined.triangles.is_empty() {
         let message = match operation {
             Operation::Union | Operation::Hull => "the inputs have no volume",

@@ -14,6 +14,7 @@ use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 use crate::level::LevelStatement;
 use crate::operand::Operand;
 use crate::run::{JobError, not_carried};
+use crate::shape_measures::{OrientedBoxStatement, ThicknessStatement};
 use crate::split::SplitStatement;
 use crate::{Operation, Part};
 
@@ -157,6 +158,12 @@ pub struct Certificate {
     /// Fractal dimension of the exact shape: of a `measure` alone.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub dimension: Option<DimensionStatement>,
+    /// The smallest box around the exact shape: of a `measure` that asks.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub oriented_box: Option<OrientedBoxStatement>,
+    /// Least walls and gaps: of a `measure` that asks.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub thickness: Option<ThicknessStatement>,
     /// Volume that the written mesh encloses.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub mesh_volume_mm3: Option<f64>,
@@ -543,7 +550,12 @@ fn of_one_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance:
 }
 
 /// What is proven of a level of a system; a tolerance of 0 is none, and what is reached is then what was asked.
-pub(crate) fn of_level(attractor: &Attractor, found: &SolidLevel, statement: LevelStatement, tolerance: f64) -> Result<Certificate, JobError> {
+pub(crate) fn of_level(
+    attractor: &Attractor,
+    found: &SolidLevel,
+    statement: LevelStatement,
+    tolerance: f64,
+) -> Result<Certificate, JobError> {
     let reached = found.moved_mm;
     let requested = Tolerance::new(if tolerance > 0.0 { tolerance } else { reached.max(*LENGTHS_MM.start()) })?;
     if reached > requested.mm() {
@@ -779,6 +791,9 @@ pub(crate) fn of_shape(attractor: &Attractor, bounds: &AxisBox, tolerance: Toler
 }
 
 #[cfg(feature = "wire")]
+pub(crate) use wire::interval_schema;
+
+#[cfg(feature = "wire")]
 mod wire {
     use super::{Checked, SelfIntersections};
     use serde::de::Error as _;
@@ -800,7 +815,7 @@ mod wire {
         array_of(ObjectBuilder::new().schema_type(Type::Number), 2)
     }
 
-    pub(super) fn interval_schema() -> RefOr<Schema> {
+    pub(crate) fn interval_schema() -> RefOr<Schema> {
         interval().into()
     }
 

@@ -100,6 +100,10 @@ pub struct Params {
     pub split: Option<Split>,
     /// The planes of a `slice`.
     pub planes: Option<Planes>,
+    /// Whether a `measure` finds the smallest box, whatever way it is turned.
+    pub oriented_box: bool,
+    /// Whether a `measure` finds the least walls and gaps.
+    pub thickness: bool,
     /// Density in g/cm^3, for the mass in a `measure`.
     pub density_g_cm3: Option<f64>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
@@ -123,6 +127,8 @@ impl Params {
             plane: None,
             split: None,
             planes: None,
+            oriented_box: false,
+            thickness: false,
             density_g_cm3: None,
             normals: false,
             simplify: true,

@@ -7,6 +7,7 @@ pub mod job;
 pub mod level;
 mod operand;
 pub mod run;
+pub mod shape_measures;
 mod slice;
 pub mod solve;
 pub mod split;

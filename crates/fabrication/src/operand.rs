@@ -66,7 +66,7 @@ pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a
 }
 
 /// Whether closed surfaces are all that there is.
-fn is_solid(attractor: &Attractor) -> bool {
+pub(crate) fn is_solid(attractor: &Attractor) -> bool {
     attractor.roots().iter().all(|root| root.solid.is_some()) && !attractor.solids().is_empty()
 }
 
@@ -108,7 +108,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
 }
 
 /// The closed surfaces of a shape, their vertices joined as the model has them.
-fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
+pub(crate) fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
     let mut meshes = Vec::with_capacity(attractor.solids().len());
     for surface in attractor.solids() {
         let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());

@@ -12,6 +12,8 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
+use crate::operand::{is_solid, surfaces};
+use crate::shape_measures::{least_thickness, no_solid, smallest_box};
 use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, level, slice, split};
 
@@ -232,7 +234,8 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
 
 /// How a job splits its input.
 fn split_of(job: &Job) -> Result<Split, JobError> {
-    let missing = || JobError::new(Kind::Invalid, "bad-parameter", "split needs volume_mm, the size that parts must fit, or cuts_mm".into());
+    let missing =
+        || JobError::new(Kind::Invalid, "bad-parameter", "split needs volume_mm, the size that parts must fit, or cuts_mm".into());
     job.params.split.clone().ok_or_else(missing)
 }
 
@@ -263,6 +266,14 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
         }
+        if job.params.oriented_box {
+            certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
+        }
+        if job.params.thickness {
+            let surfaces = if is_solid(attractor) { surfaces(attractor) } else { Vec::new() };
+            let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
+            certificate.thickness = Some(least_thickness(mesh, budget)?);
+        }
         return Ok(Outcome { geometry: Geometry::None, certificate });
     };
     let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
@@ -271,6 +282,12 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
     let difference = dilated_difference(volume(mesh), radius.mm(), dilation.inner_mm, dilation.outer_mm);
     certificate.state_mass(mesh, difference, &dilation.bounds.grown(radius.mm() + dilation.outer_mm), job.params.density_g_cm3);
     certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
+    if job.params.oriented_box {
+        certificate.oriented_box = smallest_box(attractor, radius.mm(), tolerance, budget)?;
+    }
+    if job.params.thickness {
+        certificate.thickness = Some(least_thickness(mesh, budget)?);
+    }
     Ok(Outcome { geometry: Geometry::None, certificate })
 }
 

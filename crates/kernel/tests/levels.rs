@@ -50,7 +50,8 @@ fn counted_genus(level: u32) -> i64 {
         let digits = || (0..27).map(|k| [k % 3, k / 3 % 3, k / 9]).filter(|cell| cell.iter().filter(|x| **x == 1).count() < 2);
         cubes = cubes.iter().flat_map(|cube| digits().map(|digit| std::array::from_fn(|axis| 3 * cube[axis] + digit[axis]))).collect();
     }
-    let around = cubes.iter().flat_map(|cube| (0..27).map(|k| [k % 3, k / 3 % 3, k / 9]).map(|d| [0, 1, 2].map(|axis| 2 * cube[axis] + d[axis])));
+    let around =
+        cubes.iter().flat_map(|cube| (0..27).map(|k| [k % 3, k / 3 % 3, k / 9]).map(|d| [0, 1, 2].map(|axis| 2 * cube[axis] + d[axis])));
     let complex: std::collections::HashSet<[i64; 3]> = around.collect();
     1 - complex.iter().map(|cell| if cell.iter().filter(|x| **x % 2 != 0).count() % 2 == 0 { 1 } else { -1 }).sum::<i64>()
 }
@@ -141,7 +142,11 @@ fn eight_cubes_are_a_cube() {
     // All faces within cancel; turned and mirrored copies as well.
     let mut maps = cells(2.0, 2, |_| true);
     for (index, map) in maps.iter_mut().enumerate() {
-        let turn = if index % 2 == 0 { DMat3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z) } else { DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)) };
+        let turn = if index % 2 == 0 {
+            DMat3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z)
+        } else {
+            DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0))
+        };
         let linear = 0.5 * turn;
         // The copy's lower corner stays where it was.
         let low = (0..3).fold(DVec3::ZERO, |low, column| low + (2.0 * linear.col(column)).min(DVec3::ZERO));

@@ -209,11 +209,16 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
         walker.fault(&place, code::CONFLICTING_MEMBERS, || "a comparison delivers numbers and no files; remove \"outputs\"".into());
         return None;
     }
-    let Params { radius_mm, density_g_cm3, .. } = document.params;
-    if radius_mm.is_some() || density_g_cm3.is_some() || document.inputs.iter().any(|input| input.radius_mm.is_some()) {
+    let Params { radius_mm, density_g_cm3, oriented_box, thickness, .. } = document.params;
+    if oriented_box
+        || thickness
+        || radius_mm.is_some()
+        || density_g_cm3.is_some()
+        || document.inputs.iter().any(|input| input.radius_mm.is_some())
+    {
         let place = members.get("params").unwrap_or(members.place);
         walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-            "shapes are compared as they are: remove \"radius_mm\" and \"density_g_cm3\", or ask for an \"operation\"".into()
+            "shapes are compared as they are: remove \"radius_mm\", \"density_g_cm3\", \"oriented_box\" and \"thickness\", or ask for an \"operation\"".into()
         });
         return None;
     }
@@ -361,11 +366,29 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let density = owned(walker, &members, kind, "density_g_cm3", (JobKind::Measure, "measure"))?;
     let density_g_cm3 = stated(density.map(|place| walker.positive(place, "a density in g/cm3")))?;
     let planes = planes(walker, &members, kind)?;
+    let measured = (JobKind::Measure, "measure");
+    let oriented_box = flag_of(walker, &members, kind, "oriented_box", measured, false)?;
+    let thickness = flag_of(walker, &members, kind, "thickness", measured, false)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
     let tolerance_mm = tolerance?;
-    Some(Params { tolerance_mm, level, radius_mm, operation, with, plane, split, planes, density_g_cm3, normals, simplify, stability })
+    Some(Params {
+        tolerance_mm,
+        level,
+        radius_mm,
+        operation,
+        with,
+        plane,
+        split,
+        planes,
+        oriented_box,
+        thickness,
+        density_g_cm3,
+        normals,
+        simplify,
+        stability,
+    })
 }
 
 /// The level, which stands instead of what a dilation takes.
@@ -457,7 +480,8 @@ fn split(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Split> {
     });
     let cuts = members.get("cuts_mm").map_or(Some(Default::default()), |place| {
         const EXPECTED: &str = "three arrays of offsets in mm: across x, y and z";
-        let arrays = walker.each(place, EXPECTED, |walker, place| walker.each(place, "an array of offsets in mm", |walker, place| walker.number(place)))?;
+        let arrays = walker
+            .each(place, EXPECTED, |walker, place| walker.each(place, "an array of offsets in mm", |walker, place| walker.number(place)))?;
         let found = arrays.len();
         <[Vec<f64>; 3]>::try_from(arrays).ok().or_else(|| walker.wrong_length(&place, found, EXPECTED))
     });

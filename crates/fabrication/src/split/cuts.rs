@@ -34,14 +34,18 @@ impl Cuts {
             offsets[axis].sort_by(f64::total_cmp);
             offsets[axis].dedup();
             if let Some(outside) = offsets[axis].iter().find(|offset| !(low < **offset && **offset < high)) {
-                let message =
-                    format!("a cut across {} at {outside} mm misses the solid, which reaches from {low} to {high} mm", ["x", "y", "z"][axis]);
+                let message = format!(
+                    "a cut across {} at {outside} mm misses the solid, which reaches from {low} to {high} mm",
+                    ["x", "y", "z"][axis]
+                );
                 return Err(JobError::new(Kind::Invalid, "split.cut-outside", message));
             }
         }
         let parts: f64 = offsets.iter().map(|cuts| cuts.len() as f64 + 1.0).product();
         if parts > MOST_PARTS {
-            let message = format!("the job makes up to {parts:.0} parts, and at most {MOST_PARTS:.0} are possible; give a larger volume, or fewer cuts");
+            let message = format!(
+                "the job makes up to {parts:.0} parts, and at most {MOST_PARTS:.0} are possible; give a larger volume, or fewer cuts"
+            );
             let limit = LimitFacts { limit: "parts", asked: parts, allowed: MOST_PARTS, remedy: None };
             return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Limit, "limit.parts", message) });
         }
@@ -64,7 +68,8 @@ fn automatic(low: f64, high: f64, fits: f64, peg: f64, axis: usize) -> Result<Ve
     let count = ((length - peg) / (fits - peg)).ceil();
     if count > MOST_PARTS {
         let limit = LimitFacts { limit: "parts", asked: count, allowed: MOST_PARTS, remedy: None };
-        let message = format!("the volume asks for {count:.0} parts along one axis, and at most {MOST_PARTS:.0} are possible; give a larger one");
+        let message =
+            format!("the volume asks for {count:.0} parts along one axis, and at most {MOST_PARTS:.0} are possible; give a larger one");
         return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Limit, "limit.parts", message) });
     }
     let each = (length + (count - 1.0) * peg) / count - peg;

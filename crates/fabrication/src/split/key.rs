@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use lacuna_kernel::measure::mass::volume;
-use lacuna_kernel::measure::section::{Polygon, PlaneFrame};
+use lacuna_kernel::measure::section::{PlaneFrame, Polygon};
 use lacuna_kernel::solid::TriMesh;
 
 /// A peg of a width w: w long, its sides inclined so that they come closer by w / 10, a clearance away from the faces of its socket everywhere.
@@ -123,7 +123,7 @@ impl Key {
         mesh
     }
 
-    /// Places in a face where the socket and its walls are within it, the best first: the widest, then those far from all before.
+    /// Places in a face where the socket and its walls are within it: two far apart if there are, else the widest, then those far from all before.
     pub(super) fn places(&self, face: &Polygon) -> Vec<DVec2> {
         let outwards = -self.gap() - self.wall;
         let needed = self.ring(outwards, 0.0).iter().map(|corner| corner.truncate().length()).fold(0.0, f64::max);
@@ -135,12 +135,21 @@ impl Key {
         // The middle of the face, which is the best place of many, and a grid.
         let grid = (0..PLACES * PLACES).map(|k| [k % PLACES, k / PLACES].map(|n| (n as f64 + 0.5) / PLACES as f64));
         let candidates = std::iter::once([0.5, 0.5]).chain(grid).map(|share| low + (high - low) * DVec2::from_array(share));
-        let mut wide: Vec<(DVec2, f64)> =
-            candidates.map(|at| (at, room(face, at))).filter(|(_, room)| *room >= needed).collect();
+        let mut wide: Vec<(DVec2, f64)> = candidates.map(|at| (at, room(face, at))).filter(|(_, room)| *room >= needed).collect();
         let mut places: Vec<DVec2> = Vec::new();
+        // Two keys far apart hold best: the place farthest from the widest, and the one farthest from that, if both have room.
+        let farthest = |from: DVec2| wide.iter().map(|(at, _)| *at).max_by(|a, b| a.distance(from).total_cmp(&b.distance(from)));
+        let widest = wide.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(at, _)| *at);
+        if let Some(one) = widest.and_then(farthest)
+            && let Some(other) = farthest(one).filter(|other| other.distance(one) >= 2.0 * needed)
+        {
+            places.extend([one, other]);
+            wide.retain(|(at, _)| places.iter().all(|place| at.distance(*place) >= 2.0 * needed));
+        }
         while !wide.is_empty() {
             let worth = |&(at, room): &(DVec2, f64)| places.iter().map(|other| at.distance(*other)).reduce(f64::min).unwrap_or(room);
-            let best = wide.iter().map(worth).enumerate().fold((0, f64::NEG_INFINITY), |best, (k, x)| if x > best.1 { (k, x) } else { best }).0;
+            let best =
+                wide.iter().map(worth).enumerate().fold((0, f64::NEG_INFINITY), |best, (k, x)| if x > best.1 { (k, x) } else { best }).0;
             let chosen = wide.swap_remove(best).0;
             places.push(chosen);
             // Keys do not share walls.

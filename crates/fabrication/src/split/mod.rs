@@ -229,10 +229,18 @@ const MOST_KEYS: usize = 2;
 const MOST_TRIED: usize = 8;
 
 /// Puts keys between two neighbours, the lower one's pegs in the upper one's sockets.
-fn join(cells: &mut [Cell], [lower, upper]: [usize; 2], frame: &PlaneFrame, offset: f64, key: &Key, budget: &Budget) -> Result<Placed, JobError> {
+fn join(
+    cells: &mut [Cell],
+    [lower, upper]: [usize; 2],
+    frame: &PlaneFrame,
+    offset: f64,
+    key: &Key,
+    budget: &Budget,
+) -> Result<Placed, JobError> {
     let mut placed = Placed::default();
     let mut face = Section::default();
-    let solid = Solid::new(cells[upper].mesh.clone(), budget).map_err(|error| JobError::new(Kind::Defect, "internal", error.to_string()))?;
+    let solid =
+        Solid::new(cells[upper].mesh.clone(), budget).map_err(|error| JobError::new(Kind::Defect, "internal", error.to_string()))?;
     sections::<SectionError>(&solid, frame, &[offset], budget, &mut |section| {
         face = section;
         Ok(())

@@ -45,7 +45,13 @@ pub(super) fn prove(lattice: &Lattice, surface: &Surface, sets: &[Vec<usize>]) -
     let boxed = Body::box_of(&surface.points);
     // Where neither does, the primitive's own refusal says more.
     let apart = boxed.holds_apart(lattice, sets);
-    if apart.is_ok() { Ok(boxed) } else if whole.is_convex() { Err(refusal) } else { apart.map(|()| boxed) }
+    if apart.is_ok() {
+        Ok(boxed)
+    } else if whole.is_convex() {
+        Err(refusal)
+    } else {
+        apart.map(|()| boxed)
+    }
 }
 
 impl Body {

@@ -70,7 +70,8 @@ impl Lattice {
                 Some([x?, y?, z?])
             })
             .collect();
-        let corners = corners.ok_or(LevelError::NoPrimitive { reason: "the corners of its solid are no fractions of three of its edges" })?;
+        let corners =
+            corners.ok_or(LevelError::NoPrimitive { reason: "the corners of its solid are no fractions of three of its edges" })?;
         let ratio = common(read.iter().flat_map(|(rows, _)| rows.as_flattened().iter().copied()));
         let denominator = common(read.iter().flat_map(|(_, shift)| *shift).chain(corners.iter().flatten().copied()));
         let (Some(ratio), Some(denominator)) = (ratio, denominator) else { return Err(LevelError::NoLattice { map: 0 }) };
@@ -122,7 +123,8 @@ impl Lattice {
     /// For a grid of cells along the axes: whether single precision tells its planes apart.
     pub(super) fn is_told_apart(&self, level: u32) -> bool {
         // Cells of a grid have the frame's edges divided by the ratio's power; corners lie between 0 and 1 in the frame.
-        let cells = (self.ratio as f64 / self.maps[0].linear.as_flattened().iter().map(|x| x.abs()).max().unwrap_or(1) as f64).powi(level as i32);
+        let cells =
+            (self.ratio as f64 / self.maps[0].linear.as_flattened().iter().map(|x| x.abs()).max().unwrap_or(1) as f64).powi(level as i32);
         (0..3).all(|column| {
             let edge = self.frame.col(column);
             let axis = (0..3).find(|&axis| edge[axis] != 0.0).unwrap_or(0);

@@ -79,7 +79,7 @@ pub enum LevelError {
     CrossedPrimitive,
     /// A map is not a matrix of small fractions in the primitive's frame.
     #[error(
-        "map {map} is not made of fractions with denominators up to {} in the frame of the primitive's edges, so that copies have no common lattice; give a radius instead of a level",
+        "map {map} is not made of fractions with denominators up to {} in the frame of the primitive's edges, so that copies have no common lattice; give the model a primitive of its own that its maps move by such fractions, or a radius instead of a level",
         lattice::MOST_DENOMINATOR
     )]
     NoLattice {
@@ -119,7 +119,9 @@ pub enum LevelError {
         pairs: u64,
     },
     /// Parts meet in an edge whose ends are joined otherwise.
-    #[error("at level {level} parts meet along edges so that no doubling of corners makes a manifold surface; give a radius instead of a level")]
+    #[error(
+        "at level {level} parts meet along edges so that no doubling of corners makes a manifold surface; give a radius instead of a level"
+    )]
     Pinched {
         /// The level.
         level: u32,
@@ -197,7 +199,8 @@ impl LevelError {
     /// The limit that was hit, with the level that would pass.
     #[must_use]
     pub fn limit(&self) -> Option<LimitFacts> {
-        let facts = |limit, asked, allowed, passes: u32| Some(LimitFacts { limit, asked, allowed, remedy: Some(("level", f64::from(passes))) });
+        let facts =
+            |limit, asked, allowed, passes: u32| Some(LimitFacts { limit, asked, allowed, remedy: Some(("level", f64::from(passes))) });
         match *self {
             Self::TooFine { level, passes, .. } => facts("level", f64::from(level), f64::from(passes), passes),
             Self::Triangles { asked, allowed, passes, .. } => facts("triangles", asked, allowed as f64, passes),

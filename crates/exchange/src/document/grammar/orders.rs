@@ -141,9 +141,11 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             "For split: the build volume along x, y and z, in mm, which every part fits; along axes without cuts of their own the job cuts as rarely as it can.",
             || tuple(positive(), 3),
         ),
-        optional("cuts_mm", "For split: where to cut across x, y and z, in mm: three arrays, empty where the volume tells or nothing is cut.", || {
-            tuple(list(number(), 0), 3)
-        }),
+        optional(
+            "cuts_mm",
+            "For split: where to cut across x, y and z, in mm: three arrays, empty where the volume tells or nothing is cut.",
+            || tuple(list(number(), 0), 3),
+        ),
         optional(
             "key_mm",
             "For split: the width and length of pegs that stand in sockets of the neighbouring parts, in mm; walls are half of that. No keys when absent.",
@@ -164,6 +166,16 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             "step_mm",
             "The height of layers, in mm, above zero: planes of slice are in their middles, from the bottom of the solid to its top.",
             positive,
+        ),
+        optional(
+            "oriented_box",
+            "Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent.",
+            flag,
+        ),
+        optional(
+            "thickness",
+            "Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent.",
+            flag,
         ),
         optional("density_g_cm3", "The density of the material, in g/cm3, above zero, for the mass: for measure alone.", positive),
         optional(
