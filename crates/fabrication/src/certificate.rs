@@ -233,7 +233,33 @@ pub struct PlaceStatement {
     pub nearest: CellPairStatement,
 }
 
-/// How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for a solid is its surface here.
+/// Which of two shapes holds the other, or a part of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum Holder {
+    /// The first.
+    First,
+    /// The second.
+    Second,
+}
+
+/// A solid that holds another shape, or a part of it, without touching it with its surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct InsideStatement {
+    /// Which of the two is the solid that holds.
+    pub holder: Holder,
+    /// A point inside of it that is on the other, or nearer to it than their surfaces are to each other.
+    pub point_mm: [f64; 3],
+    /// The distance of the surfaces.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub surface_distance_mm: Interval,
+}
+
+/// How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for a solid has its inside: what lies there is
+/// at the distance 0. Places and the nearest pair are those of surfaces.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
@@ -243,6 +269,9 @@ pub struct ContactStatement {
     /// The distance of the shapes.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub distance_mm: Interval,
+    /// Which solid holds the other shape or a part of it, where their surfaces are apart.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub inside: Option<InsideStatement>,
     /// The nearest pair of cells that was looked at.
     pub nearest: CellPairStatement,
     /// The places, a thousand at most.

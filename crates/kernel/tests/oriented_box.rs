@@ -1,5 +1,7 @@
 //! The smallest box: closed forms, and random points against boxes turned at random.
 
+#![allow(clippy::unwrap_used)]
+
 #[allow(dead_code)] // each test file uses a part
 mod oracle;
 

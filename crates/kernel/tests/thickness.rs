@@ -1,5 +1,7 @@
 //! Walls and gaps: closed forms, and random solids against rays.
 
+#![allow(clippy::unwrap_used)]
+
 #[allow(dead_code)] // each test file uses a part
 mod oracle;
 

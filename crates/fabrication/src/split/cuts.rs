@@ -23,10 +23,12 @@ impl Cuts {
         for axis in 0..3 {
             let (low, high) = (ends[0][axis], ends[1][axis]);
             let stated = &split.cuts_mm[axis];
-            offsets[axis] = if stated.is_empty() {
-                split.volume_mm.map_or(Ok(Vec::new()), |volume| automatic(low, high, volume[axis] - margin(ends), peg, axis))?
-            } else {
-                stated.clone()
+            // As it will be in the files.
+            let written = f64::from(high as f32) - f64::from(low as f32);
+            offsets[axis] = match split.volume_mm {
+                _ if !stated.is_empty() => stated.clone(),
+                Some(volume) if written > volume[axis] => automatic(low, high, volume[axis] - margin(ends), peg, axis)?,
+                _ => Vec::new(),
             };
             for offset in &mut offsets[axis] {
                 *offset = f64::from(*offset as f32);
@@ -53,19 +55,16 @@ impl Cuts {
     }
 }
 
-/// Cuts of a length L into k parts of u = (L + (k - 1) peg) / k each, of which the first k - 1 are u - peg and a peg: k is the least with u within `fits`.
+/// Cuts of a length L that is too long into k parts of u = (L + (k - 1) peg) / k each, of which the first k - 1 are u - peg and a peg: k is the least with u within `fits`.
 fn automatic(low: f64, high: f64, fits: f64, peg: f64, axis: usize) -> Result<Vec<f64>, JobError> {
     let length = high - low;
-    if length <= fits {
-        return Ok(Vec::new());
-    }
     if fits <= peg {
         let axis = ["x", "y", "z"][axis];
         let message = format!("parts may be {fits} mm along {axis}, and pegs alone are {peg} mm; give a larger volume, or smaller keys");
         return Err(JobError::new(Kind::Invalid, "split.volume-too-small", message));
     }
     // (L + (k - 1) peg) / k <= fits.
-    let count = ((length - peg) / (fits - peg)).ceil();
+    let count = ((length - peg) / (fits - peg)).ceil().max(2.0);
     if count > MOST_PARTS {
         let limit = LimitFacts { limit: "parts", asked: count, allowed: MOST_PARTS, remedy: None };
         let message =
@@ -83,7 +82,6 @@ mod tests {
 
     #[test]
     fn automatic_cuts_are_as_few_as_fit() {
-        assert!(automatic(0.0, 100.0, 100.0, 5.0, 0).unwrap().is_empty());
         assert_eq!(automatic(0.0, 100.0, 60.0, 0.0, 0).unwrap(), [50.0]);
         // 100 + 10 in two: 55 each, the first 45 and a peg of 10.
         assert_eq!(automatic(0.0, 100.0, 55.0, 10.0, 0).unwrap(), [45.0]);

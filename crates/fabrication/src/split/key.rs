@@ -1,6 +1,7 @@
 //! The key that puts two parts together: a tapered peg over a pentagon like a house, which no turn takes into itself, and its socket.
 
 use glam::{DVec2, DVec3};
+use lacuna_kernel::budget::{Budget, Stopped};
 use lacuna_kernel::measure::mass::volume;
 use lacuna_kernel::measure::section::{PlaneFrame, Polygon};
 use lacuna_kernel::solid::TriMesh;
@@ -124,18 +125,28 @@ impl Key {
     }
 
     /// Places in a face where the socket and its walls are within it: two far apart if there are, else the widest, then those far from all before.
-    pub(super) fn places(&self, face: &Polygon) -> Vec<DVec2> {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn places(&self, face: &Polygon, budget: &Budget) -> Result<Vec<DVec2>, Stopped> {
         let outwards = -self.gap() - self.wall;
         let needed = self.ring(outwards, 0.0).iter().map(|corner| corner.truncate().length()).fold(0.0, f64::max);
         let low = face.outer.iter().copied().reduce(DVec2::min).unwrap_or_default();
         let high = face.outer.iter().copied().reduce(DVec2::max).unwrap_or_default();
         if (high - low).min_element() < 2.0 * needed {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         // The middle of the face, which is the best place of many, and a grid.
         let grid = (0..PLACES * PLACES).map(|k| [k % PLACES, k / PLACES].map(|n| (n as f64 + 0.5) / PLACES as f64));
         let candidates = std::iter::once([0.5, 0.5]).chain(grid).map(|share| low + (high - low) * DVec2::from_array(share));
-        let mut wide: Vec<(DVec2, f64)> = candidates.map(|at| (at, room(face, at))).filter(|(_, room)| *room >= needed).collect();
+        let mut wide: Vec<(DVec2, f64)> = Vec::new();
+        for at in candidates {
+            budget.cancel.check()?;
+            let room = room(face, at);
+            if room >= needed {
+                wide.push((at, room));
+            }
+        }
         let mut places: Vec<DVec2> = Vec::new();
         // Two keys far apart hold best: the place farthest from the widest, and the one farthest from that, if both have room.
         let farthest = |from: DVec2| wide.iter().map(|(at, _)| *at).max_by(|a, b| a.distance(from).total_cmp(&b.distance(from)));
@@ -155,7 +166,7 @@ impl Key {
             // Keys do not share walls.
             wide.retain(|(at, _)| at.distance(chosen) >= 2.0 * needed);
         }
-        places
+        Ok(places)
     }
 }
 
@@ -180,7 +191,6 @@ fn room(face: &Polygon, at: DVec2) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use lacuna_kernel::budget::Budget;
     use lacuna_kernel::solid::{Crossings, Solid};
 
     #[test]

@@ -249,7 +249,7 @@ fn join(
         budget.cancel.check()?;
         placed.faces += 1;
         let mut here = 0;
-        for centre in key.places(polygon).into_iter().take(MOST_TRIED) {
+        for centre in key.places(polygon, budget)?.into_iter().take(MOST_TRIED) {
             let at = |mesh: TriMesh| Key::placed(mesh, frame, centre, offset);
             let within = |body: TriMesh, mesh: &TriMesh| -> Result<bool, JobError> {
                 let left = ManifoldRust.difference(&body, &[mesh], &budget.cancel).map_err(failed)?;

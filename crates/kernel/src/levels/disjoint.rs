@@ -3,6 +3,7 @@
 use super::LevelError;
 use super::growth::Surface;
 use super::lattice::{Lattice, Point};
+use crate::budget::{Budget, Stopped};
 use std::collections::BTreeSet;
 
 /// Faces of a box over its corners, whose bits tell which are upper: outward.
@@ -38,19 +39,22 @@ const MOST_COORDINATE: i64 = 1 << 30;
 const MOST_EDGE_PAIRS: usize = 4096;
 
 /// Finds a body and proves that its images are in it and pairwise apart: the primitive itself if it is convex, else its box in the frame.
-pub(super) fn prove(lattice: &Lattice, surface: &Surface, sets: &[Vec<usize>]) -> Result<Body, LevelError> {
+pub(super) fn prove(lattice: &Lattice, surface: &Surface, sets: &[Vec<usize>], budget: &Budget) -> Result<Body, LevelError> {
     let whole = Body::of(&surface.points, surface.loops());
-    let first = if whole.is_convex() { whole.holds_apart(lattice, sets) } else { Err(LevelError::Leaves { map: 0 }) };
-    let Err(refusal) = first else { return Ok(whole) };
+    let refusal = if whole.is_convex(budget)? {
+        match whole.holds_apart(lattice, sets, budget) {
+            Ok(()) => return Ok(whole),
+            Err(refusal) => Some(refusal),
+        }
+    } else {
+        None
+    };
+    budget.cancel.check()?;
     let boxed = Body::box_of(&surface.points);
     // Where neither does, the primitive's own refusal says more.
-    let apart = boxed.holds_apart(lattice, sets);
-    if apart.is_ok() {
-        Ok(boxed)
-    } else if whole.is_convex() {
-        Err(refusal)
-    } else {
-        apart.map(|()| boxed)
+    match boxed.holds_apart(lattice, sets, budget) {
+        Ok(()) => Ok(boxed),
+        Err(other) => Err(refusal.unwrap_or(other)),
     }
 }
 
@@ -83,22 +87,27 @@ impl Body {
         cross(&difference(b, a), &difference(c, a))
     }
 
-    fn is_convex(&self) -> bool {
-        self.faces.iter().all(|face| {
+    fn is_convex(&self, budget: &Budget) -> Result<bool, Stopped> {
+        for face in &self.faces {
+            budget.cancel.check()?;
             let normal = self.normal(&self.corners, face);
             let height = dot(&normal, &self.corners[face[0] as usize]);
-            self.corners.iter().all(|corner| dot(&normal, corner) <= height)
-        })
+            if self.corners.iter().any(|corner| dot(&normal, corner) > height) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Whether every image lies within the body, and images that occur together have a plane between them.
-    fn holds_apart(&self, lattice: &Lattice, sets: &[Vec<usize>]) -> Result<(), LevelError> {
+    fn holds_apart(&self, lattice: &Lattice, sets: &[Vec<usize>], budget: &Budget) -> Result<(), LevelError> {
         let images: Vec<Vec<Point>> =
             lattice.maps.iter().map(|map| self.corners.iter().map(|corner| Lattice::image(map, corner, lattice.ratio)).collect()).collect();
         if let Some(map) = images.iter().position(|image| image.as_flattened().iter().any(|x| x.abs() > MOST_COORDINATE)) {
             return Err(LevelError::NoLattice { map });
         }
         for face in &self.faces {
+            budget.cancel.check()?;
             let normal = self.normal(&self.corners, face);
             let height = dot(&normal, &self.corners[face[0] as usize]) * i128::from(lattice.ratio);
             if let Some(map) = images.iter().position(|image| image.iter().any(|corner| dot(&normal, corner) > height)) {
@@ -109,6 +118,7 @@ impl Body {
         for set in sets {
             for (place, &first) in set.iter().enumerate() {
                 for &second in &set[place + 1..] {
+                    budget.cancel.check()?;
                     if proven.insert((first, second)) && !self.are_apart(&images[first], &images[second]) {
                         return Err(LevelError::Overlaps { first, second });
                     }

@@ -308,7 +308,7 @@ impl Start {
         }
         let (lattice, corners) = Lattice::read(&ifs.maps, &mesh, &faces)?;
         let surface = Surface::new(corners, &faces);
-        let body = disjoint::prove(&lattice, &surface, &sets(ifs).0)?;
+        let body = disjoint::prove(&lattice, &surface, &sets(ifs).0, budget)?;
         lattice.check_depth(level)?;
         Ok(Self { lattice, body, surface, primitive })
     }
@@ -397,13 +397,9 @@ fn box_of(points: &[DVec3]) -> AxisBox {
 
 /// A box as a primitive: corners and outward faces.
 fn default_box(bounds: &AxisBox) -> Result<(Vec<DVec3>, Vec<Vec<u32>>), LevelError> {
-    let mut ends = [DVec3::ZERO; 2];
-    for axis in 0..3 {
-        let (low, high) = (shortest(bounds.low[axis]), shortest(bounds.high[axis]));
-        if low >= high {
-            return Err(LevelError::NoPrimitive { reason: "its attractor is flat, so that its box encloses nothing either" });
-        }
-        (ends[0][axis], ends[1][axis]) = (low, high);
+    let ends = [bounds.low, bounds.high].map(|corner| DVec3::from_array(corner.map(shortest)));
+    if ends[0].cmpge(ends[1]).any() {
+        return Err(LevelError::NoPrimitive { reason: "its attractor is flat, so that its box encloses nothing either" });
     }
     let corner = |code: usize| DVec3::from_array(std::array::from_fn(|axis| ends[code >> axis & 1][axis]));
     Ok(((0..8).map(corner).collect(), disjoint::BOX_FACES.map(|face| face.to_vec()).to_vec()))

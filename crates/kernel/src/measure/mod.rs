@@ -4,6 +4,7 @@ pub mod bounds;
 pub mod contact;
 pub mod dimension;
 pub mod hausdorff;
+pub mod inside;
 pub mod mass;
 pub mod oriented_box;
 pub mod section;
@@ -14,6 +15,7 @@ pub use bounds::{AxisBox, bounding_box, extent_along};
 pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};
+pub use inside::{Inside, first_inside};
 pub use oriented_box::{OrientedBox, oriented_box};
 pub use thickness::{Side, Thickness, thickness};
 

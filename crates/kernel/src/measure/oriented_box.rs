@@ -36,8 +36,6 @@ const REACH: f64 = 1.0965;
 const MOST_CUBES: usize = 400_000;
 /// Point products that are made at most, beyond the first cubes.
 const MOST_PRODUCTS: f64 = 4e9;
-/// Cubes between two looks at the budget.
-const CHECKED: usize = 64;
 /// Relative error of a width: a few products and sums of coordinates seen from the middle of the set.
 const ROUNDING: f64 = 1e-14;
 
@@ -185,9 +183,7 @@ pub fn oriented_box(points: &[DVec3], grown: f64, slack: f64, relative: f64, bud
             break;
         }
         for octant in 0..8 {
-            if made % CHECKED == 0 {
-                budget.cancel.check()?;
-            }
+            budget.cancel.check()?;
             let half = 0.5 * cube.half;
             let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
             let vector = cube.middle + DVec3::new(sign(0), sign(1), sign(2));

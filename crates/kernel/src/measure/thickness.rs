@@ -137,10 +137,10 @@ fn least_within(mesh: &TriMesh, tree: &BoxTree, side: Side, reach: f64, budget: 
         .map(|chunk| {
             let mut best: Option<Found> = None;
             let mut polygons = [Vec::with_capacity(9), Vec::with_capacity(9)];
-            if budget.cancel.check().is_err() {
-                return None;
-            }
             for a in (chunk * CHUNK) as u32..((chunk + 1) * CHUNK).min(count) as u32 {
+                if budget.cancel.reason().is_some() {
+                    return None;
+                }
                 let points = corners(a);
                 let Some(face) = Face::new(points, side) else { continue };
                 let own = mesh.triangles[a as usize];
