@@ -104,3 +104,60 @@ fn what_cannot_be_compared_is_refused() {
         assert!(read_job(document.as_bytes(), &DocumentLimits::default()).is_ok(), "{document}");
     }
 }
+
+/// A cube as a solid.
+fn cube(low: f64, high: f64) -> Value {
+    let corners: Vec<[f64; 3]> = (0..8).map(|code| [0, 1, 2].map(|axis| if code >> axis & 1 == 1 { high } else { low })).collect();
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    json!({ "family": "mesh", "vertices": corners, "faces": faces })
+}
+
+#[test]
+fn what_lies_inside_a_solid_is_not_apart_from_it() {
+    let folder = Scratch::new();
+    let (outer, inner) = (write(&folder, "outer.json", &cube(-10.0, 10.0)), write(&folder, "inner.json", &cube(-1.0, 1.0)));
+    let contact =
+        |words: &[&str], paths: &[&Path]| told(&[&["intersect", "--tolerance", "0.01"], words].concat(), paths)["contact"].clone();
+    for (paths, holder) in [([outer.as_path(), inner.as_path()], "first"), ([inner.as_path(), outer.as_path()], "second")] {
+        let found = contact(&[], &paths);
+        assert_eq!(
+            (&found["verdict"], &found["distance_mm"], &found["inside"]["holder"]),
+            (&json!("touching"), &json!([0.0, 0.0]), &json!(holder))
+        );
+        assert_within(&found["inside"]["surface_distance_mm"], 9.0, 0.05);
+    }
+    // Beside each other they are apart, and neither holds the other.
+    let beside = write(&folder, "beside.json", &cube(13.0, 15.0));
+    let found = contact(&[], &[&outer, &beside]);
+    assert_eq!((&found["verdict"], &found["inside"]), (&json!("disjoint"), &Value::Null));
+    assert_within(&found["distance_mm"], 27.0_f64.sqrt(), 0.05);
+    // Dust of which one piece lies within: Cantor's set from 0 to 33 along x, its halves from 0 to 11 and from 22 on.
+    let dust = json!({ "family": "ifs", "maps": [
+        { "scale": 0.3333333333333333, "translation": [0, 0, 0] }, { "scale": 0.3333333333333333, "translation": [22, 0, 0] }
+    ] });
+    let dust = write(&folder, "dust.json", &dust);
+    let wide = write(&folder, "wide.json", &cube(-15.0, 15.0));
+    let found = contact(&[], &[&dust, &wide]);
+    assert_eq!((&found["verdict"], &found["inside"]["holder"]), (&json!("touching"), &json!("second")), "{found}");
+    assert_within(&found["inside"]["surface_distance_mm"], 4.0, 0.05);
+    // Primitives: bounded ones may lie within, lines never do.
+    for (with, verdict, exact) in
+        [("point:1,2,3", "touching", 7.0), ("segment:0,0,0,4,0,0", "touching", 6.0), ("ball:0,0,0,2", "touching", 8.0)]
+    {
+        let found = contact(&["--with", with], &[&outer]);
+        assert_eq!(found["verdict"], verdict, "{with}: {found}");
+        assert_within(&found["inside"]["surface_distance_mm"], exact, 0.05);
+    }
+    for (with, exact) in [("point:1,2,13", 3.0), ("line:0,0,14,1,0,0", 4.0), ("plane:0,0,1,12", 2.0)] {
+        let found = contact(&["--with", with], &[&outer]);
+        assert_eq!((&found["verdict"], &found["inside"]), (&json!("disjoint"), &Value::Null), "{with}: {found}");
+        assert_within(&found["distance_mm"], exact, 0.05);
+    }
+    // A surface that is open holds nothing.
+    let sheet = write(
+        &folder,
+        "sheet.json",
+        &json!({ "family": "mesh", "vertices": [[-9, -9, 5], [9, -9, 5], [9, 9, 5], [-9, 9, 5]], "faces": [[0, 1, 2, 3]] }),
+    );
+    assert_eq!(contact(&["--with", "point:0,0,0"], &[&sheet])["verdict"], "disjoint");
+}

@@ -6,11 +6,13 @@
 //! | `contacts` | are distances, places of contact and comparisons of shapes those of closed forms? |
 //! | `corpus` | does every case of `fixtures/` hold, through the real command? |
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
+//! | `levels` | are levels of systems the solids that closed forms say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
+//! | `splits` | do the parts of a solid add up to it? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `service` | does the running service keep them? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
@@ -26,8 +28,10 @@ mod contract;
 mod corpus;
 mod determinism;
 mod independent;
+mod levels;
 mod measures;
 mod properties;
 mod service;
 mod slices;
+mod splits;
 mod thickening;

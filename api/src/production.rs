@@ -5,7 +5,7 @@ use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
-use lacuna_exchange::format::{self, Format, FormatError, Metadata, PointFile};
+use lacuna_exchange::format::{self, Format, FormatError, Metadata, NamedMesh, PointFile};
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Stack, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
@@ -156,14 +156,15 @@ pub fn write_file(
         drop(sink);
         return Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed);
     }
-    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
+    let parts = parts(&outcome.geometry);
+    let geometry = view(&outcome.geometry, &parts).ok_or_else(|| no_geometry(format))?;
     guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
     sink.flush().map_err(failed)?;
     drop(sink);
-    if let (Geometry::Solid(solid), true) = (&outcome.geometry, format != Format::Png) {
+    if matches!(outcome.geometry, Geometry::Solid(_) | Geometry::Parts(_)) && format != Format::Png {
         let stream = pending.reread().map_err(failed)?;
         let mut source = BufReader::with_capacity(1 << 16, Stoppable { stream, token });
-        guarded(|| format::verify_written(format, &mut source, solid))?.map_err(|error| format_problem(&error))?;
+        guarded(|| format::verify_written(format, &mut source, geometry))?.map_err(|error| format_problem(&error))?;
     }
     Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)
 }
@@ -218,7 +219,8 @@ pub fn stream_file(
 /// # Errors
 /// When there is nothing to see.
 pub fn picture(outcome: &Outcome) -> Result<Vec<u8>, Problem> {
-    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(Format::Png))?;
+    let parts = parts(&outcome.geometry);
+    let geometry = view(&outcome.geometry, &parts).ok_or_else(|| no_geometry(Format::Png))?;
     let mut sink = std::io::Cursor::new(Vec::new());
     guarded(|| format::write(Format::Png, geometry, &Metadata::default(), &mut sink))?.map_err(|error| format_problem(&error))?;
     Ok(sink.into_inner())
@@ -234,9 +236,19 @@ pub fn certificate_file(certificate: &Certificate) -> Result<Vec<u8>, Problem> {
     Ok(bytes)
 }
 
-fn view(geometry: &Geometry) -> Option<format::Geometry<'_>> {
+/// The parts of a geometry, by their names.
+fn parts(geometry: &Geometry) -> Vec<NamedMesh<'_>> {
+    match geometry {
+        Geometry::Parts(parts) => parts.iter().map(|part| NamedMesh { name: &part.name, mesh: part.solid.mesh() }).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// A geometry as it is written; `parts` are its own.
+fn view<'g>(geometry: &'g Geometry, parts: &'g [NamedMesh<'g>]) -> Option<format::Geometry<'g>> {
     match geometry {
         Geometry::Solid(solid) => Some(solid.into()),
+        Geometry::Parts(_) => Some(parts.into()),
         Geometry::Tessellation(tessellation) => Some(tessellation.into()),
         Geometry::Sections(_) | Geometry::None => None,
     }

@@ -91,9 +91,9 @@ pub struct Entry {
 pub struct Expected {
     /// What the case guards.
     pub about: String,
-    /// `evaluate`, `solidify`, `measure` or `solve`.
+    /// `evaluate`, `solidify`, `measure`, `solve` or `job`.
     pub kind: String,
-    /// The tolerance; 0 for `solve`, which has none.
+    /// The tolerance; 0 for `solve`, which has none, and for `job`, which states its own.
     #[serde(default)]
     pub tolerance_mm: f64,
     /// The radius.
@@ -143,10 +143,10 @@ pub struct Case {
 }
 
 impl Case {
-    /// The model document.
+    /// The model document, or that of the whole job.
     #[must_use]
     pub fn model(&self) -> PathBuf {
-        self.folder.join("model.json")
+        self.folder.join(if self.expected.kind == "job" { "job.json" } else { "model.json" })
     }
 }
 

@@ -160,11 +160,11 @@ pub(super) enum SideName {
 pub(super) struct SolidifyArgs {
     /// The model document.
     pub(super) model: PathBuf,
-    /// Hausdorff bound on the result, in mm.
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    pub(super) tolerance: f64,
-    /// Radius of the ball, in mm; not needed with --wall for a model that is a closed surface.
-    #[arg(long, value_name = "MM", value_parser = positive, required_unless_present = "wall")]
+    /// Hausdorff bound on the result, in mm; a level needs none, for it is exact but for the single precision of the files.
+    #[arg(long, value_name = "MM", value_parser = positive, required_unless_present = "level")]
+    pub(super) tolerance: Option<f64>,
+    /// Radius of the ball, in mm; not needed with --wall for a model that is a closed surface, nor with --level.
+    #[arg(long, value_name = "MM", value_parser = positive, required_unless_present_any = ["wall", "level"])]
     pub(super) radius: Option<f64>,
     /// Fill gaps narrower than this, in mm.
     #[arg(long, value_name = "MM", value_parser = positive, requires = "radius", conflicts_with = "stability")]
@@ -175,6 +175,10 @@ pub(super) struct SolidifyArgs {
     /// On which side of the surface the wall is.
     #[arg(long, value_enum, default_value_t = SideName::Inward, requires = "wall")]
     pub(super) side: SideName,
+    /// Of an ifs, instead of a dilation: the union of all copies of its primitive along addresses of this length, as an exact solid. The primitive is the
+    /// model's solid, or else the box of its attractor.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(0..=64), conflicts_with_all = ["radius", "closing", "wall", "no_simplify", "stability"])]
+    pub(super) level: Option<u32>,
     /// Leave all triangles of the lattice: quicker, and many times more triangles.
     #[arg(long)]
     pub(super) no_simplify: bool,
@@ -208,7 +212,7 @@ pub(super) struct MeasureArgs {
     /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
     pub(super) model: PathBuf,
     /// Another one: tell the Hausdorff distance of both instead.
-    #[arg(conflicts_with_all = ["radius", "density"])]
+    #[arg(conflicts_with_all = ["radius", "density", "oriented_box", "thickness"])]
     pub(super) other: Option<PathBuf>,
     /// Hausdorff bound on what is measured, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
@@ -216,6 +220,12 @@ pub(super) struct MeasureArgs {
     /// Radius of the ball, in mm: measure the solid instead of the shape itself.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: Option<f64>,
+    /// Find the smallest box, whatever way it is turned.
+    #[arg(long)]
+    pub(super) oriented_box: bool,
+    /// Find the least thickness of walls and gaps.
+    #[arg(long)]
+    pub(super) thickness: bool,
     /// Density of the material, in g/cm3: the mass is told too.
     #[arg(long, value_name = "G/CM3", value_parser = positive)]
     pub(super) density: Option<f64>,
@@ -234,6 +244,10 @@ pub(super) enum OperationName {
     Difference,
     /// The convex hull of all inputs.
     Hull,
+    /// What of one input lies behind a plane.
+    Trim,
+    /// One input in parts between planes across the axes.
+    Split,
 }
 
 #[derive(Debug, Args)]
@@ -248,6 +262,21 @@ pub(super) struct IntersectArgs {
     /// ball:X,Y,Z,RADIUS, in mm.
     #[arg(long, value_name = "WHAT:NUMBERS", value_parser = primitive, conflicts_with = "operation")]
     pub(super) with: Option<Primitive>,
+    /// With `--operation trim`: the plane, by its normal and its offset along that in mm. What the normal points to is taken away.
+    #[arg(long, value_name = "NX,NY,NZ,OFFSET", value_parser = cut_plane, allow_hyphen_values = true)]
+    pub(super) plane: Option<[f64; 4]>,
+    /// With `--operation split`: the build volume that every part fits, in mm.
+    #[arg(long, value_name = "XxYxZ", value_parser = volume)]
+    pub(super) volume: Option<[f64; 3]>,
+    /// With `--operation split`: where to cut across an axis, in mm; may be given several times.
+    #[arg(long = "cut", value_name = "AXIS=MM", value_parser = axis_cut)]
+    pub(super) cuts: Vec<(usize, f64)>,
+    /// With `--operation split`: width and length of pegs that stand in sockets of neighbouring parts, in mm.
+    #[arg(long, value_name = "MM", value_parser = positive, requires = "clearance")]
+    pub(super) key: Option<f64>,
+    /// Distance between the faces of a peg and of its socket, in mm.
+    #[arg(long, value_name = "MM", value_parser = distance, requires = "key")]
+    pub(super) clearance: Option<f64>,
     /// Hausdorff bound on every solid, in mm; without an operation, how near shapes must come.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) tolerance: f64,
@@ -444,9 +473,34 @@ fn distance(text: &str) -> Result<f64, String> {
     }
 }
 
+/// So many finite numbers with a character between.
+fn numbers<const N: usize>(text: &str, between: char) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> =
+        text.split(between).map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok())
+}
+
 fn point(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
-    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+    numbers(text, ',').ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+}
+
+fn cut_plane(text: &str) -> Result<[f64; 4], String> {
+    let plane: Option<[f64; 4]> = numbers(text, ',').filter(|[x, y, z, _]| [x, y, z].iter().any(|part| **part != 0.0));
+    plane.ok_or_else(|| "a normal with a length and an offset are expected, for example 0,0,1,5".to_owned())
+}
+
+fn volume(text: &str) -> Result<[f64; 3], String> {
+    let volume: Option<[f64; 3]> = numbers(text, 'x').filter(|sides: &[f64; 3]| sides.iter().all(|side| *side > 0.0));
+    volume.ok_or_else(|| "three positive lengths are expected, for example 200x200x180".to_owned())
+}
+
+fn axis_cut(text: &str) -> Result<(usize, f64), String> {
+    let cut = text.split_once('=').and_then(|(name, offset)| {
+        let axis = ["x", "y", "z"].iter().position(|axis| axis.eq_ignore_ascii_case(name.trim()))?;
+        let [offset] = numbers(offset, ',')?;
+        Some((axis, offset))
+    });
+    cut.ok_or_else(|| "an axis and an offset are expected, for example x=50".to_owned())
 }
 
 fn bytes(text: &str) -> Result<u64, String> {

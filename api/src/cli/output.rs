@@ -55,7 +55,9 @@ pub(super) fn deliver(
     budget: &Budget,
 ) -> Result<Vec<Written>, Problem> {
     let thumbnail = match &outcome.geometry {
-        Geometry::Solid(_) if targets.iter().any(|target| target.format == Format::ThreeMf) => Some(production::picture(outcome)?),
+        Geometry::Solid(_) | Geometry::Parts(_) if targets.iter().any(|target| target.format == Format::ThreeMf) => {
+            Some(production::picture(outcome)?)
+        }
         _ => None,
     };
     let mut pending = Vec::with_capacity(targets.len() + 1);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lacuna_exchange::format::{self, ReadLimits};
-use lacuna_fabrication::{Input, Job, JobKind, Operation, Outcome, Params, Planes, WallOrder, WallSide};
+use lacuna_fabrication::{CutPlane, Input, Job, JobKind, Operation, Outcome, Params, Planes, Split, SplitKey, WallOrder, WallSide};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 
@@ -33,12 +33,13 @@ pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Proble
         SideName::Outward => WallSide::Outward,
     };
     let params = Params {
+        level: args.level,
         radius_mm: args.radius,
         closing_mm: args.closing,
         wall: args.wall.map(|thickness_mm| WallOrder { thickness_mm, side }),
         simplify: !args.no_simplify,
         stability: args.stability,
-        ..Params::new(args.tolerance)
+        ..Params::new(args.tolerance.unwrap_or(0.0))
     };
     make(JobKind::Solidify, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
 }
@@ -51,7 +52,13 @@ pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Proble
 
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
-    let params = Params { radius_mm: args.radius, density_g_cm3: args.density, ..Params::new(args.tolerance) };
+    let params = Params {
+        radius_mm: args.radius,
+        oriented_box: args.oriented_box,
+        thickness: args.thickness,
+        density_g_cm3: args.density,
+        ..Params::new(args.tolerance)
+    };
     let inputs = std::iter::once(&args.model).chain(&args.other).map(|path| input_of(path)).collect::<Result<_, _>>()?;
     tell(JobKind::Measure, inputs, params, &args.limits, manner)
 }
@@ -70,6 +77,8 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
         OperationName::Intersection => Operation::Intersection,
         OperationName::Difference => Operation::Difference,
         OperationName::Hull => Operation::Hull,
+        OperationName::Trim => Operation::Trim,
+        OperationName::Split => Operation::Split,
     });
     let mut inputs: Vec<Input> = args.models.iter().map(|path| input_of(path)).collect::<Result<_, _>>()?;
     match args.radius.as_slice() {
@@ -83,7 +92,8 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
             return Err(Problem::new(ProblemKind::Usage, detail));
         }
     }
-    let params = Params { operation, with: args.with, ..Params::new(args.tolerance) };
+    let (plane, split) = cutting(args)?;
+    let params = Params { operation, with: args.with, plane, split, ..Params::new(args.tolerance) };
     if operation.is_none() {
         let wanted = if args.with.is_some() { 1 } else { 2 };
         if inputs.len() != wanted {
@@ -96,6 +106,29 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
     let output =
         OutputArgs { outputs: outputs.clone(), format: format.clone(), certificate: certificate.clone(), preview: preview.clone() };
     make(JobKind::Intersect, inputs, params, &output, &args.limits, manner)
+}
+
+/// What an intersect cuts with: of its operation alone.
+fn cutting(args: &IntersectArgs) -> Result<(Option<CutPlane>, Option<Split>), Problem> {
+    let usage = |detail: &str| Err(Problem::new(ProblemKind::Usage, detail.to_owned()));
+    let (trims, splits) = (args.operation == Some(OperationName::Trim), args.operation == Some(OperationName::Split));
+    let of_split = args.volume.is_some() || !args.cuts.is_empty() || args.key.is_some();
+    if args.plane.is_some() != trims {
+        return usage("--operation trim and --plane go together");
+    }
+    if of_split && !splits {
+        return usage("--volume, --cut and --key belong to --operation split");
+    }
+    if splits && args.volume.is_none() && args.cuts.is_empty() {
+        return usage("--operation split needs --volume or --cut");
+    }
+    let plane = args.plane.map(|[x, y, z, offset_mm]| CutPlane { normal: [x, y, z].into(), offset_mm });
+    let mut cuts_mm: [Vec<f64>; 3] = Default::default();
+    for &(axis, offset) in &args.cuts {
+        cuts_mm[axis].push(offset);
+    }
+    let key = args.key.zip(args.clearance).map(|(width_mm, clearance_mm)| SplitKey { width_mm, clearance_mm });
+    Ok((plane, splits.then_some(Split { volume_mm: args.volume, cuts_mm, key })))
 }
 
 /// `lacuna slice`.

@@ -99,7 +99,7 @@ fn keep_files(desk: &Desk, order: &Job, mut outcome: Outcome, budget: &Budget) -
     let stem = files::safe_stem(title.unwrap_or("result"));
     let formats: Vec<Format> = order.outputs.iter().map(|name| documents::format(name)).collect::<Result<_, _>>()?;
     let thumbnail = match (&outcome.geometry, formats.contains(&Format::ThreeMf)) {
-        (Geometry::Solid(_), true) => Some(production::picture(&outcome)?),
+        (Geometry::Solid(_) | Geometry::Parts(_), true) => Some(production::picture(&outcome)?),
         _ => None,
     };
     let mut outputs = Vec::with_capacity(formats.len() + 1);

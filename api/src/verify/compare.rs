@@ -8,7 +8,9 @@ use super::report::Row;
 /// All comparisons of a case, those that every case implies included.
 pub(super) fn rows(manifest: &Manifest, got: &Value) -> Vec<Row> {
     let mut rows = stated(manifest, got);
-    let tolerance = manifest.tolerance_mm.unwrap_or(f64::NAN);
+    // A job states its own, which the certificate repeats.
+    let requested = || got.get("requested_tolerance_mm").and_then(Value::as_f64);
+    let tolerance = manifest.tolerance_mm.or_else(requested).unwrap_or(f64::NAN);
     if let Some(bounding_box) = &manifest.bounding_box {
         rows.extend(box_rows(bounding_box, tolerance, got));
     }

@@ -41,6 +41,8 @@ pub(super) enum CaseKind {
     Solidify,
     Measure,
     Solve,
+    /// A whole job document instead of a model.
+    Job,
 }
 
 impl CaseKind {
@@ -50,7 +52,7 @@ impl CaseKind {
             Self::Evaluate => Some(JobKind::Evaluate),
             Self::Solidify => Some(JobKind::Solidify),
             Self::Measure => Some(JobKind::Measure),
-            Self::Solve => None,
+            Self::Solve | Self::Job => None,
         }
     }
 }
@@ -142,15 +144,20 @@ impl Manifest {
         }
         match (self.kind, self.radius_mm) {
             (CaseKind::Solidify, None) => return Err("`solidify` needs radius_mm".into()),
-            (CaseKind::Evaluate | CaseKind::Solve, Some(_)) => return Err("`evaluate` and `solve` have no radius_mm".into()),
+            (CaseKind::Evaluate | CaseKind::Solve | CaseKind::Job, Some(_)) => {
+                return Err("`evaluate` and `solve` have no radius_mm, and a job states its own".into());
+            }
             _ => {}
         }
         if self.stability && self.kind != CaseKind::Solidify {
             return Err("only `solidify` has stability".into());
         }
         let solves = self.kind == CaseKind::Solve;
-        if solves == self.tolerance_mm.is_some() {
-            return Err("`solve` has no tolerance_mm, everything else needs it".into());
+        if (solves || self.kind == CaseKind::Job) == self.tolerance_mm.is_some() {
+            return Err("`solve` has no tolerance_mm, a job states its own, everything else needs it".into());
+        }
+        if self.kind == CaseKind::Job && (self.bounding_box.is_some() || !self.point.is_empty()) {
+            return Err("a job has no [box] and no [point.*]".into());
         }
         let of_solve = !self.values.is_empty() || !self.entry.is_empty() || self.refused.as_ref().is_some_and(|r| r.pointers.is_some());
         if of_solve && !solves || solves && (self.bounding_box.is_some() || !self.point.is_empty()) {
@@ -203,6 +210,21 @@ mod tests {
         }
         assert!(Manifest::read(&format!("{HEAD}{entry}")).is_err());
         assert!(Manifest::read(&HEAD.replace("tolerance_mm = 1", "[refused]\ncode = \"c\"")).is_err());
+    }
+
+    #[test]
+    fn cases_of_jobs() {
+        let read = |rest: &str| Manifest::read(&format!("about = \"x\"\nkind = \"job\"\n{rest}"));
+        assert!(read("[exact]\n\"split.keys\" = 1\nsource = \"s\"").is_ok());
+        assert!(read("[refused]\ncode = \"c\"").is_ok());
+        for bad in [
+            "",
+            "tolerance_mm = 1\n[refused]\ncode = \"c\"",
+            "radius_mm = 1\n[refused]\ncode = \"c\"",
+            "stability = true\n[refused]\ncode = \"c\"",
+        ] {
+            assert!(read(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

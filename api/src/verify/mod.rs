@@ -19,7 +19,7 @@ use crate::addresses;
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::{documents, production};
-use manifest::{Manifest, Refused};
+use manifest::{CaseKind, Manifest, Refused};
 pub use report::{CaseReport, Report, Row};
 
 /// Deepest folder in which cases are looked for.
@@ -78,12 +78,16 @@ fn read_manifest(folder: &Path) -> Result<Manifest, Row> {
 }
 
 fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
-    let document = match fs::read(folder.join("model.json")) {
+    let name = if manifest.kind == CaseKind::Job { "job.json" } else { "model.json" };
+    let document = match fs::read(folder.join(name)) {
         Ok(document) => document,
-        Err(error) => return vec![Row::failure("model.json", "a readable file", &error.to_string())],
+        Err(error) => return vec![Row::failure(name, "a readable file", &error.to_string())],
     };
-    let Some(kind) = manifest.kind.job() else { return solve::rows(&document, manifest) };
-    let result = perform(folder, &document, kind, manifest);
+    let result = match (manifest.kind, manifest.kind.job()) {
+        (CaseKind::Job, _) => job_of(folder, &document).and_then(|job| done(&job)),
+        (_, Some(kind)) => perform(folder, &document, kind, manifest),
+        (_, None) => return solve::rows(&document, manifest),
+    };
     match (&manifest.refused, result) {
         (Some(refused), result) => vec![compare_refusal(refused, result)],
         (None, Ok(certificate)) => {
@@ -93,6 +97,11 @@ fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
         }
         (None, Err(problem)) => vec![Row::failure("result", "a certificate", &told(&problem))],
     }
+}
+
+/// The job of a case that states one in full.
+fn job_of(folder: &Path, document: &[u8]) -> Result<Job, Problem> {
+    documents::read_job_in(document, &Limits::default(), Some(folder))
 }
 
 /// Does the case as any door would, and gives its certificate as JSON.
@@ -110,9 +119,14 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
         outputs: Vec::new(),
         limits: Limits::default(),
     };
+    done(&job)
+}
+
+/// Does a job, and gives its certificate as JSON.
+fn done(job: &Job) -> Result<serde_json::Value, Problem> {
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
     let _watchdog = Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
-    let outcome = production::compute(&job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
+    let outcome = production::compute(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
     serde_json::to_value(&outcome.certificate).map_err(|error| Problem::internal(error.to_string()))
 }
 

@@ -1,6 +1,8 @@
 //! What the house asks of a boolean engine.
 
+use glam::DVec3;
 use lacuna_kernel::budget::CancelToken;
+use lacuna_kernel::measure::section::PlaneFrame;
 use lacuna_kernel::solid::TriMesh;
 
 use crate::BooleanError;
@@ -58,4 +60,34 @@ pub trait BooleanEngine: Send + Sync {
         let operands: Vec<&TriMesh> = std::iter::once(solid).chain(tools.iter().copied()).collect();
         self.combine(Operation::Difference, &operands, cancel)
     }
+
+    /// What of the solid lies behind the plane `normal` . x = `offset`, where the normal does not point to, and what beyond; `offset` is in units of the
+    /// normal's direction, in mm, whatever its length. Planes across coordinate axes cut exactly there.
+    ///
+    /// # Errors
+    /// As [`Self::combine`]; a normal without direction is [`BooleanError::NoPlane`].
+    fn cut(&self, solid: &TriMesh, normal: DVec3, offset: f64, cancel: &CancelToken) -> Result<[TriMesh; 2], BooleanError> {
+        let Some(half_space) = half_space(solid, normal, offset)? else { return Ok([solid.clone(), TriMesh::default()]) };
+        let behind = self.difference(solid, &[&half_space], cancel)?;
+        let beyond = self.intersection(&[solid, &half_space], cancel)?;
+        Ok([behind, beyond])
+    }
+}
+
+/// A box that holds all of a solid that lies beyond a plane, and ends at the plane; `None` if nothing lies there.
+fn half_space(solid: &TriMesh, normal: DVec3, offset: f64) -> Result<Option<TriMesh>, BooleanError> {
+    let frame = PlaneFrame::new(normal).map_err(|_| BooleanError::NoPlane)?;
+    if !offset.is_finite() {
+        return Err(BooleanError::NoPlane);
+    }
+    let Some([low, high]) = frame.bounds(&solid.vertices).filter(|[_, high]| high.z > offset) else { return Ok(None) };
+    let room = (high - low).max_element();
+    let ends = [DVec3::new(low.x - room, low.y - room, offset), high + room];
+    let corner = |code: usize| {
+        let [u, v, n] = std::array::from_fn(|axis| ends[code >> axis & 1][axis]);
+        frame.u() * u + frame.v() * v + frame.normal() * n
+    };
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Ok(Some(TriMesh { vertices: (0..8).map(corner).collect(), triangles }))
 }

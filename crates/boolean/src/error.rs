@@ -59,6 +59,9 @@ pub enum BooleanError {
     /// Nothing to combine.
     #[error("an intersection or a difference needs an operand")]
     NoOperand,
+    /// A plane to cut with has no direction or no place.
+    #[error("the plane's normal has no direction, or its offset is not finite")]
+    NoPlane,
     /// The token was fired.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -72,7 +75,7 @@ impl BooleanError {
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {
-            Self::NotASolid { .. } | Self::NoOperand => Kind::Invalid,
+            Self::NotASolid { .. } | Self::NoOperand | Self::NoPlane => Kind::Invalid,
             Self::TooLarge { .. } | Self::ResultTooLarge => Kind::Limit,
             Self::Stopped(stopped) => match stopped.reason {
                 lacuna_kernel::budget::StopReason::Cancelled => Kind::Cancelled,
@@ -96,6 +99,7 @@ impl BooleanError {
             Self::TooLarge { .. } => "boolean.operand-too-large",
             Self::ResultTooLarge => "boolean.result-too-large",
             Self::NoOperand => "boolean.no-operand",
+            Self::NoPlane => "boolean.no-plane",
             Self::Stopped(_) => "boolean.stopped",
             Self::Engine(_) => "boolean.engine",
         }

@@ -16,8 +16,11 @@ use crate::{Geometry, Job, Operation, certificate};
 
 /// Does a job of kind `intersect` with an operation.
 pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
-    if job.inputs.len() < 2 && operation != Operation::Hull {
-        return Err(wrong_inputs(job, "an operation takes two or more"));
+    match (operation, job.inputs.len()) {
+        (Operation::Hull, _) | (Operation::Trim, 1) => {}
+        (Operation::Trim, _) => return Err(wrong_inputs(job, "trim takes one")),
+        (_, count) if count < 2 => return Err(wrong_inputs(job, "an operation takes two or more")),
+        _ => {}
     }
     let sources = sources(job, budget)?;
     let share = share(&sources, tolerance)?;
@@ -27,11 +30,13 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
     }
     drop(sources);
     budget.report("combine", 0.0, 0);
-    let combined = evaluate(operation, &mut operands, budget)?;
+    let combined =
+        if operation == Operation::Trim { trim(job, &mut operands, budget)? } else { evaluate(operation, &mut operands, budget)? };
     if combined.triangles.is_empty() {
         let message = match operation {
             Operation::Union | Operation::Hull => "the inputs have no volume",
             Operation::Intersection => "the result is empty: no point lies inside of all inputs, though surfaces may touch",
+            Operation::Trim | Operation::Split => "nothing of the solid lies behind the plane: turn its normal, or move it",
             Operation::Difference => "the result is empty: the other inputs cover all of the first",
         };
         return Err(JobError::new(Kind::Unreachable, "boolean.empty", message.into()));
@@ -49,12 +54,25 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
     Ok(Outcome { geometry: Geometry::Solid(rounded.solid), certificate })
 }
 
+/// What lies behind the job's plane, where its normal does not point to.
+fn trim(job: &Job, operands: &mut [Operand], budget: &Budget) -> Result<TriMesh, JobError> {
+    let missing = || JobError::new(Kind::Invalid, "bad-parameter", "trim needs plane, the plane that cuts".into());
+    let (plane, operand) = (job.params.plane.ok_or_else(missing)?, operands.first_mut().ok_or_else(missing)?);
+    operand.join(budget)?;
+    let empty = TriMesh::default();
+    let whole = operand.meshes.first().unwrap_or(&empty);
+    let cut = ManifoldRust.cut(whole, plane.normal, plane.offset_mm, &budget.cancel);
+    let [behind, _] = cut.map_err(|error| at_fault(error, |_| &operand.statement.name))?;
+    Ok(behind)
+}
+
 /// Combines the inputs: an input of several surfaces is what lies in any of them.
 fn evaluate(operation: Operation, operands: &mut [Operand], budget: &Budget) -> Result<TriMesh, JobError> {
     let engine_operation = match operation {
         Operation::Union => lacuna_boolean::Operation::Union,
         Operation::Intersection => lacuna_boolean::Operation::Intersection,
-        Operation::Difference => lacuna_boolean::Operation::Difference,
+        // One input is trimmed or split by planes, elsewhere.
+        Operation::Difference | Operation::Trim | Operation::Split => lacuna_boolean::Operation::Difference,
         Operation::Hull => lacuna_boolean::Operation::Hull,
     };
     // An input of several surfaces is joined first where that is not what the operation does with it anyway.

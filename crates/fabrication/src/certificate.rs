@@ -1,15 +1,22 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
+use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict, Wall};
+use lacuna_kernel::error::Kind;
+use lacuna_kernel::levels::SolidLevel;
 use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
-use lacuna_kernel::solid::{Rounded, Solid, TriMesh};
+use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
-use lacuna_kernel::tolerance::{Radius, Tolerance};
+use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 
+use crate::level::LevelStatement;
 use crate::operand::Operand;
-use crate::{Operation, WallOrder, WallSide};
+use crate::run::{JobError, not_carried};
+use crate::shape_measures::{OrientedBoxStatement, ThicknessStatement};
+use crate::split::SplitStatement;
+use crate::{Operation, Part, WallOrder, WallSide};
 
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -118,6 +125,12 @@ pub struct Certificate {
     /// How far two shapes are from being the same: of a `measure` of two.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub hausdorff: Option<HausdorffStatement>,
+    /// Which level of a system the result is, when it is one: the bounds are then those of that level.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub level: Option<LevelStatement>,
+    /// The parts of the result, when it was split.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub split: Option<SplitStatement>,
     /// The sections of the solid, when it was cut.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub sections: Option<SectionsStatement>,
@@ -151,6 +164,12 @@ pub struct Certificate {
     /// Fractal dimension of the exact shape: of a `measure` alone.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub dimension: Option<DimensionStatement>,
+    /// The smallest box around the exact shape: of a `measure` that asks.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub oriented_box: Option<OrientedBoxStatement>,
+    /// Least walls and gaps: of a `measure` that asks.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub thickness: Option<ThicknessStatement>,
     /// Volume that the written mesh encloses.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub mesh_volume_mm3: Option<f64>,
@@ -220,7 +239,33 @@ pub struct PlaceStatement {
     pub nearest: CellPairStatement,
 }
 
-/// How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for a solid is its surface here.
+/// Which of two shapes holds the other, or a part of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum Holder {
+    /// The first.
+    First,
+    /// The second.
+    Second,
+}
+
+/// A solid that holds another shape, or a part of it, without touching it with its surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct InsideStatement {
+    /// Which of the two is the solid that holds.
+    pub holder: Holder,
+    /// A point inside of it that is on the other, or nearer to it than their surfaces are to each other.
+    pub point_mm: [f64; 3],
+    /// The distance of the surfaces.
+    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
+    pub surface_distance_mm: Interval,
+}
+
+/// How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for a solid has its inside: what lies there is
+/// at the distance 0. Places and the nearest pair are those of surfaces.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
@@ -230,6 +275,9 @@ pub struct ContactStatement {
     /// The distance of the shapes.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub distance_mm: Interval,
+    /// Which solid holds the other shape or a part of it, where their surfaces are apart.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub inside: Option<InsideStatement>,
     /// The nearest pair of cells that was looked at.
     pub nearest: CellPairStatement,
     /// The places, a thousand at most.
@@ -511,7 +559,7 @@ impl Certificate {
         let counts = ["sealed voids", "separate pieces", "triangles cross"];
         let own =
             std::mem::take(&mut self.warnings).into_iter().filter(|warning| !counts.iter().any(|word| warning.contains(word))).collect();
-        let counted = of_solid(&wall.solid, crossings + wall.crossings, own, tolerance);
+        let counted = of_one_solid(&wall.solid, crossings + wall.crossings, own, tolerance);
         let grown = if side == WallSide::Outward { thickness_mm } else { 0.0 };
         let moved = |end: usize| self.bbox_mm[end].map(|x| if end == 0 { x.map(|x| x - grown) } else { x.map(|x| x + grown) });
         let reached_mm = [(thickness_mm - wall.inner_mm).max(0.0), thickness_mm + wall.outer_mm];
@@ -597,15 +645,86 @@ fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tol
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
     }
-    if topology.components > 1 {
-        certificate.warnings.push(format!("{} separate pieces: they will not hold together", topology.components));
+    certificate
+}
+
+/// As [`of_solid`], for what is made in one piece.
+fn of_one_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
+    let mut certificate = of_solid(solid, crossings, warnings, tolerance);
+    let components = solid.topology().components;
+    if components > 1 {
+        certificate.warnings.push(format!("{components} separate pieces: they will not hold together"));
     }
     certificate
 }
 
+/// What is proven of a level of a system; a tolerance of 0 is none, and what is reached is then what was asked.
+pub(crate) fn of_level(
+    attractor: &Attractor,
+    found: &SolidLevel,
+    statement: LevelStatement,
+    tolerance: f64,
+) -> Result<Certificate, JobError> {
+    let reached = found.moved_mm;
+    let requested = Tolerance::new(if tolerance > 0.0 { tolerance } else { reached.max(*LENGTHS_MM.start()) })?;
+    if reached > requested.mm() {
+        return Err(not_carried(requested, found.bounds.extent(), reached));
+    }
+    let mut counted = of_one_solid(&found.solid, found.contacts, attractor.warnings().to_vec(), requested);
+    if found.doubled_vertices > 0 {
+        counted.warnings.push(format!(
+            "parts touch along edges or at corners without being joined: {} corners are doubled, and {} pairs of triangles touch; a dilation joins them",
+            found.doubled_vertices, found.contacts
+        ));
+    }
+    Ok(Certificate {
+        achieved_bound_mm: reached,
+        inner_bound_mm: Some(reached),
+        outer_bound_mm: Some(reached),
+        bbox_mm: corners(&found.bounds),
+        volume_mm3: Some([found.volume.low, found.volume.high]),
+        area_mm2: Some([found.area.low, found.area.high]),
+        level: Some(statement),
+        ..counted
+    })
+}
+
+/// What is proven of a solid in parts: its bounds, and the counts of all parts together.
+pub(crate) fn of_split(
+    parts: &[Part],
+    crossings: u64,
+    moved_mm: f64,
+    operand: &Operand,
+    statement: SplitStatement,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Certificate, JobError> {
+    let mut all = TriMesh::default();
+    for Part { solid, .. } in parts {
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(&solid.mesh().vertices);
+        all.triangles.extend(solid.mesh().triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
+    }
+    let all = Solid::new(all, budget).map_err(|error| match error {
+        SolidError::Stopped(stopped) => JobError::from(stopped),
+        other => JobError::new(Kind::Defect, "internal", format!("parts together are no solid: {other}")),
+    })?;
+    let counted = of_solid(&all, crossings, operand.warnings.clone(), tolerance);
+    let [inner, outer] = [operand.statement.inner_bound_mm, operand.statement.outer_bound_mm].map(|bound| bound + moved_mm);
+    Ok(Certificate {
+        achieved_bound_mm: inner.max(outer),
+        inner_bound_mm: Some(inner),
+        outer_bound_mm: Some(outer),
+        leaf_cells: operand.leaf_cells,
+        bbox_mm: corners(&operand.bounds),
+        split: Some(statement),
+        ..counted
+    })
+}
+
 /// What is proven of a dilated shape.
 pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, tolerance: Tolerance) -> Certificate {
-    let mut counted = of_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
+    let mut counted = of_one_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
     let radius = dilation.least_radius_mm;
     let exact = dilated_volume(volume(dilation.solid.mesh()), radius, dilation.inner_mm, dilation.outer_mm);
     let exact_area = dilated_area(exact, radius);
@@ -652,7 +771,7 @@ fn box_of_all<'b>(boxes: impl Iterator<Item = &'b AxisBox>) -> [[Interval; 3]; 2
 
 /// What is proven of one input as a solid.
 pub(crate) fn of_operand(rounded: &Rounded, operand: &Operand, tolerance: Tolerance) -> Certificate {
-    let counted = of_solid(&rounded.solid, rounded.crossings, operand.warnings.clone(), tolerance);
+    let counted = of_one_solid(&rounded.solid, rounded.crossings, operand.warnings.clone(), tolerance);
     let [inner, outer] = [operand.statement.inner_bound_mm, operand.statement.outer_bound_mm].map(|bound| bound + rounded.moved_mm);
     Certificate {
         achieved_bound_mm: inner.max(outer),
@@ -673,7 +792,7 @@ pub(crate) fn of_operation(
     tolerance: Tolerance,
 ) -> Certificate {
     let warnings = operands.iter().flat_map(|operand| operand.warnings.clone()).collect();
-    let mut counted = of_solid(&rounded.solid, rounded.crossings, warnings, tolerance);
+    let mut counted = of_one_solid(&rounded.solid, rounded.crossings, warnings, tolerance);
     let taken_away = |index: usize| operation == Operation::Difference && index > 0;
     let (mut inner, mut outer) = (0.0_f64, 0.0_f64);
     for (index, Operand { statement, .. }) in operands.iter().enumerate() {
@@ -731,7 +850,7 @@ fn box_of(operation: Operation, operands: &[Operand]) -> [[Interval; 3]; 2] {
             let high = boxes().map(|bounds| bounds.high[axis].high).fold(f64::INFINITY, f64::min);
             [low.min(high), low.max(high)]
         })),
-        Operation::Difference => {
+        Operation::Difference | Operation::Trim | Operation::Split => {
             same(std::array::from_fn(|axis| boxes().next().map_or([0.0; 2], |bounds| [bounds.low[axis].low, bounds.high[axis].high])))
         }
     }
@@ -782,6 +901,9 @@ pub(crate) fn of_shape(attractor: &Attractor, bounds: &AxisBox, tolerance: Toler
 }
 
 #[cfg(feature = "wire")]
+pub(crate) use wire::interval_schema;
+
+#[cfg(feature = "wire")]
 mod wire {
     use super::{Checked, SelfIntersections};
     use serde::de::Error as _;
@@ -803,7 +925,7 @@ mod wire {
         array_of(ObjectBuilder::new().schema_type(Type::Number), 2)
     }
 
-    pub(super) fn interval_schema() -> RefOr<Schema> {
+    pub(crate) fn interval_schema() -> RefOr<Schema> {
         interval().into()
     }
 

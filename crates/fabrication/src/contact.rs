@@ -1,15 +1,20 @@
 //! How far shapes are apart, where they meet, and how far one is from being the other.
 
-use lacuna_kernel::attractor::Attractor;
+use glam::DVec3;
+use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
-use lacuna_kernel::measure::contact::{CellPair, Contact, ContactError, ContactQuery, Place, Verdict, intersect, intersect_primitive};
+use lacuna_kernel::measure::contact::{
+    CellPair, Contact, ContactError, ContactQuery, Place, Primitive, Verdict, intersect, intersect_primitive,
+};
 use lacuna_kernel::measure::hausdorff::{Directed, Hausdorff, hausdorff};
-use lacuna_kernel::measure::{AxisBox, bounding_box};
-use lacuna_kernel::tolerance::Tolerance;
+use lacuna_kernel::measure::{AxisBox, Inside, bounding_box, first_inside};
+use lacuna_kernel::tolerance::{LENGTHS_MM, Tolerance};
 
 use crate::certificate::{
-    self, CellPairStatement, ContactStatement, ContactVerdict, DirectedStatement, HausdorffStatement, PlaceStatement,
+    self, CellPairStatement, ContactStatement, ContactVerdict, DirectedStatement, HausdorffStatement, Holder, InsideStatement,
+    PlaceStatement,
 };
+use crate::operand::{is_solid, surfaces};
 use crate::run::{JobError, Outcome, lower_all, wrong_inputs};
 use crate::{Geometry, Job};
 
@@ -51,8 +56,63 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     if found.places.len() > MOST_PLACES {
         certificate.warnings.push(format!("{} of {} places are described", MOST_PLACES, found.places.len()));
     }
-    certificate.contact = Some(statement(&found));
+    let mut stated = statement(&found);
+    if found.distance_mm.low > 0.0 {
+        let held = match (shapes.as_slice(), &job.params.with) {
+            ([(first, _), (second, _)], _) => match holds(second, &samples(first, &found, budget)?, budget)? {
+                Inside::None => (Holder::First, holds(first, &samples(second, &found, budget)?, budget)?),
+                held => (Holder::Second, held),
+            },
+            ([(shape, _)], Some(primitive)) => (Holder::First, holds(shape, &point_of(primitive), budget)?),
+            _ => (Holder::First, Inside::None),
+        };
+        match held {
+            (_, Inside::None) => {}
+            (holder, Inside::Point(point)) => {
+                let surface_distance_mm = stated.distance_mm;
+                stated.inside = Some(InsideStatement { holder, point_mm: point.to_array(), surface_distance_mm });
+                (stated.verdict, stated.distance_mm) = (ContactVerdict::Touching, [0.0; 2]);
+            }
+            (_, Inside::Undecided) => {
+                certificate.warnings.push("whether one shape lies inside the other is not decided: the surfaces are very close".into());
+                (stated.verdict, stated.distance_mm[0], stated.complete) = (ContactVerdict::Near, 0.0, false);
+            }
+        }
+    }
+    certificate.contact = Some(stated);
     Ok(Outcome { geometry: Geometry::None, certificate })
+}
+
+/// Points of a shape, at least one on every piece of it that a surface as far as was found leaves together.
+///
+/// Let d be that distance. A point of the shape is within d / 3 of the sample, and that point of the sample is on the same element as a vertex; the way between
+/// stays within d / 3 of the shape, so it does not meet the surface, and the vertex is inside if and only if the point is.
+fn samples(shape: &Attractor, found: &Contact, budget: &Budget) -> Result<Vec<DVec3>, JobError> {
+    let fine = (found.distance_mm.low / 3.0).clamp(*LENGTHS_MM.start(), *LENGTHS_MM.end());
+    Ok(refine(shape, Tolerance::new(fine)?, budget)?.vertices)
+}
+
+/// A point of what a shape is held against, where it is bounded: it is connected, and what is not bounded is not within a solid.
+fn point_of(primitive: &Primitive) -> Vec<DVec3> {
+    match *primitive {
+        Primitive::Point(x) | Primitive::Segment([x, _]) | Primitive::AxisBox { low: x, .. } | Primitive::Ball { centre: x, .. } => {
+            vec![x.into()]
+        }
+        Primitive::Ray { .. } | Primitive::Line { .. } | Primitive::Plane { .. } => Vec::new(),
+    }
+}
+
+/// Whether a shape that stands for solids holds one of the points, which are not on its surfaces.
+fn holds(shape: &Attractor, points: &[DVec3], budget: &Budget) -> Result<Inside, JobError> {
+    if is_solid(shape) {
+        for surface in surfaces(shape) {
+            let found = first_inside(&surface, points, budget)?;
+            if found != Inside::None {
+                return Ok(found);
+            }
+        }
+    }
+    Ok(Inside::None)
 }
 
 /// Does a job of kind `measure` with two inputs: how far one shape is from being the other.
@@ -102,6 +162,7 @@ fn statement(found: &Contact) -> ContactStatement {
     ContactStatement {
         verdict: verdict(found.verdict()),
         distance_mm: [found.distance_mm.low, found.distance_mm.high],
+        inside: None,
         nearest: pair(&found.nearest),
         places: found.places.iter().take(MOST_PLACES).map(place).collect(),
         complete: found.complete,

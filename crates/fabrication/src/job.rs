@@ -33,6 +33,35 @@ pub struct Planes {
     pub step_mm: Option<f64>,
 }
 
+/// A plane normal . x = offset, which cuts a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutPlane {
+    /// What it is perpendicular to, of any length: it points to what is taken away.
+    pub normal: glam::DVec3,
+    /// Where it is along the normal's direction, in mm.
+    pub offset_mm: f64,
+}
+
+/// How a solid is split into parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Split {
+    /// What every part must fit, in mm along the axes.
+    pub volume_mm: Option<[f64; 3]>,
+    /// Where to cut across x, y and z, in mm; where none is stated, as the volume asks.
+    pub cuts_mm: [Vec<f64>; 3],
+    /// Keys that hold the parts together; none when absent.
+    pub key: Option<SplitKey>,
+}
+
+/// Pegs and sockets between parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SplitKey {
+    /// Width and length of a peg, in mm; walls are half of that.
+    pub width_mm: f64,
+    /// Distance between the faces of a peg and of its socket, in mm.
+    pub clearance_mm: f64,
+}
+
 /// How solids are combined. All operations are regularised: a face, an edge or a point that two solids merely share leaves nothing behind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
@@ -46,6 +75,10 @@ pub enum Operation {
     Difference,
     /// The convex hull of all inputs.
     Hull,
+    /// What of one input lies on one side of a plane.
+    Trim,
+    /// One input in parts along planes.
+    Split,
 }
 
 /// On which side of a closed surface its wall is.
@@ -80,9 +113,11 @@ pub struct WallOrder {
 /// Settings of a job. What a kind does not use must be absent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params {
-    /// Hausdorff bound on the result, in mm.
+    /// Hausdorff bound on the result, in mm; 0 for a level without one, which is exact but for single precision.
     pub tolerance_mm: f64,
-    /// Radius of the dilating ball, in mm: required by `solidify` unless there is a wall, optional for `measure` (without
+    /// The level of a `solidify` that joins copies of a system's primitive instead of dilating its attractor.
+    pub level: Option<u32>,
+    /// Radius of the dilating ball, in mm: required by `solidify` unless there is a wall or a level, optional for `measure` (without
     /// it the shape itself is measured), for `intersect` and for `slice` (without it the inputs are solids themselves).
     pub radius_mm: Option<f64>,
     /// Of a `solidify`: gaps narrower than this are filled, in mm: the solid is closed with a ball of half the size.
@@ -93,8 +128,16 @@ pub struct Params {
     pub operation: Option<Operation>,
     /// What an `intersect` without an operation holds its one input against.
     pub with: Option<Primitive>,
+    /// Where an `intersect` trims its input.
+    pub plane: Option<CutPlane>,
+    /// How an `intersect` splits its input.
+    pub split: Option<Split>,
     /// The planes of a `slice`.
     pub planes: Option<Planes>,
+    /// Whether a `measure` finds the smallest box, whatever way it is turned.
+    pub oriented_box: bool,
+    /// Whether a `measure` finds the least walls and gaps.
+    pub thickness: bool,
     /// Density in g/cm^3, for the mass in a `measure`.
     pub density_g_cm3: Option<f64>,
     /// Whether an evaluation carries the normals of the limit surface into formats that have room for them.
@@ -111,12 +154,17 @@ impl Params {
     pub fn new(tolerance_mm: f64) -> Self {
         Self {
             tolerance_mm,
+            level: None,
             radius_mm: None,
             closing_mm: None,
             wall: None,
             operation: None,
             with: None,
+            plane: None,
+            split: None,
             planes: None,
+            oriented_box: false,
+            thickness: false,
             density_g_cm3: None,
             normals: false,
             simplify: true,

@@ -77,7 +77,7 @@ fn may_be_solid(attractor: &Attractor) -> bool {
 }
 
 /// Whether closed surfaces are all that there is.
-fn is_solid(attractor: &Attractor) -> bool {
+pub(crate) fn is_solid(attractor: &Attractor) -> bool {
     attractor.roots().iter().all(|root| root.solid.is_some()) && !attractor.solids().is_empty()
 }
 
@@ -156,7 +156,7 @@ fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
 }
 
 /// The closed surfaces of a shape, their vertices joined as the model has them.
-fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
+pub(crate) fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
     let mut meshes = Vec::with_capacity(attractor.solids().len());
     for surface in attractor.solids() {
         let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());

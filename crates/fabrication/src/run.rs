@@ -12,20 +12,33 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
+use crate::operand::{is_solid, surfaces};
+use crate::shape_measures::{least_thickness, no_solid, smallest_box};
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, Stack, boolean, certificate, contact, slice, solidify};
+use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, level, slice, solidify, split};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// A printable solid.
     Solid(Solid),
+    /// Printable solids that lie apart.
+    Parts(Vec<Part>),
     /// An evaluation.
     Tessellation(Tessellation),
     /// A solid and planes that cut it.
     Sections(Box<Stack>),
     /// Numbers only.
     None,
+}
+
+/// A solid and its name in files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Its name.
+    pub name: String,
+    /// Itself.
+    pub solid: Solid,
 }
 
 /// What a job made.
@@ -201,6 +214,9 @@ pub(crate) fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 /// # Errors
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
+    if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
+        return level::solidify(job, level, budget);
+    }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
         JobKind::Evaluate => evaluate(&lower(job, budget)?.attractor, tolerance, job.params.normals, budget),
@@ -208,11 +224,19 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         JobKind::Measure if job.inputs.len() > 1 => contact::compare(job, tolerance, budget),
         JobKind::Measure => measure(job, tolerance, budget),
         JobKind::Intersect => match job.params.operation {
+            Some(Operation::Split) => split::split(job, &split_of(job)?, tolerance, budget),
             Some(operation) => boolean::combine(job, operation, tolerance, budget),
             None => contact::contact(job, tolerance, budget),
         },
         JobKind::Slice => slice::slice(job, tolerance, budget),
     }
+}
+
+/// How a job splits its input.
+fn split_of(job: &Job) -> Result<Split, JobError> {
+    let missing =
+        || JobError::new(Kind::Invalid, "bad-parameter", "split needs volume_mm, the size that parts must fit, or cuts_mm".into());
+    job.params.split.clone().ok_or_else(missing)
 }
 
 fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
@@ -225,6 +249,14 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
         }
+        if job.params.oriented_box {
+            certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
+        }
+        if job.params.thickness {
+            let surfaces = if is_solid(attractor) { surfaces(attractor) } else { Vec::new() };
+            let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
+            certificate.thickness = Some(least_thickness(mesh, budget)?);
+        }
         return Ok(Outcome { geometry: Geometry::None, certificate });
     };
     let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
@@ -233,6 +265,12 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
     let difference = dilated_difference(volume(mesh), dilation.least_radius_mm, dilation.inner_mm, dilation.outer_mm);
     certificate.state_mass(mesh, difference, &dilation.bounds.grown(dilation.outer_mm), job.params.density_g_cm3);
     certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
+    if job.params.oriented_box {
+        certificate.oriented_box = smallest_box(attractor, radius.mm(), tolerance, budget)?;
+    }
+    if job.params.thickness {
+        certificate.thickness = Some(least_thickness(mesh, budget)?);
+    }
     Ok(Outcome { geometry: Geometry::None, certificate })
 }
 
@@ -334,8 +372,12 @@ const BYTES_PER_CELL: f64 = 64.0;
 /// # Errors
 /// As [`run`], for what shows before the work.
 pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
+    if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
+        return level::plan(job, level, budget);
+    }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
+        JobKind::Intersect if job.params.operation == Some(Operation::Split) => return split::plan(job, tolerance, budget),
         JobKind::Intersect if job.params.operation.is_some() => return boolean::plan(job, tolerance, budget),
         JobKind::Slice => return slice::plan(job, tolerance, budget),
         // Nothing is made, and what a search costs shows in the search.

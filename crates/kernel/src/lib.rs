@@ -7,6 +7,7 @@ pub mod budget;
 pub mod dilation;
 pub mod error;
 mod groups;
+pub mod levels;
 pub mod measure;
 pub mod model;
 pub mod solid;

@@ -3,7 +3,9 @@
 
 mod orders;
 
-pub(super) use orders::{ADDRESS_QUESTION, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, OPERATIONS, SOLVE, WALL_SIDES, WITH};
+pub(super) use orders::{
+    ADDRESS_QUESTION, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, MOST_LEVEL, OPERATIONS, SOLVE, WALL_SIDES, WITH,
+};
 use serde_json::{Value, json};
 
 use super::join::SIDES;

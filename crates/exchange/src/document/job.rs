@@ -4,12 +4,12 @@ use std::collections::HashSet;
 
 use glam::DVec3;
 
-use lacuna_fabrication::job::{Input, Job, JobKind, Operation, Params, Planes, WallOrder, WallSide};
+use lacuna_fabrication::job::{CutPlane, Input, Job, JobKind, Operation, Params, Planes, Split, SplitKey, WallOrder, WallSide};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::measure::contact::Primitive;
 use lacuna_kernel::model::Model;
 
-use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, OPERATIONS, WALL_SIDES};
+use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, MOST_LEVEL, OPERATIONS, WALL_SIDES};
 use super::model::{model, version};
 use super::node::{Place, quoted};
 use super::walk::{Members, Walker, length, suggestion};
@@ -183,7 +183,10 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
     let (count, Params { operation, with, .. }) = (document.inputs.len(), &document.params);
     let place = members.get("inputs").unwrap_or(members.place);
     let wanted = match (document.kind, operation, with) {
-        (JobKind::Intersect, Some(operation), _) if count < 2 && *operation != Operation::Hull => Some("two or more for an operation"),
+        (JobKind::Intersect, Some(Operation::Trim | Operation::Split), _) if count != 1 => Some("one to be cut"),
+        (JobKind::Intersect, Some(Operation::Union | Operation::Intersection | Operation::Difference), _) if count < 2 => {
+            Some("two or more for an operation")
+        }
         (JobKind::Intersect, None, None) if count != 2 => {
             Some("two to be held against each other; three or more need an \"operation\", one a \"with\"")
         }
@@ -206,11 +209,16 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
         walker.fault(&place, code::CONFLICTING_MEMBERS, || "a comparison delivers numbers and no files; remove \"outputs\"".into());
         return None;
     }
-    let Params { radius_mm, density_g_cm3, .. } = document.params;
-    if radius_mm.is_some() || density_g_cm3.is_some() || document.inputs.iter().any(|input| input.radius_mm.is_some()) {
+    let Params { radius_mm, density_g_cm3, oriented_box, thickness, .. } = document.params;
+    if oriented_box
+        || thickness
+        || radius_mm.is_some()
+        || density_g_cm3.is_some()
+        || document.inputs.iter().any(|input| input.radius_mm.is_some())
+    {
         let place = members.get("params").unwrap_or(members.place);
         walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-            "shapes are compared as they are: remove \"radius_mm\" and \"density_g_cm3\", or ask for an \"operation\"".into()
+            "shapes are compared as they are: remove \"radius_mm\", \"density_g_cm3\", \"oriented_box\" and \"thickness\", or ask for an \"operation\"".into()
         });
         return None;
     }
@@ -320,12 +328,23 @@ pub(super) fn source(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<I
 
 fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> Option<Params> {
     let members = walker.object(place, &JOB_PARAMS)?;
-    let tolerance = members.get("tolerance_mm").and_then(|place| walker.positive(place, "a tolerance in mm"));
+    let level = level(walker, &members, kind)?;
+    let tolerance = match members.get("tolerance_mm") {
+        Some(place) => walker.positive(place, "a tolerance in mm"),
+        // A level is exact but for the files' precision.
+        None if level.is_some() => Some(0.0),
+        None => {
+            walker.fault(&place, code::MISSING_MEMBER, || {
+                "params needs the member \"tolerance_mm\": the Hausdorff bound on the result, in mm, above zero".into()
+            });
+            None
+        }
+    };
     let radius = members.get("radius_mm").map(|place| walker.positive(place, "a radius in mm"));
     match (kind, members.get("radius_mm")) {
-        (Some(JobKind::Solidify), None) if !members.has("wall_mm") => {
+        (Some(JobKind::Solidify), None) if level.is_none() && !members.has("wall_mm") => {
             walker.fault(&place, code::MISSING_MEMBER, || {
-                "solidify needs the member \"radius_mm\", the radius of the dilating ball in mm, or \"wall_mm\", the thickness of a wall along a closed surface".into()
+                "solidify needs the member \"radius_mm\", the radius of the dilating ball in mm, or \"wall_mm\", the thickness of a wall along a closed surface, or for an ifs \"level\"".into()
             });
             return None;
         }
@@ -342,22 +361,32 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         None => None,
     };
     let (operation, with) = operation(walker, &members, kind)?;
+    let (plane, split) = cutting(walker, &members, kind, operation)?;
     let density = owned(walker, &members, kind, "density_g_cm3", (JobKind::Measure, "measure"))?;
     let density_g_cm3 = stated(density.map(|place| walker.positive(place, "a density in g/cm3")))?;
     let planes = planes(walker, &members, kind)?;
+    let measured = (JobKind::Measure, "measure");
+    let oriented_box = flag_of(walker, &members, kind, "oriented_box", measured, false)?;
+    let thickness = flag_of(walker, &members, kind, "thickness", measured, false)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
+    let tolerance_mm = tolerance?;
     let closing_mm = closing(walker, &members, kind, stability)?;
     let wall = wall(walker, &members, kind)?;
     Some(Params {
-        tolerance_mm: tolerance?,
+        tolerance_mm,
+        level,
         radius_mm,
         closing_mm,
         wall,
         operation,
         with,
+        plane,
+        split,
         planes,
+        oriented_box,
+        thickness,
         density_g_cm3,
         normals,
         simplify,
@@ -396,6 +425,118 @@ fn wall(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -
             Some(Some(WallOrder { thickness_mm: thickness?, side: side? }))
         }
     }
+}
+
+/// The level, which stands instead of what a dilation takes.
+#[allow(clippy::option_option)]
+fn level(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<Option<u32>> {
+    let Some(place) = owned(walker, members, kind, "level", (JobKind::Solidify, "solidify"))? else { return Some(None) };
+    let mut legal = true;
+    for name in ["radius_mm", "closing_mm", "wall_mm", "side", "simplify", "stability"] {
+        if let Some(conflict) = members.get(name) {
+            walker.fault(&conflict, code::CONFLICTING_MEMBERS, || {
+                format!("a level joins copies and dilates nothing: \"{name}\" does not go with \"level\"; keep one of them")
+            });
+            legal = false;
+        }
+    }
+    let number = walker.integer(place, "the level of copies")?;
+    if number > MOST_LEVEL {
+        walker.fault(&place, code::INDEX_OUT_OF_RANGE, || format!("is {number}; expected {MOST_LEVEL} at most"));
+        return None;
+    }
+    legal.then_some(Some(number as u32))
+}
+
+/// The plane of a trim, and how a split is made: each operation takes its own, and no other takes any.
+#[allow(clippy::type_complexity)]
+fn cutting(
+    walker: &mut Walker<'_>,
+    members: &Members<'_>,
+    kind: Option<JobKind>,
+    operation: Option<Operation>,
+) -> Option<(Option<CutPlane>, Option<Split>)> {
+    let mut legal = true;
+    for (name, owner, word) in [
+        ("plane", Operation::Trim, "trim"),
+        ("volume_mm", Operation::Split, "split"),
+        ("cuts_mm", Operation::Split, "split"),
+        ("key_mm", Operation::Split, "split"),
+        ("clearance_mm", Operation::Split, "split"),
+    ] {
+        let Some(place) = owned(walker, members, kind, name, (JobKind::Intersect, "intersect")) else {
+            legal = false;
+            continue;
+        };
+        if let Some(place) = place.filter(|_| operation != Some(owner)) {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+                format!("only the operation \"{word}\" takes \"{name}\"; remove it, or ask for that operation")
+            });
+            legal = false;
+        }
+    }
+    if !legal {
+        return None;
+    }
+    match operation {
+        Some(Operation::Trim) => Some((Some(cut_plane(walker, members)?), None)),
+        Some(Operation::Split) => Some((None, Some(split(walker, members)?))),
+        _ => Some((None, None)),
+    }
+}
+
+fn cut_plane(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<CutPlane> {
+    let Some(place) = members.get("plane") else {
+        walker.fault(&members.place, code::MISSING_MEMBER, || "trim needs the member \"plane\": a normal and an offset in mm".into());
+        return None;
+    };
+    let [x, y, z, offset_mm] = walker.numbers(place, "the three numbers of a normal, and an offset in mm")?;
+    let normal = DVec3::new(x, y, z);
+    if normal == DVec3::ZERO {
+        walker.fault(&place, code::NOT_POSITIVE, || "has a normal without length; expected the direction of what is taken away".into());
+        return None;
+    }
+    Some(CutPlane { normal, offset_mm })
+}
+
+fn split(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Split> {
+    if !members.has("volume_mm") && !members.has("cuts_mm") {
+        walker.fault(&members.place, code::MISSING_MEMBER, || {
+            "split needs the member \"volume_mm\", the size that every part fits, or \"cuts_mm\", where to cut across x, y and z".into()
+        });
+        return None;
+    }
+    let volume = members.get("volume_mm").map(|place| {
+        let volume: [f64; 3] = walker.numbers(place, "three lengths in mm")?;
+        if volume.iter().any(|length| *length <= 0.0) {
+            walker.fault(&place, code::NOT_POSITIVE, || "has a length that is not above zero; expected a build volume in mm".into());
+            return None;
+        }
+        Some(volume)
+    });
+    let cuts = members.get("cuts_mm").map_or(Some(Default::default()), |place| {
+        const EXPECTED: &str = "three arrays of offsets in mm: across x, y and z";
+        let arrays = walker
+            .each(place, EXPECTED, |walker, place| walker.each(place, "an array of offsets in mm", |walker, place| walker.number(place)))?;
+        let found = arrays.len();
+        <[Vec<f64>; 3]>::try_from(arrays).ok().or_else(|| walker.wrong_length(&place, found, EXPECTED))
+    });
+    let key = match (members.get("key_mm"), members.get("clearance_mm")) {
+        (None, None) => Some(None),
+        (Some(width), Some(clearance)) => {
+            let width_mm = walker.positive(width, "the width of a key in mm");
+            let clearance_mm = walker.number(clearance).filter(|x| *x >= 0.0).or_else(|| {
+                walker.fault(&clearance, code::NOT_POSITIVE, || "is no clearance; expected a length in mm, or 0".into());
+                None
+            });
+            Some(Some(SplitKey { width_mm: width_mm?, clearance_mm: clearance_mm? }))
+        }
+        (Some(place), None) | (None, Some(place)) => {
+            walker.fault(&place, code::MISSING_MEMBER, || "keys need both \"key_mm\", their width, and \"clearance_mm\"".into());
+            None
+        }
+    };
+    Some(Split { volume_mm: stated(volume)?, cuts_mm: cuts?, key: key? })
 }
 
 /// The operation and the primitive, which intersect alone takes, and of which one rules out the other.

@@ -156,9 +156,17 @@ fn job() -> Value {
     let kind =
         |word: &str, then: Value| json!({ "if": { "properties": { "kind": { "const": word } }, "required": ["kind"] }, "then": then });
     schema["allOf"] = json!([
+        { "if": { "properties": { "params": { "required": ["level"] } } }, "else": { "properties": { "params": { "required": ["tolerance_mm"] } } } },
         kind(
             "solidify",
-            json!({ "properties": { "params": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["wall_mm"] }], "not": { "required": ["normals"] } } } })
+            json!({ "properties": { "params": {
+                "anyOf": [{ "required": ["radius_mm"] }, { "required": ["wall_mm"] }, { "required": ["level"] }],
+                "not": { "required": ["normals"] },
+                "dependentSchemas": { "level": { "not": { "anyOf": [
+                    { "required": ["radius_mm"] }, { "required": ["closing_mm"] }, { "required": ["wall_mm"] }, { "required": ["simplify"] },
+                    { "required": ["stability"] }
+                ] } } },
+            } } })
         ),
         kind(
             "evaluate",

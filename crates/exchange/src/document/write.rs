@@ -275,16 +275,24 @@ object! {
         .put("model", &Wire(&input.model))?
         .put_some("radius_mm", input.radius_mm.map(Number).as_ref())?;
     lacuna_fabrication::job::Params: |params, members| members
-        .put("tolerance_mm", &Number(params.tolerance_mm))?
+        .put_if(params.level.is_none() || params.tolerance_mm > 0.0, "tolerance_mm", &Number(params.tolerance_mm))?
+        .put_some("level", params.level.as_ref())?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
         .put_some("closing_mm", params.closing_mm.map(Number).as_ref())?
         .put_some("wall_mm", params.wall.map(|wall| Number(wall.thickness_mm)).as_ref())?
         .put_some("side", params.wall.map(|wall| wall.side).as_ref())?
         .put_some("operation", params.operation.as_ref())?
         .put_some("with", params.with.as_ref().map(with).as_ref())?
+        .put_some("plane", params.plane.map(|plane| plane.normal.extend(plane.offset_mm).to_array().map(Number)).as_ref())?
+        .put_some("volume_mm", params.split.as_ref().and_then(|split| split.volume_mm).map(|volume| volume.map(Number)).as_ref())?
+        .put_some("cuts_mm", params.split.as_ref().filter(|split| split.cuts_mm.iter().any(|cuts| !cuts.is_empty())).map(|split| split.cuts_mm.each_ref().map(|cuts| cuts.iter().copied().map(Number).collect::<Vec<_>>())).as_ref())?
+        .put_some("key_mm", params.split.as_ref().and_then(|split| split.key).map(|key| Number(key.width_mm)).as_ref())?
+        .put_some("clearance_mm", params.split.as_ref().and_then(|split| split.key).map(|key| Number(key.clearance_mm)).as_ref())?
         .put_some("normal", params.planes.as_ref().map(|planes| planes.normal.to_array().map(Number)).as_ref())?
         .put_some("offsets_mm", params.planes.as_ref().filter(|planes| planes.step_mm.is_none()).map(|planes| planes.offsets_mm.iter().copied().map(Number).collect::<Vec<_>>()).as_ref())?
         .put_some("step_mm", params.planes.as_ref().and_then(|planes| planes.step_mm).map(Number).as_ref())?
+        .put_if(params.oriented_box, "oriented_box", &true)?
+        .put_if(params.thickness, "thickness", &true)?
         .put_some("density_g_cm3", params.density_g_cm3.map(Number).as_ref())?
         .put_if(params.normals, "normals", &true)?
         .put_if(!params.simplify, "simplify", &false)?

@@ -4,14 +4,20 @@ pub mod bounds;
 pub mod contact;
 pub mod dimension;
 pub mod hausdorff;
+pub mod inside;
 pub mod mass;
+pub mod oriented_box;
 pub mod section;
+pub mod thickness;
 pub mod triangle;
 
 pub use bounds::{AxisBox, bounding_box, extent_along};
 pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};
+pub use inside::{Inside, first_inside};
+pub use oriented_box::{OrientedBox, oriented_box};
+pub use thickness::{Side, Thickness, thickness};
 
 /// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,20 +6,20 @@ use robust::{Coord, Coord3D, orient2d, orient3d};
 
 /// The sign of the volume of (a, b, c, d), as a number.
 #[inline]
-fn side(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
+pub(crate) fn side(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     let coordinates = |p: &Point| Coord3D { x: p[0], y: p[1], z: p[2] };
     orient3d(coordinates(a), coordinates(b), coordinates(c), coordinates(d))
 }
 
 /// The sign of the area of (a, b, c) seen along an axis.
 #[inline]
-fn turn(axis: usize, a: &Point, b: &Point, c: &Point) -> f64 {
+pub(crate) fn turn(axis: usize, a: &Point, b: &Point, c: &Point) -> f64 {
     let coordinates = |p: &Point| Coord { x: p[(axis + 1) % 3], y: p[(axis + 2) % 3] };
     orient2d(coordinates(a), coordinates(b), coordinates(c))
 }
 
 /// An axis along which a triangle is seen with area: projecting its plane along it loses nothing. `None` for a triangle without area.
-fn view(triangle: &[Point; 3]) -> Option<usize> {
+pub(crate) fn view(triangle: &[Point; 3]) -> Option<usize> {
     (0..3).find(|&axis| turn(axis, &triangle[0], &triangle[1], &triangle[2]) != 0.0)
 }
 

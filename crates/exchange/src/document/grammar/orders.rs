@@ -6,16 +6,21 @@ use lacuna_fabrication::job::{Operation, WallSide};
 
 use super::super::address::{CELLS_LISTED, MOST_CELLS_LISTED};
 use super::{
-    MODEL, Member, Object, count, flag, list, number, one_of_words, optional, positive, reference, required, text, vector, version,
+    MODEL, Member, Object, count, flag, list, number, one_of_words, optional, positive, reference, required, text, tuple, vector, version,
 };
 use crate::format::FORMATS;
 
+/// Levels beyond this have more copies than could ever be held, unless there is but one map.
+pub(in super::super) const MOST_LEVEL: u64 = 64;
+
 /// Operations by their words.
-pub(in super::super) const OPERATIONS: [(&str, Operation); 4] = [
+pub(in super::super) const OPERATIONS: [(&str, Operation); 6] = [
     ("union", Operation::Union),
     ("intersection", Operation::Intersection),
     ("difference", Operation::Difference),
     ("hull", Operation::Hull),
+    ("trim", Operation::Trim),
+    ("split", Operation::Split),
 ];
 
 /// Sides of walls by their words.
@@ -35,7 +40,7 @@ pub(in super::super) const JOB: Object = Object {
         required("lacuna", "The version of the grammar: 1.", version),
         required(
             "kind",
-            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), or slice (plane sections of a solid).",
+            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball, or a level of an ifs), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), or slice (plane sections of a solid).",
             || one_of_words(&["evaluate", "solidify", "measure", "intersect", "slice"]),
         ),
         SOURCE[0],
@@ -106,10 +111,19 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
     title: "params",
     about: "Settings of a job. What a kind does not use must be absent.",
     members: &[
-        required("tolerance_mm", "The Hausdorff bound on the result, in mm, above zero.", positive),
+        optional(
+            "tolerance_mm",
+            "The Hausdorff bound on the result, in mm, above zero. Required but with level, which is exact but for the single precision of the files.",
+            positive,
+        ),
+        optional(
+            "level",
+            "For solidify of a model of the family ifs, instead of radius_mm: the union of all copies of the primitive along addresses of this length, as an exact solid; the primitive is the model's solid, or else the box of its attractor.",
+            || json!({ "type": "integer", "minimum": 0, "maximum": MOST_LEVEL }),
+        ),
         optional(
             "radius_mm",
-            "The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm is there, optional for measure, intersect and slice, absent for evaluate.",
+            "The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate.",
             positive,
         ),
         optional(
@@ -129,12 +143,37 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         ),
         optional(
             "operation",
-            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), in the first and in none of the others (difference), or their convex hull (hull). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file.",
+            "What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), in the first and in none of the others (difference), or their convex hull (hull); of one input, what lies behind a plane (trim), or its parts between planes (split). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file.",
             || one_of_words(&OPERATIONS.map(|(word, _)| word)),
         ),
         optional("with", "What the one input of intersect is held against, where there is neither a second one nor an operation.", || {
             reference("With")
         }),
+        optional(
+            "plane",
+            "For trim: the normal of a plane, of any length, and its distance from the origin along that, in mm. What the normal points to is taken away.",
+            numbers!(4),
+        ),
+        optional(
+            "volume_mm",
+            "For split: the build volume along x, y and z, in mm, which every part fits; along axes without cuts of their own the job cuts as rarely as it can.",
+            || tuple(positive(), 3),
+        ),
+        optional(
+            "cuts_mm",
+            "For split: where to cut across x, y and z, in mm: three arrays, empty where the volume tells or nothing is cut.",
+            || tuple(list(number(), 0), 3),
+        ),
+        optional(
+            "key_mm",
+            "For split: the width and length of pegs that stand in sockets of the neighbouring parts, in mm; walls are half of that. No keys when absent.",
+            positive,
+        ),
+        optional(
+            "clearance_mm",
+            "For split, with key_mm and only with it: the distance between the faces of a peg and of its socket, in mm.",
+            || json!({ "type": "number", "minimum": 0 }),
+        ),
         optional("normal", "What the planes of slice are perpendicular to, of any length; [0, 0, 1] when absent.", vector),
         optional(
             "offsets_mm",
@@ -145,6 +184,16 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             "step_mm",
             "The height of layers, in mm, above zero: planes of slice are in their middles, from the bottom of the solid to its top.",
             positive,
+        ),
+        optional(
+            "oriented_box",
+            "Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent.",
+            flag,
+        ),
+        optional(
+            "thickness",
+            "Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent.",
+            flag,
         ),
         optional("density_g_cm3", "The density of the material, in g/cm3, above zero, for the mass: for measure alone.", positive),
         optional(

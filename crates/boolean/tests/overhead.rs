@@ -1,0 +1,71 @@
+//! What the door costs beside calling Manifold directly: a measurement that prints its figures.
+//!
+//! `cargo test --release -p lacuna-boolean --test overhead -- --ignored --nocapture`
+
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
+
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use lacuna_boolean::{BooleanEngine, ManifoldRust, Operation};
+use lacuna_kernel::budget::CancelToken;
+use lacuna_kernel::solid::TriMesh;
+use manifold_rust::manifold::Manifold;
+use manifold_rust::types::MeshGLP;
+
+/// A wavy torus of `steps` times `steps` quadrilaterals around an axis of z through a point.
+fn torus(steps: u32, at: DVec3) -> TriMesh {
+    let angle = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(steps);
+    let point = |i: u32, j: u32| {
+        let (s, c) = angle(j).sin_cos();
+        let ring = 30.0 + (10.0 + (7.0 * angle(i)).sin()) * c;
+        at + DVec3::new(ring * angle(i).cos(), ring * angle(i).sin(), 10.0 * s)
+    };
+    let number = |i: u32, j: u32| (i % steps) * steps + j % steps;
+    let cells = || (0..steps).flat_map(move |i| (0..steps).map(move |j| (i, j)));
+    let halves = |(i, j)| [[number(i, j), number(i + 1, j), number(i + 1, j + 1)], [number(i, j), number(i + 1, j + 1), number(i, j + 1)]];
+    TriMesh { vertices: cells().map(|(i, j)| point(i, j)).collect(), triangles: cells().flat_map(halves).collect() }
+}
+
+/// The same union without the door: import, union, export.
+fn directly(one: &TriMesh, other: &TriMesh) -> usize {
+    let import = |mesh: &TriMesh| {
+        Manifold::from_mesh_glp(&MeshGLP::<f64, u32> {
+            num_prop: 3,
+            vert_properties: mesh.vertices.iter().flat_map(|p| p.to_array()).collect(),
+            tri_verts: mesh.triangles.as_flattened().to_vec(),
+            ..MeshGLP::default()
+        })
+    };
+    import(one).union(&import(other)).get_mesh_glp::<f64, u32>(-1).tri_verts.len() / 3
+}
+
+/// The least of some runs: what others do at the same time only adds.
+fn least(mut work: impl FnMut() -> usize) -> (Duration, usize) {
+    (0..7)
+        .map(|_| {
+            let start = Instant::now();
+            let triangles = work();
+            (start.elapsed(), triangles)
+        })
+        .min()
+        .unwrap()
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn the_door_beside_manifold() {
+    for steps in [100, 300] {
+        let (one, other) = (torus(steps, DVec3::ZERO), torus(steps, DVec3::new(13.0, 7.0, 3.0)));
+        let (direct, expected) = least(|| directly(&one, &other));
+        let through = || ManifoldRust.combine(Operation::Union, &[&one, &other], &CancelToken::new()).unwrap().triangles.len();
+        let (door, triangles) = least(through);
+        assert_eq!(triangles, expected);
+        let share = 100.0 * (door.as_secs_f64() / direct.as_secs_f64() - 1.0);
+        println!(
+            "{} + {} triangles to {triangles}: directly {direct:?}, through the door {door:?}, {share:+.1} %",
+            one.triangles.len(),
+            other.triangles.len()
+        );
+    }
+}

@@ -1,0 +1,119 @@
+//! Measures of a shape that are made when they are asked for: its smallest box, and the thickness of walls and gaps.
+
+use lacuna_kernel::attractor::{Attractor, RefineError, refine};
+use lacuna_kernel::budget::{Budget, Limits};
+use lacuna_kernel::error::Kind;
+use lacuna_kernel::measure::mass::mesh_of;
+use lacuna_kernel::measure::{Side, oriented_box, thickness};
+use lacuna_kernel::solid::{Crossings, TriMesh};
+use lacuna_kernel::tolerance::Tolerance;
+
+use crate::certificate::Interval;
+use crate::run::JobError;
+
+/// The smallest box around the exact shape, whatever way it is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct OrientedBoxStatement {
+    /// Unit vectors along the edges of a box that holds the shape.
+    pub axes: [[f64; 3]; 3],
+    /// Its middle.
+    pub centre_mm: [f64; 3],
+    /// Its edges.
+    pub sizes_mm: [f64; 3],
+    /// The volume of the smallest box lies between; the upper end is the volume of this one.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub volume_mm3: Interval,
+    /// Whether the bounds are within a thousandth of each other, and what the tolerance takes.
+    pub complete: bool,
+}
+
+/// A least thickness, and where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct LeastThicknessStatement {
+    /// The thickness.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub least_mm: Interval,
+    /// A point of a face, and the one across.
+    pub between_mm: [[f64; 3]; 2],
+}
+
+/// Least thickness along the normals of the mesh that is measured, between faces without a common corner: at edges sharper than a right angle every wall ends
+/// in nothing. For a dilation the mesh is the one that would be written, without simplification.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct ThicknessStatement {
+    /// Of walls, through the material; absent where no face lies across another.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub wall: Option<LeastThicknessStatement>,
+    /// Of gaps, through the air.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub gap: Option<LeastThicknessStatement>,
+}
+
+/// Bounds of the smallest box differ by this share of it.
+const RELATIVE: f64 = 1e-3;
+/// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
+const MOST_CELLS: u64 = 300_000;
+
+/// The smallest box of a shape dilated by a radius, 0 for the shape itself.
+pub(crate) fn smallest_box(
+    attractor: &Attractor,
+    radius_mm: f64,
+    tolerance: Tolerance,
+    budget: &Budget,
+) -> Result<Option<OrientedBoxStatement>, JobError> {
+    let (points, slack) = match mesh_of(attractor) {
+        Some((mesh, _)) => (mesh.vertices, 0.0),
+        None => sampled(attractor, tolerance, budget)?,
+    };
+    let found = oriented_box(&points, 2.0 * radius_mm, slack, RELATIVE, budget)?;
+    Ok(found.map(|found| OrientedBoxStatement {
+        axes: found.axes.map(|axis| axis.to_array()),
+        centre_mm: found.centre.to_array(),
+        sizes_mm: found.sizes,
+        volume_mm3: [found.volume.low, found.volume.high],
+        complete: found.complete,
+    }))
+}
+
+/// Points of a shape, and how far it and they are from each other.
+fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(Vec<glam::DVec3>, f64), JobError> {
+    let limits = Limits { cells: MOST_CELLS.min(budget.limits.cells), ..budget.limits };
+    let few = Budget { limits, progress: None, ..budget.clone() };
+    let mut coarse = tolerance.mm();
+    loop {
+        match refine(attractor, Tolerance::new(coarse)?, &few) {
+            Ok(sample) => return Ok((sample.vertices, sample.deviation_mm)),
+            Err(RefineError::Cells { .. } | RefineError::Memory { .. }) => coarse *= 2.0,
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+/// Least walls and gaps of a closed mesh.
+pub(crate) fn least_thickness(mesh: &TriMesh, budget: &Budget) -> Result<ThicknessStatement, JobError> {
+    let crossings = Crossings::of(mesh, budget)?.count;
+    if crossings > 0 {
+        let message = format!("{crossings} pairs of faces of the solid meet where they are not joined: its walls have no thickness there");
+        return Err(JobError::new(Kind::Unreachable, "thickness.crossings", message));
+    }
+    let of = |side: Side| -> Result<Option<LeastThicknessStatement>, JobError> {
+        let found = thickness(mesh, side, budget)?;
+        Ok(found.map(|found| LeastThicknessStatement {
+            least_mm: [found.least.low, found.least.high],
+            between_mm: found.between.map(|point| point.to_array()),
+        }))
+    };
+    Ok(ThicknessStatement { wall: of(Side::Wall)?, gap: of(Side::Gap)? })
+}
+
+/// The shape has no walls.
+pub(crate) fn no_solid() -> JobError {
+    let message = "only solids have walls and gaps: the shape is not one closed surface; give \"radius_mm\", and its dilation is measured";
+    JobError::new(Kind::Invalid, "job.not-a-solid", message.into())
+}

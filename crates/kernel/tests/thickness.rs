@@ -1,0 +1,172 @@
+//! Walls and gaps: closed forms, and random solids against rays.
+
+#![allow(clippy::unwrap_used)]
+
+#[allow(dead_code)] // each test file uses a part
+mod oracle;
+
+use glam::{DMat3, DVec3};
+use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
+use lacuna_kernel::measure::{Side, Thickness, thickness};
+use lacuna_kernel::solid::TriMesh;
+use oracle::Random;
+
+fn cuboid(low: DVec3, high: DVec3) -> TriMesh {
+    let ends = [low, high];
+    let corner = |code: usize| DVec3::from_array(std::array::from_fn(|axis| ends[code >> axis & 1][axis]));
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriMesh { vertices: (0..8).map(corner).collect(), triangles }
+}
+
+fn joined(meshes: &[TriMesh]) -> TriMesh {
+    let mut all = TriMesh::default();
+    for mesh in meshes {
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(&mesh.vertices);
+        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|corner| corner + first)));
+    }
+    all
+}
+
+fn turned_inside_out(mut mesh: TriMesh) -> TriMesh {
+    mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    mesh
+}
+
+/// Points of latitude and longitude on a sphere.
+fn sphere(radius: f64, rings: u32, sectors: u32) -> TriMesh {
+    let mut mesh = TriMesh { vertices: vec![DVec3::Z * radius, -DVec3::Z * radius], triangles: Vec::new() };
+    let at = |ring: u32, sector: u32| 2 + ring * sectors + sector % sectors;
+    for ring in 0..rings {
+        let polar = std::f64::consts::PI * f64::from(ring + 1) / f64::from(rings + 1);
+        for sector in 0..sectors {
+            let angle = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors);
+            mesh.vertices.push(radius * DVec3::new(polar.sin() * angle.cos(), polar.sin() * angle.sin(), polar.cos()));
+        }
+    }
+    for sector in 0..sectors {
+        mesh.triangles.push([0, at(0, sector), at(0, sector + 1)]);
+        mesh.triangles.push([1, at(rings - 1, sector + 1), at(rings - 1, sector)]);
+        for ring in 0..rings - 1 {
+            mesh.triangles.push([at(ring, sector), at(ring + 1, sector), at(ring + 1, sector + 1)]);
+            mesh.triangles.push([at(ring, sector), at(ring + 1, sector + 1), at(ring, sector + 1)]);
+        }
+    }
+    mesh
+}
+
+fn least(mesh: &TriMesh, side: Side) -> Option<Thickness> {
+    thickness(mesh, side, &Budget::default()).unwrap()
+}
+
+#[track_caller]
+fn assert_is(found: Option<Thickness>, exact: f64) {
+    let found = found.unwrap();
+    assert!(found.least.low <= exact && exact <= found.least.high && found.least.width() < 1e-9, "{exact}: {found:?}");
+    assert!((found.between[0].distance(found.between[1]) - exact).abs() < 1e-9, "{found:?}");
+}
+
+#[test]
+fn slabs_and_plates() {
+    let slab = cuboid(DVec3::new(-5.0, 2.0, 1.0), DVec3::new(45.0, 32.0, 1.75));
+    assert_is(least(&slab, Side::Wall), 0.75);
+    assert_eq!(least(&slab, Side::Gap), None);
+    // Turned, rounding is all that is lost.
+    let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.8);
+    let turned = TriMesh { vertices: slab.vertices.iter().map(|p| turn * *p).collect(), ..slab };
+    assert_is(least(&turned, Side::Wall), 0.75);
+    // Two plates of 2 and 3 at a gap of 0.3, the second beside most of the first.
+    let plates =
+        joined(&[cuboid(DVec3::ZERO, DVec3::new(10.0, 10.0, 2.0)), cuboid(DVec3::new(9.0, 0.0, 2.3), DVec3::new(20.0, 10.0, 5.3))]);
+    assert_is(least(&plates, Side::Wall), 2.0);
+    assert_is(least(&plates, Side::Gap), 0.3);
+    // Side by side without anything of one over the other: no gap along normals.
+    let apart = joined(&[cuboid(DVec3::ZERO, DVec3::ONE), cuboid(DVec3::new(1.5, 1.5, 1.5), DVec3::splat(2.5))]);
+    assert_eq!(least(&apart, Side::Gap), None);
+}
+
+#[test]
+fn wedges_are_thinnest_where_faces_without_a_common_corner_are() {
+    // A lid over a box at a slope: z from 1 at x = 0 to 3 at x = 10, thinnest at the low end, seen from the bottom along z and from the lid along its normal.
+    let mut wedge = cuboid(DVec3::ZERO, DVec3::new(10.0, 4.0, 1.0));
+    for vertex in &mut wedge.vertices {
+        if vertex.z > 0.5 {
+            vertex.z = 1.0 + 0.2 * vertex.x;
+        }
+    }
+    // From the bottom the way is 1 at x = 0. From the lid the normal leans away from x = 0: through (x, 1 + x / 5) it meets the bottom after sqrt(1.04) (1 + x / 5).
+    assert_is(least(&wedge, Side::Wall), 1.0);
+}
+
+#[test]
+fn balls_and_shells() {
+    let ball = sphere(5.0, 23, 48);
+    let found = least(&ball, Side::Wall).unwrap();
+    // Faces of the polyhedron across each other are at most the diameter apart, and not much less.
+    assert!(found.least.high <= 10.0 && found.least.low >= 9.9, "{found:?}");
+    assert_eq!(least(&ball, Side::Gap), None);
+    let shell = joined(&[sphere(5.0, 47, 96), turned_inside_out(sphere(4.0, 47, 96))]);
+    let found = least(&shell, Side::Wall).unwrap();
+    // The outer polyhedron is within the outer sphere by 5 (1 - cos(pi / 96)^2) at most.
+    assert!(found.least.high <= 1.0 && found.least.low >= 1.0 - 0.011, "{found:?}");
+    // Through the hollow: its diameter.
+    let found = least(&shell, Side::Gap).unwrap();
+    assert!(found.least.high <= 8.0 && found.least.low >= 7.97, "{found:?}");
+}
+
+#[test]
+fn a_search_ends_when_it_is_stopped() {
+    let cancel = CancelToken::new();
+    cancel.fire(StopReason::Cancelled);
+    assert!(thickness(&sphere(1.0, 20, 20), Side::Wall, &Budget { cancel, ..Budget::default() }).is_err());
+}
+
+/// The distance along a ray to a triangle (Moeller and Trumbore, 1997).
+fn hit(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let (p, q) = (b - a, c - a);
+    let across = direction.cross(q);
+    let determinant = p.dot(across);
+    if determinant.abs() < 1e-12 {
+        return None;
+    }
+    let from = origin - a;
+    let u = from.dot(across) / determinant;
+    let turned = from.cross(p);
+    let v = direction.dot(turned) / determinant;
+    let t = q.dot(turned) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 1e-9).then_some(t)
+}
+
+/// No ray along a normal is shorter than the least thickness.
+#[test]
+fn no_ray_is_shorter() {
+    let mut random = Random(17);
+    for _ in 0..32 {
+        // A star-shaped lump, and the same one turned beside it: faces do not cross.
+        let mut lump = sphere(1.0, 12, 14);
+        for vertex in lump.vertices.iter_mut().skip(2) {
+            *vertex *= 0.5 + random.unit();
+        }
+        let gap = 0.05 + 0.45 * random.unit();
+        let moved = TriMesh { vertices: lump.vertices.iter().map(|p| DVec3::new(3.0 + gap - p.x, -p.y, p.z)).collect(), ..lump.clone() };
+        let mesh = joined(&[lump, moved]);
+        for side in [Side::Wall, Side::Gap] {
+            let found = least(&mesh, side);
+            for own in &mesh.triangles {
+                let [a, b, c] = own.map(|corner| mesh.vertices[corner as usize]);
+                let normal = (b - a).cross(c - a).normalize();
+                let direction = if side == Side::Wall { -normal } else { normal };
+                let (s, t) = (random.unit(), random.unit());
+                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+                let origin = a + (b - a) * s + (c - a) * t;
+                for other in mesh.triangles.iter().filter(|other| !other.iter().any(|corner| own.contains(corner))) {
+                    if let Some(length) = hit(origin, direction, other.map(|corner| mesh.vertices[corner as usize])) {
+                        let least = found.map_or(f64::INFINITY, |found| found.least.low);
+                        assert!(length >= least - 1e-9, "{side:?}: a ray of {length} is shorter than {least}");
+                    }
+                }
+            }
+        }
+    }
+}
