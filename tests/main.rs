@@ -12,6 +12,7 @@
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `service` | does the running service keep them? |
+//! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |
 
@@ -29,3 +30,4 @@ mod measures;
 mod properties;
 mod service;
 mod slices;
+mod uploads;

@@ -55,6 +55,10 @@ pub struct Config {
     pub header_seconds: u64,
     /// Time for a request's body, in seconds.
     pub body_seconds: u64,
+    /// Longest mesh file that is taken, in bytes.
+    pub upload_bytes: u64,
+    /// Time for a whole upload, in seconds; between two pieces of it `body_seconds` may pass.
+    pub upload_seconds: u64,
     /// Time for an answer, in seconds; longer than the longest `Prefer: wait`.
     pub answer_seconds: u64,
     /// Jobs that may wait.
@@ -159,6 +163,8 @@ impl Config {
             body_bytes: reader.take("LACUNA_BODY_BYTES", None, 8 << 20, COUNT)?,
             header_seconds: reader.take("LACUNA_HEADER_SECONDS", None, 10, COUNT)?,
             body_seconds: reader.take("LACUNA_BODY_SECONDS", None, 30, COUNT)?,
+            upload_bytes: reader.take("LACUNA_UPLOAD_BYTES", None, 256 << 20, COUNT)?,
+            upload_seconds: reader.take("LACUNA_UPLOAD_SECONDS", None, 600, COUNT)?,
             answer_seconds: reader.take("LACUNA_ANSWER_SECONDS", None, 60, COUNT)?,
             queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,
             jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 36, COUNT)?,

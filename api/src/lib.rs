@@ -14,6 +14,7 @@ pub mod digest;
 pub mod documents;
 pub mod files;
 pub mod http;
+pub mod inspection;
 pub mod jobs;
 pub mod metrics;
 pub mod openapi;

@@ -5,11 +5,12 @@ use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
-use lacuna_exchange::format::{self, Format, FormatError, Metadata, PointFile};
+use lacuna_exchange::format::{self, Fan, Format, FormatError, Metadata, PointFile};
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Stack, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::model::Model;
+use lacuna_kernel::model::{Model, PolygonMesh};
+use lacuna_kernel::solid::TriMesh;
 
 use crate::digest::Digest;
 use crate::files::{PendingFile, Stoppable};
@@ -156,7 +157,14 @@ pub fn write_file(
         drop(sink);
         return Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed);
     }
-    let geometry = view(&outcome.geometry).ok_or_else(|| no_geometry(format))?;
+    let cut;
+    let geometry = match &outcome.geometry {
+        Geometry::Polygons { mesh, closed } => {
+            cut = Cut::of(mesh);
+            cut.geometry(*closed)
+        }
+        other => view(other).ok_or_else(|| no_geometry(format))?,
+    };
     guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
     sink.flush().map_err(failed)?;
     drop(sink);
@@ -238,7 +246,24 @@ fn view(geometry: &Geometry) -> Option<format::Geometry<'_>> {
     match geometry {
         Geometry::Solid(solid) => Some(solid.into()),
         Geometry::Tessellation(tessellation) => Some(tessellation.into()),
-        Geometry::Sections(_) | Geometry::None => None,
+        Geometry::Polygons { .. } | Geometry::Sections(_) | Geometry::None => None,
+    }
+}
+
+/// Polygons as the formats take them: cut into triangles, with a note of which belong together.
+struct Cut {
+    mesh: TriMesh,
+    fans: Vec<Fan>,
+}
+
+impl Cut {
+    fn of(mesh: &PolygonMesh) -> Self {
+        let (triangles, fans) = format::fanned(&mesh.faces);
+        Self { mesh: TriMesh { vertices: mesh.vertices.clone(), triangles }, fans }
+    }
+
+    fn geometry(&self, closed: bool) -> format::Geometry<'_> {
+        format::Geometry::Polygons { mesh: &self.mesh, fans: &self.fans, closed }
     }
 }
 

@@ -6,8 +6,9 @@ use std::path::Path;
 use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
 
 use super::args::ConvertArgs;
-use super::inspect::{mesh_file, topology};
+use super::inspect::mesh_file;
 use super::output::{Target, finish, start, target};
+use crate::inspection;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{format_problem, guarded};
 
@@ -20,7 +21,7 @@ pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
         // With stderr gone there is nobody left to tell.
         let _ = writeln!(std::io::stderr(), "warning: {count} shapes of the kind {word} hold no polygons and were left out");
     }
-    let closed = topology(&args.file, &file)?.is_closed_manifold();
+    let closed = inspection::topology(&file)?.is_closed_manifold();
     let mut pending = Vec::with_capacity(targets.len());
     for target in &targets {
         let mut part = start(&target.path)?;
@@ -34,7 +35,8 @@ fn write(format: Format, file: &MeshFile, closed: bool, part: &mut crate::files:
     let title = file.facts.object_names.first().map(String::as_str);
     let metadata = Metadata { title, ..Metadata::default() };
     let mut sink = BufWriter::with_capacity(1 << 16, part);
-    let written = guarded(|| format::write(format, Geometry::Polygons { file, closed }, &metadata, &mut sink))?;
+    let written =
+        guarded(|| format::write(format, Geometry::Polygons { mesh: &file.mesh, fans: &file.fans, closed }, &metadata, &mut sink))?;
     written.map_err(|error| match error {
         // The file is at fault, not a model.
         format::FormatError::CannotCarry { .. } => Problem { kind: ProblemKind::InvalidFile, ..format_problem(&error) },

@@ -98,6 +98,11 @@ pub(super) fn healthcheck(url: Option<&str>) -> Result<(), Problem> {
     Err(Problem::new(ProblemKind::ServiceUnreachable, format!("{address} is not ready: {status}")))
 }
 
+/// The address of the service that `serve` would start on this machine.
+pub(super) fn local_url() -> Result<String, Problem> {
+    Ok(format!("http://{}", local_address(&Config::read(&Flags::default(), &environment)?.0)))
+}
+
 /// Where the service can be reached from inside its own machine.
 fn local_address(config: &Config) -> String {
     let port = config.bind.port();

@@ -42,13 +42,20 @@ pub async fn observe(State(state): State<Shared>, request: Request, next: Next) 
 
 /// Runs the request within its time; a panic becomes our problem.
 async fn guard(state: &Shared, request: Request, next: Next) -> Response {
-    let time = Duration::from_secs(state.config.answer_seconds);
+    let time = Duration::from_secs(time_of(state, &request));
     let work = AssertUnwindSafe(next.run(request)).catch_unwind();
     match tokio::time::timeout(time, work).await {
         Ok(Ok(response)) => response,
         Ok(Err(_)) => Problem::internal("a handler panicked").into_response(),
         Err(_) => Problem::new(ProblemKind::Timeout, format!("no answer within {} s", time.as_secs())).into_response(),
     }
+}
+
+/// Seconds for an answer: a large file may take long to arrive.
+fn time_of(state: &Shared, request: &Request) -> u64 {
+    let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
+    let uploads = request.method() == Method::POST && route == Some("/v1/models");
+    if uploads { state.config.upload_seconds.max(state.config.answer_seconds) } else { state.config.answer_seconds }
 }
 
 fn as_problem(mut response: Response, id: &str) -> Response {

@@ -6,6 +6,7 @@ use tokio::sync::{Semaphore, watch};
 
 use super::auth::{Owner, RateLimiter};
 use crate::config::Config;
+use crate::documents::Stored;
 use crate::jobs::desk::{Desk, DeskLimits};
 use crate::metrics::Metrics;
 use crate::problem::Problem;
@@ -60,11 +61,11 @@ impl AppState {
         Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, limiter, blocking }))
     }
 
-    /// Finds the models that an owner has stored.
-    pub fn models_of(&self, owner: &Owner) -> impl Fn(&str) -> Option<Vec<u8>> {
+    /// Finds the models and mesh files that an owner has stored.
+    pub fn models_of(&self, owner: &Owner) -> impl Fn(&str) -> Option<Stored> {
         let (store, owner) = (Arc::clone(&self.store), owner.0.clone());
         move |id| {
-            store.model_document(&owner, id).unwrap_or_else(|error| {
+            store.stored(&owner, id).unwrap_or_else(|error| {
                 tracing::error!(%error, "a stored model could not be read");
                 None
             })

@@ -39,6 +39,8 @@ pub struct FormatCapability {
 pub struct LimitCapability {
     /// Bytes of a JSON body.
     body_bytes: usize,
+    /// Bytes of an uploaded mesh file.
+    upload_bytes: u64,
     /// Seconds that `Prefer: wait` may ask.
     wait_seconds: u64,
     /// Most wall time of a job, in seconds.
@@ -74,10 +76,11 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
         FormatCapability { name: row.ending, media_type: row.media_type, carries }
     });
     Json(Capabilities {
-        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure, JobKind::Intersect, JobKind::Slice],
+        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure, JobKind::Intersect, JobKind::Slice, JobKind::Convert],
         formats: formats.collect(),
         limits: LimitCapability {
             body_bytes: config.body_bytes,
+            upload_bytes: config.upload_bytes,
             wait_seconds: crate::http::headers::LONGEST_WAIT.as_secs(),
             seconds: config.job_limits.seconds,
             memory_bytes: config.job_limits.memory_bytes,

@@ -92,8 +92,9 @@ fn accept(
     body: &[u8],
     idempotency: Option<Idempotency>,
 ) -> Result<(std::sync::Arc<crate::jobs::live::LiveJob>, bool), Problem> {
-    let job = documents::read_job(body, &state.config.job_limits, &state.models_of(owner))?;
-    match predict(state.engine, &job, PLAN_TIME) {
+    let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
+    let job = &order.job;
+    match predict(state.engine, job, PLAN_TIME) {
         // A prediction that takes too long is no reason to refuse what may be done in time.
         Err(problem) if problem.code != "limit.seconds" => return Err(problem),
         _ => {}
@@ -101,8 +102,8 @@ fn accept(
     let submission = Submission {
         owner: owner.0.clone(),
         kind: job.kind,
-        document: documents::order_document(&job).into_bytes(),
-        input_digest: documents::job_digest(&job),
+        document: order.document().into_bytes(),
+        input_digest: documents::job_digest(job),
         idempotency,
     };
     state.desk.submit(submission)

@@ -9,3 +9,4 @@ pub mod library;
 pub mod models;
 pub mod results;
 pub mod studies;
+pub mod uploads;

@@ -91,8 +91,8 @@ pub async fn plan(
     JsonBody(body): JsonBody,
 ) -> Result<Json<Plan>, Problem> {
     let plan = state.beside(move |state| {
-        let job = documents::read_job(&body, &state.config.job_limits, &state.models_of(&owner))?;
-        predict(state.engine, &job, PLAN_TIME)
+        let order = documents::read_order(&body, &state.config.job_limits, &state.models_of(&owner))?;
+        predict(state.engine, &order.job, PLAN_TIME)
     });
     plan.await.map(Json)
 }

@@ -1,10 +1,11 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
+use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
 use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
 use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
-use lacuna_kernel::solid::{Rounded, Solid, TriMesh};
+use lacuna_kernel::solid::{Rounded, Solid, Topology, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 
@@ -684,6 +685,40 @@ pub(crate) fn of_evaluation(attractor: &Attractor, tessellation: &Tessellation, 
         boundary_loops: complex.map(|complex| complex.boundary_loops),
         bbox_mm: corners(bounds),
         ..start(attractor.warnings().to_vec(), tolerance)
+    }
+}
+
+/// What is counted of a mesh that was only rounded, by `moved_mm` at most, from the vertices that were given.
+pub(crate) fn of_polygons(mesh: &TriMesh, topology: &Topology, given: &[DVec3], moved_mm: f64, tolerance: Tolerance) -> Certificate {
+    let closed = topology.is_closed_manifold();
+    let mut warnings = Vec::new();
+    let enclosed = Some(volume(mesh)).filter(|volume| volume.is_finite());
+    if !closed {
+        warnings.push("the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing".to_owned());
+    } else if enclosed.is_some_and(|volume| volume < 0.0) {
+        warnings.push("the faces look inwards: the enclosed volume is negative".to_owned());
+    }
+    let corner = |choose: fn(DVec3, DVec3) -> DVec3| given.iter().copied().reduce(choose).unwrap_or_default().to_array();
+    Certificate {
+        achieved_bound_mm: moved_mm,
+        leaf_cells: topology.triangles,
+        vertices: topology.vertices,
+        edges: topology.edges,
+        triangles: topology.triangles,
+        components: Some(topology.components),
+        shells: Some(topology.shells),
+        cavities: closed.then_some(topology.cavities),
+        genus: closed.then_some(topology.genus),
+        euler: Some(topology.euler),
+        boundary_edges: Some(topology.boundary_edges),
+        nonmanifold_edges: Some(topology.nonmanifold_edges),
+        nonmanifold_vertices: Some(topology.nonmanifold_vertices),
+        flipped_pairs: Some(topology.flipped_pairs),
+        degenerate_triangles: Some(topology.degenerate_triangles),
+        mesh_volume_mm3: enclosed,
+        mesh_area_mm2: Some(area(mesh)).filter(|area| area.is_finite()),
+        bbox_mm: [corner(DVec3::min), corner(DVec3::max)].map(|corner| corner.map(|end| [end, end])),
+        ..start(warnings, tolerance)
     }
 }
 

@@ -3,6 +3,7 @@
 mod boolean;
 pub mod certificate;
 mod contact;
+mod convert;
 pub mod job;
 mod operand;
 pub mod run;
