@@ -3,11 +3,13 @@
 //! | module | asks |
 //! |---|---|
 //! | `booleans` | do combined solids hold what their certificates say? |
+//! | `clients` | do the Python and the TypeScript client follow the contract, and do their work? |
 //! | `contacts` | are distances, places of contact and comparisons of shapes those of closed forms? |
 //! | `corpus` | does every case of `fixtures/` hold, through the real command? |
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
+//! | `remote` | does the command line at a service leave what it leaves here? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
@@ -20,6 +22,7 @@
 
 mod architecture;
 mod booleans;
+mod clients;
 mod contacts;
 mod container;
 mod contract;
@@ -28,6 +31,7 @@ mod determinism;
 mod independent;
 mod measures;
 mod properties;
+mod remote;
 mod service;
 mod slices;
 mod uploads;

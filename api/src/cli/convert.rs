@@ -22,18 +22,24 @@ pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
         let _ = writeln!(std::io::stderr(), "warning: {count} shapes of the kind {word} hold no polygons and were left out");
     }
     let closed = inspection::topology(&file)?.is_closed_manifold();
+    let title = title(&args.file, &file.facts.object_names);
     let mut pending = Vec::with_capacity(targets.len());
     for target in &targets {
         let mut part = start(&target.path)?;
-        write(target.format, &file, closed, &mut part)?;
+        write(target.format, &file, &title, closed, &mut part)?;
         pending.push((part, &target.path));
     }
     pending.into_iter().try_for_each(|(part, path)| finish(part, path))
 }
 
-fn write(format: Format, file: &MeshFile, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
-    let title = file.facts.object_names.first().map(String::as_str);
-    let metadata = Metadata { title, ..Metadata::default() };
+/// What a mesh is called: as its first object, else as its file.
+pub(super) fn title(path: &Path, objects: &[String]) -> String {
+    let stem = path.file_stem().filter(|_| path != Path::new("-")).map(|stem| stem.to_string_lossy().into_owned());
+    objects.first().cloned().or(stem).unwrap_or_else(|| "mesh".to_owned())
+}
+
+fn write(format: Format, file: &MeshFile, title: &str, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
+    let metadata = Metadata { title: Some(title), ..Metadata::default() };
     let mut sink = BufWriter::with_capacity(1 << 16, part);
     let written =
         guarded(|| format::write(format, Geometry::Polygons { mesh: &file.mesh, fans: &file.fans, closed }, &metadata, &mut sink))?;

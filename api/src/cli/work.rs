@@ -11,6 +11,7 @@ use super::args::{
     ConvertArgs, EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SliceArgs,
     SolidifyArgs,
 };
+use super::convert::title;
 use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
 use super::remote::{self, Server};
@@ -113,8 +114,7 @@ pub(super) fn convert(args: &ConvertArgs, server: &Server, manner: Manner<'_>) -
     let view = server.upload(&bytes)?;
     let corners = view.mesh.as_ref().and_then(|mesh| mesh.bbox_mm).unwrap_or_default();
     let extent = corners.as_flattened().iter().map(|end| end.abs()).fold(f64::MIN_POSITIVE / f64::EPSILON, f64::max);
-    let objects = view.mesh.as_ref().map(|mesh| mesh.objects.as_slice()).unwrap_or_default();
-    let name = objects.first().cloned().unwrap_or_else(|| "mesh".to_owned());
+    let name = title(&args.file, view.mesh.as_ref().map(|mesh| mesh.objects.as_slice()).unwrap_or_default());
     let model = Model { name: None, shape: Shape::Mesh(PolygonMesh::default()) };
     let given = Given { input: Input { name, model, radius_mm: None }, reference: Some(view.id) };
     let output = OutputArgs { outputs: args.outputs.clone(), format: args.format.clone(), certificate: None, preview: None };

@@ -56,7 +56,7 @@ pub struct JobPage {
 /// The job's own failure is in its `problem`, never in the status. An `Idempotency-Key` makes a repeated
 /// submission give the first one's job. Equal work that was finished before is not done again.
 #[utoipa::path(
-    post, path = "/v1/jobs", tag = "jobs", request_body = Job,
+    post, path = "/v1/jobs", operation_id = "submit_job", tag = "jobs", request_body = Job,
     params(("Prefer" = Option<String>, Header, description = "`wait=10`, `respond-async`"),
         ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 characters, the caller's choice")),
     responses((status = 200, body = JobView, description = "It has ended"), (status = 202, body = JobView, description = "It is accepted"),
@@ -121,7 +121,7 @@ fn answer(view: JobView) -> Response {
 
 /// Lists the caller's jobs.
 #[utoipa::path(
-    get, path = "/v1/jobs", tag = "jobs", params(JobQuery),
+    get, path = "/v1/jobs", operation_id = "list_jobs", tag = "jobs", params(JobQuery),
     responses((status = 200, body = JobPage), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn list(
@@ -148,7 +148,7 @@ pub async fn list(
 
 /// A job, in every state with 200.
 #[utoipa::path(
-    get, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    get, path = "/v1/jobs/{id}", operation_id = "show_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 200, body = JobView), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
@@ -163,7 +163,7 @@ pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner
 
 /// Stops a job. 200 if it has ended, 202 while it is stopping.
 #[utoipa::path(
-    post, path = "/v1/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    post, path = "/v1/jobs/{id}/cancel", operation_id = "cancel_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 200, body = JobView), (status = 202, body = JobView),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
@@ -175,7 +175,7 @@ pub async fn cancel(State(state): State<Shared>, Extension(owner): Extension<Own
 
 /// Stops a job if needed and forgets it.
 #[utoipa::path(
-    delete, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    delete, path = "/v1/jobs/{id}", operation_id = "forget_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn forget(

@@ -50,7 +50,7 @@ pub struct ModelPage {
 /// The same shape and name, or the same file, give the same id. A mesh file is received piece by piece, read within
 /// limits and examined: `mesh` tells what it holds, and nothing of it is repaired. `model_ref` in a job names either.
 #[utoipa::path(
-    post, path = "/v1/models", tag = "models", params(UploadQuery),
+    post, path = "/v1/models", operation_id = "store_model", tag = "models", params(UploadQuery),
     request_body(content((Model = "application/json"), (MeshFile = "model/stl"), (MeshFile = "model/3mf"), (MeshFile = "model/obj"),
         (MeshFile = "model/vrml"), (MeshFile = "application/octet-stream"))),
     responses((status = 201, body = ModelView), (status = 200, body = ModelView, description = "It was stored before"),
@@ -81,7 +81,7 @@ pub async fn store(
 
 /// Lists the caller's models.
 #[utoipa::path(
-    get, path = "/v1/models", tag = "models", params(ModelQuery),
+    get, path = "/v1/models", operation_id = "list_models", tag = "models", params(ModelQuery),
     responses((status = 200, body = ModelPage), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn list(
@@ -102,7 +102,7 @@ pub async fn list(
 
 /// The canonical document of a model, or a mesh file as it was uploaded. `HEAD` gives the headers.
 #[utoipa::path(
-    get, path = "/v1/models/{id}", tag = "models", params(("id" = String, Path, description = "The model's id")),
+    get, path = "/v1/models/{id}", operation_id = "fetch_model", tag = "models", params(("id" = String, Path, description = "The model's id")),
     responses((status = 200, description = "The document, or the file with its own media type",
             content((Model = "application/vnd.lacuna.model+json;v=1"), (MeshFile = "model/stl"), (MeshFile = "model/3mf"),
                 (MeshFile = "model/obj"), (MeshFile = "model/vrml"), (MeshFile = "application/octet-stream"))),
@@ -135,7 +135,7 @@ pub async fn fetch(
 
 /// Forgets a model. Jobs that used it keep what they made.
 #[utoipa::path(
-    delete, path = "/v1/models/{id}", tag = "models", params(("id" = String, Path, description = "The model's id")),
+    delete, path = "/v1/models/{id}", operation_id = "forget_model", tag = "models", params(("id" = String, Path, description = "The model's id")),
     responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn forget(
