@@ -14,6 +14,7 @@
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `service` | does the running service keep them? |
+//! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
 //! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |
@@ -34,4 +35,5 @@ mod properties;
 mod remote;
 mod service;
 mod slices;
+mod surface;
 mod uploads;

@@ -16,6 +16,8 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 CONTRACT = HERE.parent / "openapi.json"
 NOTE = "Generated from api/openapi.json by api/clients/generate.py: do not edit."
+#: What the parts by hand have already.
+TAKEN = {"address", "ask", "fetch", "key", "output", "timeout", "upload", "wait"}
 METHODS = ("get", "post", "put", "patch", "delete")
 JSON_TYPE = re.compile(r"^application/(json|.*\+json)(;.*)?$")
 
@@ -295,6 +297,8 @@ def main():
     names = [operation.name for operation in operations]
     if len(set(names)) < len(names):
         sys.exit(f"operations share names: {sorted(name for name in set(names) if names.count(name) > 1)}")
+    if taken := TAKEN.intersection(snake(name) for name in names):
+        sys.exit(f"operations are called as members of the clients: {sorted(taken)}; give them another operation_id")
     declarations, runs = typescript(contract, operations)
     files = {
         HERE / "python/lacuna_client/api.py": python(contract, operations),

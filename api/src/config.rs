@@ -67,6 +67,8 @@ pub struct Config {
     pub jobs_per_key: usize,
     /// Submissions per minute that one key may make.
     pub submissions_per_minute: u32,
+    /// Other calls per minute that one key may make.
+    pub calls_per_minute: u32,
     /// Time to end what runs when the service stops, in seconds.
     pub drain_seconds: u64,
     /// Age at which ended jobs are forgotten, in hours.
@@ -169,6 +171,7 @@ impl Config {
             queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,
             jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 36, COUNT)?,
             submissions_per_minute: reader.take("LACUNA_SUBMISSIONS_PER_MINUTE", None, 600, COUNT)?,
+            calls_per_minute: reader.take("LACUNA_CALLS_PER_MINUTE", None, 6000, COUNT)?,
             drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
             retention_hours: reader.take("LACUNA_RETENTION_HOURS", None, 72, COUNT)?,
             job_limits: Limits {

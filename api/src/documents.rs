@@ -51,13 +51,15 @@ pub struct Order {
     /// The job, every model in it.
     pub job: Job,
     references: Vec<Option<String>>,
+    /// The id of a job that this one replaces.
+    pub supersedes: Option<String>,
 }
 
 impl Order {
     /// A job, and by which words whoever does it finds the inputs that have one.
     #[must_use]
     pub fn new(job: Job, references: Vec<Option<String>>) -> Self {
-        Self { job, references }
+        Self { job, references, supersedes: None }
     }
 
     /// The document from which a worker does the job: canonical, limits complete, models in full but for uploaded mesh
@@ -203,9 +205,42 @@ pub fn read_order(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<
 /// # Errors
 /// All findings, as one problem.
 pub fn read_job_in(bytes: &[u8], most: &Limits, folder: Option<&Path>) -> Result<Job, Problem> {
-    let Some(folder) = folder else { return read_order(bytes, most, &|_| None).map(|order| order.job) };
+    let Some(folder) = folder else { return here(read_order(bytes, most, &|_| None)?) };
     let read = || document::read_job_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name));
-    complete(production::guarded(read)?.map_err(refused)?, most, &|_| None).map(|order| order.job)
+    here(complete(production::guarded(read)?.map_err(refused)?, most, &|_| None)?)
+}
+
+/// A job that is done at once, by whoever reads it.
+fn here(order: Order) -> Result<Job, Problem> {
+    match order.supersedes {
+        None => Ok(order.job),
+        Some(_) => Err(one_finding("/supersedes", UNKNOWN_JOB, "there is no other job to be replaced; a service has jobs")),
+    }
+}
+
+/// The code of an id that is no job's.
+const UNKNOWN_JOB: &str = "job.unknown-job";
+
+/// A job to be replaced is not there.
+#[must_use]
+pub fn unknown_job(id: &str) -> Problem {
+    let shown: String = id.chars().take(80).collect();
+    one_finding("/supersedes", UNKNOWN_JOB, &format!("there is no job {shown:?} to be replaced; leave \"supersedes\" out"))
+}
+
+/// A job document without its kind, completed; every place in it stays where it was.
+#[must_use]
+pub fn of_kind(body: &[u8], kind: JobKind) -> Vec<u8> {
+    let (Some(first), Some(last)) = (body.iter().position(|&byte| byte == b'{'), body.iter().rposition(|&byte| byte == b'}')) else {
+        // No object: the reader says what it is instead.
+        return body.to_vec();
+    };
+    if last < first {
+        return body.to_vec();
+    }
+    let comma = if body[first + 1..last].iter().all(u8::is_ascii_whitespace) { "" } else { "," };
+    let member = format!("{comma}\"kind\":\"{}\"", kind_word(kind));
+    [&body[..last], member.as_bytes(), &body[last..]].concat()
 }
 
 /// Fetches what a job names, and remembers what of it are mesh files.
@@ -253,6 +288,7 @@ impl Fetcher<'_> {
 
 fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Order, Problem> {
     let ids: Vec<Option<String>> = read.inputs.iter().map(|input| input.reference().map(str::to_owned)).collect();
+    let supersedes = read.supersedes.clone();
     let mut fetcher = Fetcher { find, references: HashMap::new(), triangles: 0, most_triangles: most.triangles, refusal: None };
     let resolved = read.resolve(&within(&Limits::default(), most), most, |id| fetcher.fetch(id));
     if let Some(problem) = fetcher.refusal {
@@ -274,7 +310,7 @@ fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<O
     for (index, name) in job.outputs.iter().enumerate() {
         format(name).map_err(|problem| one_finding(&format!("/outputs/{index}"), &problem.code, &problem.detail))?;
     }
-    Ok(Order { job, references })
+    Ok(Order { job, references, supersedes })
 }
 
 /// Reads a request to solve a model, and fetches the model if it is stored.

@@ -22,6 +22,7 @@ pub mod problem;
 pub mod production;
 pub mod routes;
 pub mod store;
+pub mod trades;
 pub mod verify;
 
 /// Locks a mutex whose data stays whole even if a holder panicked: every change under our locks is one

@@ -130,6 +130,49 @@ impl ProblemKind {
         }
     }
 
+    /// All kinds.
+    pub const ALL: [Self; 27] = [
+        Self::MalformedJson,
+        Self::BadRequest,
+        Self::Unauthenticated,
+        Self::NotFound,
+        Self::MethodNotAllowed,
+        Self::RequestTimeout,
+        Self::IdempotencyInProgress,
+        Self::StateConflict,
+        Self::BodyTooLarge,
+        Self::UnsupportedMedia,
+        Self::Range,
+        Self::InvalidModel,
+        Self::InvalidFile,
+        Self::IdempotencyMismatch,
+        Self::Unreachable,
+        Self::Limit,
+        Self::TooManyJobs,
+        Self::RateLimited,
+        Self::Cancelled,
+        Self::Interrupted,
+        Self::Internal,
+        Self::InputOutput,
+        Self::ShuttingDown,
+        Self::Timeout,
+        Self::Usage,
+        Self::CheckFailed,
+        Self::ServiceUnreachable,
+    ];
+
+    /// The kind whose address ends with a word.
+    #[must_use]
+    pub fn of_code(code: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.facts().2 == code)
+    }
+
+    /// The kind in words.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        self.facts().3
+    }
+
     /// The exit code of a command that ends with this problem.
     #[must_use]
     pub fn exit_code(self) -> u8 {
@@ -385,6 +428,15 @@ mod tests {
         ] {
             let kind = ProblemKind::from(kind);
             assert_eq!((kind.facts().0, kind.exit_code()), (status, exit));
+        }
+    }
+
+    #[test]
+    fn every_kind_has_an_address_of_its_own() {
+        for kind in ProblemKind::ALL {
+            let address = serde_json::to_value(kind).unwrap();
+            assert_eq!(address, format!("/problems/{}", kind.facts().2));
+            assert_eq!(ProblemKind::of_code(kind.facts().2), Some(kind));
         }
     }
 

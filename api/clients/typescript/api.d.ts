@@ -188,8 +188,12 @@ export interface Capabilities {
   kernel_version: string;
   /** Kinds of jobs. */
   kinds: Array<JobKind>;
+  /** Classics of the library. */
+  library: Array<string>;
   /** Limits. */
   limits: LimitCapability;
+  /** Processes with a profile. */
+  profiles: Array<string>;
 }
 
 /** A Catmull-Rom spline. */
@@ -516,6 +520,8 @@ export interface FormatCapability {
   media_type: string;
   /** Its name in `outputs`. */
   name: string;
+  /** Whether files of it can be uploaded. */
+  reads: boolean;
 }
 
 /** The four-point scheme. */
@@ -683,6 +689,8 @@ export interface Job {
   outputs?: Array<"stl" | "3mf" | "glb" | "obj" | "ply" | "off" | "wrl" | "png" | "csv" | "svg" | "dxf">;
   /** How to do it. */
   params: JobParams;
+  /** For a service: the id of a job that is stopped once this one is accepted, because nobody wants it any more. */
+  supersedes?: string;
 }
 
 /** A named model. Exactly one of model and model_ref is given. */
@@ -812,6 +820,9 @@ export interface Join {
   strip?: boolean;
 }
 
+/** Where a number comes from. */
+export type Kind = "sourced" | "chosen";
+
 /** The library. */
 export interface LibraryPage {
   /** The classics, sorted by name. */
@@ -822,6 +833,8 @@ export interface LibraryPage {
 export interface LimitCapability {
   /** Bytes of a JSON body. */
   body_bytes: number;
+  /** Other calls per minute and key. */
+  calls_per_minute: number;
   /** Most leaf cells of a job. */
   cells: number;
   /** Longest address. */
@@ -871,6 +884,26 @@ export interface LocatedPoint {
   cell: CellPlace;
   /** The point. */
   point_mm: Array<number>;
+}
+
+/** A material. */
+export interface Material {
+  /** Its density in g/cm3; an alloy's own data sheet goes before it. */
+  density_g_cm3: number;
+  /** Its name. */
+  name: string;
+  /** How far sources disagree. */
+  range_g_cm3?: Array<number> | null;
+  /** Where the numbers come from. */
+  source: string;
+  /** What people call it. */
+  title: string;
+}
+
+/** The materials. */
+export interface MaterialPage {
+  /** The materials, sorted by name. */
+  items: Array<Material>;
 }
 
 /**
@@ -1248,12 +1281,60 @@ export interface Problem {
 /** The kinds of problem, one per `/problems/` address. */
 export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
 
+/** A kind of problem. */
+export interface ProblemPage {
+  /** The exit code of commands that end with it. */
+  exit_code: number;
+  /** The HTTP status of answers with it. */
+  status: number;
+  /** The kind in words. */
+  title: string;
+  /** Its address, as in `type`. */
+  type: ProblemKind;
+}
+
+/** The numbers of a process. */
+export interface Profile {
+  /** The name of the process. */
+  name: string;
+  /** Its numbers. */
+  quantities: Array<Quantity>;
+  /** What people call it. */
+  title: string;
+}
+
+/** The profiles. */
+export interface ProfilePage {
+  /** The profiles, sorted by name. */
+  items: Array<Profile>;
+}
+
 /** What a slicer will ask or suffer from. */
 export interface Prompt {
   /** Stable code. */
   code: string;
   /** What, in words, with the way out. */
   message: string;
+}
+
+/** A number of a process. */
+export interface Quantity {
+  /** How. */
+  kind: Kind;
+  /** The most that is seen. */
+  max?: number | null;
+  /** The least that is seen. */
+  min?: number | null;
+  /** Its name. */
+  name: string;
+  /** When it holds. */
+  remark?: string;
+  /** Where it comes from. */
+  source: string;
+  /** The unit; empty for numbers without one. */
+  unit: string;
+  /** The default. */
+  value: number;
 }
 
 /** Two products of a state's operators and embeddings that are equal. */
@@ -1308,6 +1389,26 @@ export type Severity = "error" | "warning";
 
 /** A shape of one of the families. */
 export type Shape = IfsShape | BcifsShape | BezierCurveShape | CornerCuttingShape | SubdivisionShape | BezierSurfaceShape | NurbsCurveShape | NurbsSurfaceShape | NurbsVolumeShape | CatmullRomShape | BetaSplineShape | FourPointShape | InterpolationShape | TensorShape | SumShape | MeshShape | TerrainShape | GroupShape;
+
+/** A job document without `kind`, which the address says. */
+export interface ShortOrder {
+  /** Named models, for kinds of jobs with several. */
+  inputs?: Array<JobInput>;
+  /** The version of the grammar: 1. */
+  lacuna: 1;
+  /** What the job may use; the service's defaults when absent. */
+  limits?: JobLimits;
+  /** The model, in full. */
+  model?: EmbeddedModel;
+  /** The id of a stored model or of an uploaded mesh file. */
+  model_ref?: string;
+  /** Names of the formats wanted, for example 3mf and stl. */
+  outputs?: Array<"stl" | "3mf" | "glb" | "obj" | "ply" | "off" | "wrl" | "png" | "csv" | "svg" | "dxf">;
+  /** How to do it. */
+  params: JobParams;
+  /** For a service: the id of a job that is stopped once this one is accepted, because nobody wants it any more. */
+  supersedes?: string;
+}
 
 /**
  * The product T_i T_j ... b_m b_p ...: a child, a child of that child and so on, then a boundary of the last, a
@@ -1600,10 +1701,12 @@ export class Api extends Transport {
   livez(options?: { signal?: AbortSignal }): Promise<Health>;
   /** Counters in the text format of Prometheus. */
   metrics(options?: { signal?: AbortSignal }): Promise<Response>;
+  /** Tells a kind of problem. */
+  showProblem(code: string, options?: { signal?: AbortSignal }): Promise<ProblemPage>;
   /** Whether the service takes work: not while it goes down, nor when its data folder cannot be written. */
   readyz(options?: { signal?: AbortSignal }): Promise<Health>;
   /** Tells where an address leads, or which addresses lead near a point. */
-  address(body: AddressQuestion, options?: { signal?: AbortSignal }): Promise<AddressAnswer>;
+  locate(body: AddressQuestion, options?: { signal?: AbortSignal }): Promise<AddressAnswer>;
   /**
    * Draws the automaton of a model: states as nodes, transitions and boundaries as two kinds of arrows. An SVG
    * picture, or DOT text when `Accept` prefers `text/vnd.graphviz`. A model that is a legal document is drawn even
@@ -1612,6 +1715,11 @@ export class Api extends Transport {
   automaton(body: Model, options?: { signal?: AbortSignal }): Promise<Response>;
   /** Kinds of jobs, formats and limits of this service. */
   capabilities(options?: { signal?: AbortSignal }): Promise<Capabilities>;
+  /**
+   * Evaluates: a job of the kind `evaluate`, waited for 10 s. 200 if it has ended by then, else 202 with its
+   * `Location`: nothing is lost, and `Prefer: wait=n` chooses another time.
+   */
+  evaluate(body: ShortOrder, options?: { prefer?: string | null; idempotencyKey?: string | null; signal?: AbortSignal }): Promise<JobView>;
   /** Lists the caller's jobs. */
   listJobs(options?: { state?: JobState; kind?: JobKind; limit?: number; cursor?: string; signal?: AbortSignal }): Promise<JobPage>;
   /**
@@ -1637,6 +1745,13 @@ export class Api extends Transport {
   listClassics(options?: { signal?: AbortSignal }): Promise<LibraryPage>;
   /** The model document of a classic. `HEAD` gives its headers. */
   fetchClassic(name: string, options?: { signal?: AbortSignal }): Promise<Model>;
+  /** Lists materials with their densities. */
+  listMaterials(options?: { signal?: AbortSignal }): Promise<MaterialPage>;
+  /**
+   * Measures: a job of the kind `measure`, waited for 10 s. 200 if it has ended by then, else 202 with its
+   * `Location`: nothing is lost, and `Prefer: wait=n` chooses another time.
+   */
+  measure(body: ShortOrder, options?: { prefer?: string | null; idempotencyKey?: string | null; signal?: AbortSignal }): Promise<JobView>;
   /** Lists the caller's models. */
   listModels(options?: { limit?: number; cursor?: string; signal?: AbortSignal }): Promise<ModelPage>;
   /**
@@ -1656,6 +1771,10 @@ export class Api extends Transport {
    * value that passes.
    */
   plan(body: Job, options?: { signal?: AbortSignal }): Promise<Plan>;
+  /** Lists the profiles of processes. */
+  listProfiles(options?: { signal?: AbortSignal }): Promise<ProfilePage>;
+  /** The numbers of a process: default, range, unit and source of each. */
+  showProfile(process: string, options?: { signal?: AbortSignal }): Promise<Profile>;
   /** The bytes with a digest, if one of the caller's jobs made them. They never change. `HEAD` gives the headers. */
   fetchResult(digest: string, options?: { range?: string | null; signal?: AbortSignal }): Promise<Response>;
   /**

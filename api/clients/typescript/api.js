@@ -15,11 +15,15 @@ export class Api extends Transport {
     return this._bytes("GET", "/metrics", { accept: "text/plain, application/problem+json", signal: options.signal });
   }
 
+  showProblem(code, options = {}) {
+    return this._json("GET", `/problems/${encodeURIComponent(code)}`, { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
   readyz(options = {}) {
     return this._json("GET", "/readyz", { accept: "application/json, application/problem+json", signal: options.signal });
   }
 
-  address(body, options = {}) {
+  locate(body, options = {}) {
     return this._json("POST", "/v1/address", { body, accept: "application/json, application/problem+json", signal: options.signal });
   }
 
@@ -29,6 +33,10 @@ export class Api extends Transport {
 
   capabilities(options = {}) {
     return this._json("GET", "/v1/capabilities", { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  evaluate(body, options = {}) {
+    return this._json("POST", "/v1/evaluate", { header: { "Prefer": options.prefer, "Idempotency-Key": options.idempotencyKey }, body, accept: "application/json, application/problem+json", signal: options.signal });
   }
 
   listJobs(options = {}) {
@@ -67,6 +75,14 @@ export class Api extends Transport {
     return this._json("GET", `/v1/library/${encodeURIComponent(name)}`, { accept: "application/vnd.lacuna.model+json;v=1, application/problem+json", signal: options.signal });
   }
 
+  listMaterials(options = {}) {
+    return this._json("GET", "/v1/materials", { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  measure(body, options = {}) {
+    return this._json("POST", "/v1/measure", { header: { "Prefer": options.prefer, "Idempotency-Key": options.idempotencyKey }, body, accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
   listModels(options = {}) {
     return this._json("GET", "/v1/models", { query: { "limit": options.limit, "cursor": options.cursor }, accept: "application/json, application/problem+json", signal: options.signal });
   }
@@ -89,6 +105,14 @@ export class Api extends Transport {
 
   plan(body, options = {}) {
     return this._json("POST", "/v1/plan", { body, accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  listProfiles(options = {}) {
+    return this._json("GET", "/v1/profiles", { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  showProfile(process, options = {}) {
+    return this._json("GET", `/v1/profiles/${encodeURIComponent(process)}`, { accept: "application/json, application/problem+json", signal: options.signal });
   }
 
   fetchResult(digest, options = {}) {

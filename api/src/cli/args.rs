@@ -99,6 +99,13 @@ pub(super) enum Command {
     Convert(ConvertArgs),
     /// List the classics of the library as JSON, or give the model document of one.
     Library(LibraryArgs),
+    /// List materials with their densities and sources; JSON on stdout.
+    Materials,
+    /// List the numbers of processes with their ranges and sources, or of one; JSON on stdout.
+    Profiles {
+        /// `sla`, `cast` or `panels`; all when absent.
+        process: Option<String>,
+    },
     /// Do the cases below a folder and compare with what they expect; exit code 1 when one fails.
     Verify(VerifyArgs),
     /// Jobs of a service, one step at a time; of the service that runs on this machine without --server.

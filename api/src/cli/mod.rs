@@ -59,6 +59,8 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
             None => convert::convert(&args),
         },
         Command::Library(args) => library::library(&args),
+        Command::Materials => print_json(&crate::trades::materials()),
+        Command::Profiles { process } => library::profiles(process.as_deref()),
         Command::Verify(args) => study::verify(&args, cli.quiet),
         Command::Jobs(command) => match manner.server {
             Some(server) => remote::jobs::jobs(server, &command, manner),

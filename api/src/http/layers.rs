@@ -11,14 +11,14 @@ use axum::response::{IntoResponse, Response};
 use futures_util::FutureExt;
 use uuid::Uuid;
 
+use super::auth::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::state::Shared;
 use crate::problem::{Problem, ProblemKind};
 
 /// The header with a request's id.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-const EXPOSED: &str =
-    "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link";
+const EXPOSED: &str = "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link, RateLimit, RateLimit-Policy";
 
 /// Gives a request its id, tells the log and the metrics of it, and every error its form.
 pub async fn observe(State(state): State<Shared>, request: Request, next: Next) -> Response {
@@ -64,7 +64,8 @@ fn as_problem(mut response: Response, id: &str) -> Response {
         tracing::error!(request_id = %id, code = %problem.code, detail = %problem.detail, "defect");
     }
     problem.request_id = Some(id.to_owned());
-    let kept = [header::ALLOW, header::CONTENT_RANGE].map(|name| (name.clone(), response.headers().get(&name).cloned()));
+    let kept = [header::ALLOW, header::CONTENT_RANGE, RATE_LIMIT, RATE_LIMIT_POLICY]
+        .map(|name| (name.clone(), response.headers().get(&name).cloned()));
     let mut answer = problem.into_response();
     for (name, value) in kept {
         if let Some(value) = value {

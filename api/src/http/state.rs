@@ -27,8 +27,10 @@ pub struct AppState {
     pub closing: watch::Sender<bool>,
     /// Who does the jobs.
     pub engine: Engine,
-    /// Who called how often.
-    pub limiter: RateLimiter,
+    /// Who submitted how often.
+    pub submissions: RateLimiter,
+    /// Who called otherwise how often.
+    pub calls: RateLimiter,
     /// Places for work on documents beside the event loop.
     blocking: Arc<Semaphore>,
 }
@@ -55,10 +57,11 @@ impl AppState {
         let metrics = Arc::new(Metrics::default());
         let limits = DeskLimits { queued: config.queued, per_owner: config.jobs_per_key };
         let desk = Arc::new(Desk::open(Arc::clone(&store), limits, Arc::clone(&metrics)).map_err(failed)?);
-        let limiter = RateLimiter::new(config.submissions_per_minute);
+        let submissions = RateLimiter::new("submissions", config.submissions_per_minute);
+        let calls = RateLimiter::new("calls", config.calls_per_minute);
         // Twice the workers: reading documents is short, but must not take the memory of many at once.
         let blocking = Arc::new(Semaphore::new(config.workers * 2));
-        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, limiter, blocking }))
+        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, submissions, calls, blocking }))
     }
 
     /// Finds the models and mesh files that an owner has stored.

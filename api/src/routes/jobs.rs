@@ -35,6 +35,7 @@ pub struct JobQuery {
     /// Only jobs of this kind.
     kind: Option<JobKind>,
     /// Items of the page, 1 to 200; 50 when absent.
+    #[param(minimum = 1, maximum = 200)]
     limit: Option<usize>,
     /// `next` of the page before.
     cursor: Option<String>,
@@ -69,11 +70,21 @@ pub async fn submit(
     headers: HeaderMap,
     JsonBody(body): JsonBody,
 ) -> Result<Response, Problem> {
-    let key = idempotency_key(&headers)?;
-    let preference = Preference::of(&headers);
+    take(state, owner, &headers, body.to_vec(), Duration::ZERO).await
+}
+
+/// Accepts a job and waits for it as long as the caller prefers, or else as long as is usual there.
+///
+/// # Errors
+/// What is wrong with the job, or why none is accepted.
+pub(super) async fn take(state: Shared, owner: Owner, headers: &HeaderMap, body: Vec<u8>, usual: Duration) -> Result<Response, Problem> {
+    let key = idempotency_key(headers)?;
+    let preference = Preference::of(headers);
     let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
     let (job, replayed) = state.beside(move |state| accept(state, &owner, &body, used)).await?;
-    let view = job.wait(preference.wait.unwrap_or(Duration::ZERO)).await;
+    // Whoever asks for an answer at once gets it, wherever others wait.
+    let usual = if preference.respond_async { Duration::ZERO } else { usual };
+    let view = job.wait(preference.wait.unwrap_or(usual)).await;
     let ended = view.state.is_final();
     let mut response = answer(view);
     if let Some(applied) = preference.applied(ended).and_then(|applied| HeaderValue::from_str(&applied).ok()) {
@@ -94,6 +105,8 @@ fn accept(
 ) -> Result<(std::sync::Arc<crate::jobs::live::LiveJob>, bool), Problem> {
     let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
     let job = &order.job;
+    let replaced = order.supersedes.as_deref().map(|id| state.desk.find(&owner.0, id).ok_or_else(|| documents::unknown_job(id)));
+    let replaced = replaced.transpose()?;
     match predict(state.engine, job, PLAN_TIME) {
         // A prediction that takes too long is no reason to refuse what may be done in time.
         Err(problem) if problem.code != "limit.seconds" => return Err(problem),
@@ -106,7 +119,12 @@ fn accept(
         input_digest: documents::job_digest(job),
         idempotency,
     };
-    state.desk.submit(submission)
+    let accepted = state.desk.submit(submission)?;
+    // Only now: a refusal must not cost the caller what there is. The same work twice is not replaced by itself.
+    if let Some(replaced) = replaced.filter(|replaced| !std::sync::Arc::ptr_eq(replaced, &accepted.0) && !replaced.state().is_final()) {
+        state.desk.cancel(&replaced).map_err(|error| Problem::io("the replaced job could not be stopped", &error))?;
+    }
+    Ok(accepted)
 }
 
 fn answer(view: JobView) -> Response {

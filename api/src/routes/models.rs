@@ -30,6 +30,7 @@ pub(super) const MEDIA_TYPE: &str = "application/vnd.lacuna.model+json;v=1";
 #[into_params(parameter_in = Query)]
 pub struct ModelQuery {
     /// Items of the page, 1 to 200; 50 when absent.
+    #[param(minimum = 1, maximum = 200)]
     limit: Option<usize>,
     /// `next` of the page before.
     cursor: Option<String>,

@@ -110,7 +110,9 @@ Capabilities = TypedDict('Capabilities', {
     'formats': 'list[FormatCapability]',
     'kernel_version': 'str',
     'kinds': 'list[JobKind]',
+    'library': 'list[str]',
     'limits': 'LimitCapability',
+    'profiles': 'list[str]',
 })
 
 CatmullRomScheme = TypedDict('CatmullRomScheme', {
@@ -292,6 +294,7 @@ FormatCapability = TypedDict('FormatCapability', {
     'carries': 'list[str]',
     'media_type': 'str',
     'name': 'str',
+    'reads': 'bool',
 })
 
 FourPointScheme = TypedDict('FourPointScheme', {
@@ -376,6 +379,7 @@ Job = TypedDict('Job', {
     'model_ref': 'NotRequired[str]',
     'outputs': "NotRequired[list[Literal['stl', '3mf', 'glb', 'obj', 'ply', 'off', 'wrl', 'png', 'csv', 'svg', 'dxf']]]",
     'params': 'JobParams',
+    'supersedes': 'NotRequired[str]',
 })
 
 JobInput = TypedDict('JobInput', {
@@ -438,12 +442,15 @@ Join = TypedDict('Join', {
     'strip': 'NotRequired[bool]',
 })
 
+Kind: TypeAlias = "Literal['sourced', 'chosen']"
+
 LibraryPage = TypedDict('LibraryPage', {
     'items': 'list[ClassicView]',
 })
 
 LimitCapability = TypedDict('LimitCapability', {
     'body_bytes': 'int',
+    'calls_per_minute': 'int',
     'cells': 'int',
     'depth': 'int',
     'jobs_per_key': 'int',
@@ -469,6 +476,18 @@ LocatedPoint = TypedDict('LocatedPoint', {
     'bound_mm': 'float',
     'cell': 'CellPlace',
     'point_mm': 'list[float]',
+})
+
+Material = TypedDict('Material', {
+    'density_g_cm3': 'float',
+    'name': 'str',
+    'range_g_cm3': 'NotRequired[list[float] | None]',
+    'source': 'str',
+    'title': 'str',
+})
+
+MaterialPage = TypedDict('MaterialPage', {
+    'items': 'list[Material]',
 })
 
 Matrix: TypeAlias = 'list[list[float | None | str]]'
@@ -663,9 +682,37 @@ Problem = TypedDict('Problem', {
 
 ProblemKind: TypeAlias = "Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/not-found', '/problems/method-not-allowed', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']"
 
+ProblemPage = TypedDict('ProblemPage', {
+    'exit_code': 'int',
+    'status': 'int',
+    'title': 'str',
+    'type': 'ProblemKind',
+})
+
+Profile = TypedDict('Profile', {
+    'name': 'str',
+    'quantities': 'list[Quantity]',
+    'title': 'str',
+})
+
+ProfilePage = TypedDict('ProfilePage', {
+    'items': 'list[Profile]',
+})
+
 Prompt = TypedDict('Prompt', {
     'code': 'str',
     'message': 'str',
+})
+
+Quantity = TypedDict('Quantity', {
+    'kind': 'Kind',
+    'max': 'NotRequired[float | None]',
+    'min': 'NotRequired[float | None]',
+    'name': 'str',
+    'remark': 'NotRequired[str]',
+    'source': 'str',
+    'unit': 'str',
+    'value': 'float',
 })
 
 Relation = TypedDict('Relation', {
@@ -697,6 +744,17 @@ SectionsStatement = TypedDict('SectionsStatement', {
 Severity: TypeAlias = "Literal['error', 'warning']"
 
 Shape: TypeAlias = 'IfsShape | BcifsShape | BezierCurveShape | CornerCuttingShape | SubdivisionShape | BezierSurfaceShape | NurbsCurveShape | NurbsSurfaceShape | NurbsVolumeShape | CatmullRomShape | BetaSplineShape | FourPointShape | InterpolationShape | TensorShape | SumShape | MeshShape | TerrainShape | GroupShape'
+
+ShortOrder = TypedDict('ShortOrder', {
+    'inputs': 'NotRequired[list[JobInput]]',
+    'lacuna': 'Literal[1]',
+    'limits': 'NotRequired[JobLimits]',
+    'model': 'NotRequired[EmbeddedModel]',
+    'model_ref': 'NotRequired[str]',
+    'outputs': "NotRequired[list[Literal['stl', '3mf', 'glb', 'obj', 'ply', 'off', 'wrl', 'png', 'csv', 'svg', 'dxf']]]",
+    'params': 'JobParams',
+    'supersedes': 'NotRequired[str]',
+})
 
 Side = TypedDict('Side', {
     'boundary': 'NotRequired[list[int]]',
@@ -865,11 +923,15 @@ class Api(Transport):
         """Counters in the text format of Prometheus."""
         return self._bytes('GET', '/metrics', accept='text/plain, application/problem+json')
 
+    def show_problem(self, code: str) -> ProblemPage:
+        """Tells a kind of problem."""
+        return self._json('GET', f"/problems/{quote(code, safe='')}", accept='application/json, application/problem+json')
+
     def readyz(self) -> Health:
         """Whether the service takes work: not while it goes down, nor when its data folder cannot be written."""
         return self._json('GET', '/readyz', accept='application/json, application/problem+json')
 
-    def address(self, body: AddressQuestion) -> AddressAnswer:
+    def locate(self, body: AddressQuestion) -> AddressAnswer:
         """Tells where an address leads, or which addresses lead near a point."""
         return self._json('POST', '/v1/address', body=body, accept='application/json, application/problem+json')
 
@@ -884,6 +946,14 @@ class Api(Transport):
     def capabilities(self) -> Capabilities:
         """Kinds of jobs, formats and limits of this service."""
         return self._json('GET', '/v1/capabilities', accept='application/json, application/problem+json')
+
+    def evaluate(self, body: ShortOrder, *, prefer: str | None | None = None, idempotency_key: str | None | None = None) -> JobView:
+        """Evaluates: a job of the kind `evaluate`, waited for 10 s.
+
+        200 if it has ended by then, else 202 with its `Location`: nothing is lost, and `Prefer: wait=n` chooses
+        another time.
+        """
+        return self._json('POST', '/v1/evaluate', header={'Prefer': prefer, 'Idempotency-Key': idempotency_key}, body=body, accept='application/json, application/problem+json')
 
     def list_jobs(self, *, state: JobState | None = None, kind: JobKind | None = None, limit: int | None = None, cursor: str | None = None) -> JobPage:
         """Lists the caller's jobs."""
@@ -929,6 +999,18 @@ class Api(Transport):
         """The model document of a classic. `HEAD` gives its headers."""
         return self._json('GET', f"/v1/library/{quote(name, safe='')}", accept='application/vnd.lacuna.model+json;v=1, application/problem+json')
 
+    def list_materials(self) -> MaterialPage:
+        """Lists materials with their densities."""
+        return self._json('GET', '/v1/materials', accept='application/json, application/problem+json')
+
+    def measure(self, body: ShortOrder, *, prefer: str | None | None = None, idempotency_key: str | None | None = None) -> JobView:
+        """Measures: a job of the kind `measure`, waited for 10 s.
+
+        200 if it has ended by then, else 202 with its `Location`: nothing is lost, and `Prefer: wait=n` chooses
+        another time.
+        """
+        return self._json('POST', '/v1/measure', header={'Prefer': prefer, 'Idempotency-Key': idempotency_key}, body=body, accept='application/json, application/problem+json')
+
     def list_models(self, *, limit: int | None = None, cursor: str | None = None) -> ModelPage:
         """Lists the caller's models."""
         return self._json('GET', '/v1/models', query={'limit': limit, 'cursor': cursor}, accept='application/json, application/problem+json')
@@ -960,6 +1042,14 @@ class Api(Transport):
         A job that would pass a limit is refused with the limit and a value that passes.
         """
         return self._json('POST', '/v1/plan', body=body, accept='application/json, application/problem+json')
+
+    def list_profiles(self) -> ProfilePage:
+        """Lists the profiles of processes."""
+        return self._json('GET', '/v1/profiles', accept='application/json, application/problem+json')
+
+    def show_profile(self, process: str) -> Profile:
+        """The numbers of a process: default, range, unit and source of each."""
+        return self._json('GET', f"/v1/profiles/{quote(process, safe='')}", accept='application/json, application/problem+json')
 
     def fetch_result(self, digest: str, *, range: str | None | None = None) -> Answer:
         """The bytes with a digest, if one of the caller's jobs made them. They never change. `HEAD` gives the headers."""

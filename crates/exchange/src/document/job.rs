@@ -31,6 +31,8 @@ pub struct JobDocument {
     pub outputs: Vec<String>,
     /// What may be used, as far as the document says.
     pub limits: RequestedLimits,
+    /// The id of the job that this one replaces.
+    pub supersedes: Option<String>,
 }
 
 /// A model that a job uses.
@@ -178,7 +180,9 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
     let params = members.get("params").and_then(|place| params(walker, place, kind));
     let outputs = members.get("outputs").map_or(Some(Vec::new()), |place| outputs(walker, place, kind));
     let limits = members.get("limits").map_or(Some(RequestedLimits::default()), |place| limits(walker, place));
-    let document = JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits? };
+    let supersedes = stated(members.get("supersedes").map(|place| walker.name(place, "the id of a job")));
+    let document =
+        JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits?, supersedes: supersedes? };
     settle(walker, &members, &document)?;
     Some(document)
 }

@@ -47,6 +47,11 @@ pub(in super::super) const JOB: Object = Object {
             || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
         ),
         optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
+        optional(
+            "supersedes",
+            "For a service: the id of a job that is stopped once this one is accepted, because nobody wants it any more.",
+            text,
+        ),
     ],
 };
 
