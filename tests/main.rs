@@ -6,6 +6,8 @@
 //! | `clients` | do the Python and the TypeScript client follow the contract, and do their work? |
 //! | `contacts` | are distances, places of contact and comparisons of shapes those of closed forms? |
 //! | `corpus` | does every case of `fixtures/` hold, through the real command? |
+//! | `fuzz` | are documents, mesh files and requests that nobody would write read or refused, without a panic? |
+//! | `hostile` | does the service keep to its description whatever a program makes of that? |
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
@@ -29,6 +31,8 @@ mod container;
 mod contract;
 mod corpus;
 mod determinism;
+mod fuzz;
+mod hostile;
 mod independent;
 mod measures;
 mod properties;

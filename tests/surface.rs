@@ -108,6 +108,49 @@ fn rates_are_announced_and_kept() {
 }
 
 #[test]
+fn keys_of_a_file_have_scopes_and_are_not_told() {
+    let scratch = Scratch::new();
+    let sha256 = |key: &str| {
+        let file = scratch.join("key");
+        std::fs::write(&file, key).unwrap();
+        String::from_utf8(std::process::Command::new("sha256sum").arg(file).output().unwrap().stdout).unwrap()[..64].to_owned()
+    };
+    let keys: String = ["read", "run", "admin"]
+        .map(|scope| format!("[[keys]]\nname = \"{scope}\"\nsha256 = \"{}\"\nscope = \"{scope}\"\n", sha256(&format!("{scope}-key"))))
+        .concat();
+    let file = scratch.join("lacuna.toml");
+    std::fs::write(&file, format!("workers = 1\nretention_hours = 5\n{keys}")).unwrap();
+    let told = std::process::Command::new(lacuna_tests::support::binary::lacuna())
+        .args(["doctor", "--config"])
+        .arg(&file)
+        .env("LACUNA_WORKERS", "4")
+        .output()
+        .unwrap();
+    let told: Value = serde_json::from_slice(&told.stdout).unwrap();
+    let setting = |name: &str| told["settings"].as_array().unwrap().iter().find(|setting| setting["name"] == name).unwrap().clone();
+    assert_eq!((&setting("LACUNA_WORKERS")["value"], &setting("LACUNA_WORKERS")["origin"]), (&json!("4"), &json!("environment")));
+    assert_eq!((&setting("LACUNA_RETENTION_HOURS")["value"], &setting("LACUNA_RETENTION_HOURS")["origin"]), (&json!("5"), &json!("file")));
+    assert_eq!(&setting("keys")["value"], &json!("3 set"));
+
+    let service = Service::start_with(&scratch.join("data"), &[("LACUNA_CONFIG", file.to_str().unwrap())]);
+    let order = json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 } }).to_string();
+    for (key, look, submit, metrics) in
+        [("none", 401, 401, 401), ("read-key", 200, 403, 403), ("run-key", 200, 202, 403), ("admin-key", 200, 202, 200)]
+    {
+        let bearer = format!("Bearer {key}");
+        let headers = [("authorization", bearer.as_str())];
+        assert_eq!(service.get_with("/v1/jobs", &headers).status, look, "{key}");
+        let submitted = service.post_with("/v1/jobs", &headers, order.as_bytes());
+        assert!(submitted.status == submit || submitted.status == 200 && submit == 202, "{key}: {}", submitted.json());
+        assert_eq!(service.get_with("/metrics", &headers).status, metrics, "{key}");
+    }
+    std::fs::write(&file, "wokers = 1\n").unwrap();
+    let refused = run(["doctor".as_ref(), "--config".as_ref(), file.as_os_str()]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("wokers"));
+}
+
+#[test]
 fn the_type_of_a_problem_leads_to_its_page() {
     let scratch = Scratch::new();
     let service = Service::start_with(scratch.path(), &[("LACUNA_API_KEYS", "key")]);

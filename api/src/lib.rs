@@ -10,6 +10,7 @@ pub mod addresses;
 pub mod cli;
 pub mod clock;
 pub mod config;
+pub mod config_file;
 pub mod digest;
 pub mod documents;
 pub mod files;

@@ -22,6 +22,9 @@ pub enum ProblemKind {
     /// No key, or one that is not known.
     #[serde(rename = "/problems/unauthenticated")]
     Unauthenticated,
+    /// The key is known and may not do this.
+    #[serde(rename = "/problems/forbidden")]
+    Forbidden,
     /// There is no such thing, or it belongs to another key.
     #[serde(rename = "/problems/not-found")]
     NotFound,
@@ -103,6 +106,7 @@ impl ProblemKind {
             Self::MalformedJson => (400, 3, "malformed-json", "The body is not JSON"),
             Self::BadRequest => (400, 2, "bad-request", "A header or parameter cannot be understood"),
             Self::Unauthenticated => (401, 5, "unauthenticated", "A valid key is needed"),
+            Self::Forbidden => (403, 5, "forbidden", "The key does not allow this"),
             Self::NotFound => (404, 6, "not-found", "There is no such resource"),
             Self::MethodNotAllowed => (405, 2, "method-not-allowed", "The resource does not have this method"),
             Self::RequestTimeout => (408, 5, "request-timeout", "The request was not finished in time"),
@@ -131,10 +135,11 @@ impl ProblemKind {
     }
 
     /// All kinds.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 28] = [
         Self::MalformedJson,
         Self::BadRequest,
         Self::Unauthenticated,
+        Self::Forbidden,
         Self::NotFound,
         Self::MethodNotAllowed,
         Self::RequestTimeout,
@@ -260,6 +265,7 @@ impl Problem {
     #[must_use]
     pub fn from_status(status: u16) -> Self {
         let kind = match status {
+            403 => ProblemKind::Forbidden,
             404 => ProblemKind::NotFound,
             405 => ProblemKind::MethodNotAllowed,
             408 => ProblemKind::RequestTimeout,

@@ -1279,7 +1279,7 @@ export interface Problem {
 }
 
 /** The kinds of problem, one per `/problems/` address. */
-export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
+export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/forbidden" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
 
 /** A kind of problem. */
 export interface ProblemPage {

@@ -447,6 +447,9 @@ pub(super) struct VerifyArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
+    /// File of settings (TOML), which go behind flags and environment.
+    #[arg(long, value_name = "FILE")]
+    pub(super) config: Option<PathBuf>,
     /// Address and port; port 0 takes a free one. An address beyond this machine needs LACUNA_API_KEYS.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(super) bind: Option<String>,

@@ -12,6 +12,7 @@ use lacuna_kernel::error::LimitFacts;
 
 use super::state::Shared;
 use crate::config::Config;
+use crate::config_file::Scope;
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
 
@@ -27,9 +28,18 @@ pub struct Owner(pub String);
 /// Lets requests with a known key pass and tells the handlers whose they are.
 ///
 /// # Errors
-/// 401 without a known key, 429 above the rate.
+/// 401 without a known key, 403 if it may not, 429 above the rate.
 pub async fn require_key(State(state): State<Shared>, mut request: Request, next: Next) -> Result<Response, Problem> {
-    let owner = identify(&state.config, request.headers())?;
+    let (owner, scope) = identify(&state.config, request.headers())?;
+    let needed = match *request.method() {
+        _ if request.uri().path() == "/metrics" => Scope::Admin,
+        Method::GET | Method::HEAD => Scope::Read,
+        _ => Scope::Run,
+    };
+    if scope < needed {
+        let detail = format!("This key has the scope {scope:?}, and {needed:?} is needed; ask whoever gave it to you").to_lowercase();
+        return Err(Problem::new(ProblemKind::Forbidden, detail));
+    }
     // Without keys everybody is one, and whoever polls would take it from the others: then only submissions are counted.
     let limiter = match *request.method() {
         Method::POST => Some(&state.submissions),
@@ -56,17 +66,17 @@ pub async fn require_key(State(state): State<Shared>, mut request: Request, next
     Ok(response)
 }
 
-fn identify(config: &Config, headers: &HeaderMap) -> Result<Owner, Problem> {
+fn identify(config: &Config, headers: &HeaderMap) -> Result<(Owner, Scope), Problem> {
     if config.keys.is_empty() {
-        return Ok(Owner("local".to_owned()));
+        return Ok((Owner("local".to_owned()), Scope::Admin));
     }
     let given = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let (scheme, key) = given.split_once(' ').unwrap_or_default();
     let digest = Digest::of(key.trim().as_bytes());
     // All keys are compared, so that the time does not tell which one came close.
-    let known = config.keys.iter().fold(false, |known, key| key.same_in_constant_time(&digest) | known);
-    if known && scheme.eq_ignore_ascii_case("bearer") {
-        return Ok(Owner(digest.hex()[..32].to_owned()));
+    let known = config.keys.iter().fold(None, |known, key| if key.digest.same_in_constant_time(&digest) { Some(key.scope) } else { known });
+    if let Some(scope) = known.filter(|_| scheme.eq_ignore_ascii_case("bearer")) {
+        return Ok((Owner(digest.hex()[..32].to_owned()), scope));
     }
     Err(Problem::new(ProblemKind::Unauthenticated, "Send a key of this service: Authorization: Bearer KEY"))
 }

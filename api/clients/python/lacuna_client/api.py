@@ -680,7 +680,7 @@ Problem = TypedDict('Problem', {
     'type': 'ProblemKind',
 })
 
-ProblemKind: TypeAlias = "Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/not-found', '/problems/method-not-allowed', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']"
+ProblemKind: TypeAlias = "Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/forbidden', '/problems/not-found', '/problems/method-not-allowed', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']"
 
 ProblemPage = TypedDict('ProblemPage', {
     'exit_code': 'int',
