@@ -3,18 +3,24 @@
 //! | module | asks |
 //! |---|---|
 //! | `booleans` | do combined solids hold what their certificates say? |
+//! | `clients` | do the Python and the TypeScript client follow the contract, and do their work? |
 //! | `contacts` | are distances, places of contact and comparisons of shapes those of closed forms? |
 //! | `corpus` | does every case of `fixtures/` hold, through the real command? |
+//! | `fuzz` | are documents, mesh files and requests that nobody would write read or refused, without a panic? |
+//! | `hostile` | does the service keep to its description whatever a program makes of that? |
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
 //! | `levels` | are levels of systems the solids that closed forms say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
+//! | `remote` | does the command line at a service leave what it leaves here? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `splits` | do the parts of a solid add up to it? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `service` | does the running service keep them? |
+//! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
+//! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |
 
@@ -22,16 +28,22 @@
 
 mod architecture;
 mod booleans;
+mod clients;
 mod contacts;
 mod container;
 mod contract;
 mod corpus;
 mod determinism;
+mod fuzz;
+mod hostile;
 mod independent;
 mod levels;
 mod measures;
 mod properties;
+mod remote;
 mod service;
 mod slices;
 mod splits;
+mod surface;
 mod thickening;
+mod uploads;

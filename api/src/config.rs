@@ -1,10 +1,12 @@
-//! Settings of the service, each with the origin of its value: flag, environment or default.
+//! Settings of the service, each with the origin of its value: flag, environment, file or default.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use lacuna_kernel::budget::Limits;
+use tracing_subscriber::filter::LevelFilter;
 
+use crate::config_file::{ConfigFile, Key, Scope};
 use crate::digest::Digest;
 
 /// Where a value comes from.
@@ -15,6 +17,8 @@ pub enum Origin {
     Flag,
     /// A variable of the environment.
     Environment,
+    /// The configuration file.
+    File,
     /// Nobody said otherwise.
     Default,
 }
@@ -22,6 +26,8 @@ pub enum Origin {
 /// What the command line of `serve` may say.
 #[derive(Clone, Debug, Default)]
 pub struct Flags {
+    /// `--config`.
+    pub config: Option<PathBuf>,
     /// `--bind`.
     pub bind: Option<String>,
     /// `--data`.
@@ -45,8 +51,8 @@ pub struct Config {
     pub workers: usize,
     /// Threads that they share; 0 for one per core.
     pub threads: usize,
-    /// Digests of the keys; without any, everybody who reaches the address is the same owner.
-    pub keys: Vec<Digest>,
+    /// The keys; without any, everybody who reaches the address is the same owner.
+    pub keys: Vec<Key>,
     /// Origins whose pages may call the service.
     pub cors_origins: Vec<String>,
     /// Longest JSON body in bytes.
@@ -55,6 +61,10 @@ pub struct Config {
     pub header_seconds: u64,
     /// Time for a request's body, in seconds.
     pub body_seconds: u64,
+    /// Longest mesh file that is taken, in bytes.
+    pub upload_bytes: u64,
+    /// Time for a whole upload, in seconds; between two pieces of it `body_seconds` may pass.
+    pub upload_seconds: u64,
     /// Time for an answer, in seconds; longer than the longest `Prefer: wait`.
     pub answer_seconds: u64,
     /// Jobs that may wait.
@@ -63,12 +73,16 @@ pub struct Config {
     pub jobs_per_key: usize,
     /// Submissions per minute that one key may make.
     pub submissions_per_minute: u32,
+    /// Other calls per minute that one key may make.
+    pub calls_per_minute: u32,
     /// Time to end what runs when the service stops, in seconds.
     pub drain_seconds: u64,
     /// Age at which ended jobs are forgotten, in hours.
     pub retention_hours: u64,
     /// The most that a job may ask for; the default of what it does not ask for.
     pub job_limits: Limits,
+    /// How much is logged: `error`, `warn`, `info`, `debug`, `trace` or `off`.
+    pub log: LevelFilter,
     /// Whether the log is JSON.
     pub log_json: bool,
 }
@@ -99,10 +113,18 @@ pub struct Told {
 /// Reads settings and keeps where each came from.
 struct Reader<'a> {
     environment: &'a dyn Fn(&str) -> Option<String>,
+    file: ConfigFile,
     told: Vec<Told>,
 }
 
 impl Reader<'_> {
+    /// What the environment says, or else the file.
+    fn stated(&self, name: &str) -> Option<(String, Origin)> {
+        // The file is asked in any case: what the environment overrides is no unknown setting.
+        let filed = self.file.text(name);
+        (self.environment)(name).map(|text| (text, Origin::Environment)).or(filed.map(|text| (text, Origin::File)))
+    }
+
     fn take<T: ToString + std::str::FromStr>(
         &mut self,
         name: &'static str,
@@ -110,11 +132,11 @@ impl Reader<'_> {
         default: T,
         expected: &'static str,
     ) -> Result<T, BadSetting> {
-        let (value, origin) = match (flag, (self.environment)(name)) {
+        let (value, origin) = match (flag, self.stated(name)) {
             (Some(value), _) => (value, Origin::Flag),
-            (None, Some(text)) => {
+            (None, Some((text, origin))) => {
                 let value = text.trim().parse().map_err(|_| BadSetting { name, value: text, expected })?;
-                (value, Origin::Environment)
+                (value, origin)
             }
             (None, None) => (default, Origin::Default),
         };
@@ -123,10 +145,8 @@ impl Reader<'_> {
     }
 
     fn list(&mut self, name: &'static str, secret: bool) -> Vec<String> {
-        let text = (self.environment)(name);
-        let origin = if text.is_some() { Origin::Environment } else { Origin::Default };
-        let items: Vec<String> =
-            text.unwrap_or_default().split(',').map(str::trim).filter(|item| !item.is_empty()).map(str::to_owned).collect();
+        let (text, origin) = self.stated(name).unwrap_or((String::new(), Origin::Default));
+        let items: Vec<String> = text.split(',').map(str::trim).filter(|item| !item.is_empty()).map(str::to_owned).collect();
         let value = if secret { format!("{} set", items.len()) } else { items.join(", ") };
         self.told.push(Told { name, value, origin });
         items
@@ -140,7 +160,12 @@ impl Config {
     /// When a value cannot be read, or the address is public and there is no key.
     pub fn read(flags: &Flags, environment: &dyn Fn(&str) -> Option<String>) -> Result<(Self, Vec<Told>), BadSetting> {
         const COUNT: &str = "a whole number is expected";
-        let mut reader = Reader { environment, told: Vec::new() };
+        let named = flags.config.clone().map(|path| (path, Origin::Flag));
+        let named = named.or_else(|| environment("LACUNA_CONFIG").map(|path| (PathBuf::from(path), Origin::Environment)));
+        let file = named.as_ref().map(|(path, _)| ConfigFile::read(path)).transpose()?.unwrap_or_default();
+        let (value, origin) = named.map_or((String::new(), Origin::Default), |(path, origin)| (path.display().to_string(), origin));
+        let filed_keys = file.keys()?;
+        let mut reader = Reader { environment, file, told: vec![Told { name: "LACUNA_CONFIG", value, origin }] };
         let bind = reader.take("LACUNA_BIND", flags.bind.clone(), "127.0.0.1:7878".to_owned(), "")?;
         let address = bind.parse::<SocketAddr>().map_err(|_| BadSetting {
             name: "LACUNA_BIND",
@@ -154,15 +179,18 @@ impl Config {
             data: PathBuf::from(data),
             workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
             threads: reader.take("LACUNA_THREADS", flags.threads, 0, COUNT)?,
-            keys: reader.list("LACUNA_API_KEYS", true).iter().map(|key| Digest::of(key.as_bytes())).collect(),
+            keys: read_keys(&mut reader, filed_keys),
             cors_origins: reader.list("LACUNA_CORS_ORIGINS", false),
             body_bytes: reader.take("LACUNA_BODY_BYTES", None, 8 << 20, COUNT)?,
             header_seconds: reader.take("LACUNA_HEADER_SECONDS", None, 10, COUNT)?,
             body_seconds: reader.take("LACUNA_BODY_SECONDS", None, 30, COUNT)?,
+            upload_bytes: reader.take("LACUNA_UPLOAD_BYTES", None, 256 << 20, COUNT)?,
+            upload_seconds: reader.take("LACUNA_UPLOAD_SECONDS", None, 600, COUNT)?,
             answer_seconds: reader.take("LACUNA_ANSWER_SECONDS", None, 60, COUNT)?,
             queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,
             jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 36, COUNT)?,
             submissions_per_minute: reader.take("LACUNA_SUBMISSIONS_PER_MINUTE", None, 600, COUNT)?,
+            calls_per_minute: reader.take("LACUNA_CALLS_PER_MINUTE", None, 6000, COUNT)?,
             drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
             retention_hours: reader.take("LACUNA_RETENTION_HOURS", None, 72, COUNT)?,
             job_limits: Limits {
@@ -171,9 +199,11 @@ impl Config {
                 triangles: reader.take("LACUNA_LIMIT_TRIANGLES", None, 50_000_000, COUNT)?,
                 ..defaults
             },
+            log: reader.take("LACUNA_LOG", None, LevelFilter::INFO, "error, warn, info, debug, trace or off is expected")?,
             log_json: reader.take("LACUNA_LOG_JSON", flags.log_json, false, "true or false is expected")?,
         };
         config.check(&bind)?;
+        reader.file.check_known()?;
         Ok((config, reader.told))
     }
 
@@ -188,6 +218,16 @@ impl Config {
         }
         Ok(())
     }
+}
+
+/// Keys of the environment, which may do everything, and those of the file, which have a scope.
+fn read_keys(reader: &mut Reader<'_>, filed: Vec<Key>) -> Vec<Key> {
+    let plain = reader.list("LACUNA_API_KEYS", true);
+    if !filed.is_empty() {
+        reader.told.push(Told { name: "keys", value: format!("{} set", filed.len()), origin: Origin::File });
+    }
+    let plain = plain.iter().map(|key| Key { digest: Digest::of(key.as_bytes()), scope: Scope::Admin });
+    plain.chain(filed).collect()
 }
 
 #[cfg(test)]
@@ -215,6 +255,26 @@ mod tests {
         let (config, told) = Config::read(&flags, &keys).unwrap();
         assert_eq!(config.keys.len(), 2);
         assert!(told.iter().all(|t| !t.value.contains("secret")));
+    }
+
+    #[test]
+    fn a_file_stands_between_the_environment_and_the_defaults() {
+        let path = std::env::temp_dir().join(format!("lacuna-config-{}.toml", uuid::Uuid::now_v7()));
+        let key = Digest::of(b"secret").hex();
+        let text = format!("workers = 5\nqueued = 9\nbind = \"0.0.0.0:80\"\n[[keys]]\nsha256 = \"{key}\"\nscope = \"read\"\n");
+        std::fs::write(&path, &text).unwrap();
+        let environment = |name: &str| (name == "LACUNA_QUEUED").then(|| "7".to_owned());
+        let flags = Flags { config: Some(path.clone()), ..Flags::default() };
+        let (config, told) = Config::read(&flags, &environment).unwrap();
+        assert_eq!((config.workers, config.queued, config.keys.len(), config.keys[0].scope), (5, 7, 1, Scope::Read));
+        let origin = |name| told.iter().find(|t| t.name == name).unwrap().origin;
+        assert_eq!(
+            (origin("LACUNA_WORKERS"), origin("LACUNA_QUEUED"), origin("LACUNA_CONFIG")),
+            (Origin::File, Origin::Environment, Origin::Flag)
+        );
+        std::fs::write(&path, text + "[colour]\n").unwrap();
+        assert!(Config::read(&flags, &environment).unwrap_err().value.contains("colour"));
+        std::fs::remove_file(path).unwrap();
     }
 
     #[test]

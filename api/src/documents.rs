@@ -1,7 +1,7 @@
 //! Documents at the doors: bytes to typed models and jobs, all findings as one problem, and the digest of
 //! what was meant.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -12,16 +12,63 @@ use lacuna_exchange::format::automaton::Diagram;
 use lacuna_exchange::format::{FORMATS, Format, MeshFile, ReadLimits, read as read_mesh};
 use lacuna_fabrication::{Job, JobKind, SolutionSpace, Solved};
 use lacuna_kernel::budget::{Budget, Limits};
-use lacuna_kernel::model::Model;
+use lacuna_kernel::error::LimitFacts;
+use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 use serde::{Deserialize, Serialize, Serializer};
 use utoipa::ToSchema;
 
-use crate::digest::Digest;
+use crate::digest::{Digest, DigestSink};
+use crate::inspection;
 use crate::problem::{Finding, Problem, ProblemKind};
 use crate::production;
 
-/// Finds a stored model's document by its id.
-pub type ModelFinder<'a> = &'a dyn Fn(&str) -> Option<Vec<u8>>;
+/// What is kept under an id.
+pub enum Stored {
+    /// A model document.
+    Document(Vec<u8>),
+    /// A mesh file.
+    Mesh(StoredMesh),
+}
+
+/// A mesh file that somebody uploaded.
+pub struct StoredMesh {
+    /// What to call it.
+    pub name: Option<String>,
+    /// As what to read it.
+    pub format: Format,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// The word by which a worker finds it again: it depends on the contents alone.
+    pub reference: String,
+}
+
+/// Finds what is stored under an id.
+pub type ModelFinder<'a> = &'a dyn Fn(&str) -> Option<Stored>;
+
+/// A job that was read, and by which words a worker finds the mesh files among its inputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// The job, every model in it.
+    pub job: Job,
+    references: Vec<Option<String>>,
+    /// The id of a job that this one replaces.
+    pub supersedes: Option<String>,
+}
+
+impl Order {
+    /// A job, and by which words whoever does it finds the inputs that have one.
+    #[must_use]
+    pub fn new(job: Job, references: Vec<Option<String>>) -> Self {
+        Self { job, references, supersedes: None }
+    }
+
+    /// The document from which a worker does the job: canonical, limits complete, models in full but for uploaded mesh
+    /// files, which stay where they are.
+    #[must_use]
+    pub fn document(&self) -> String {
+        document::write_order(&self.job, &self.references)
+    }
+}
 
 /// What `validate` says of a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -82,6 +129,7 @@ pub fn kind_word(kind: JobKind) -> &'static str {
         JobKind::Measure => "measure",
         JobKind::Intersect => "intersect",
         JobKind::Slice => "slice",
+        JobKind::Convert => "convert",
     }
 }
 
@@ -124,11 +172,31 @@ fn mesh_in(folder: &Path, name: &str) -> Result<MeshFile, String> {
     read_mesh(&bytes, None, &limits).map_err(|error| error.to_string())
 }
 
-/// Reads a job document, fetches the stored models that it names, and completes its limits.
+/// A mesh file as a model: its polygons, which are a solid if they are closed.
+///
+/// # Errors
+/// When the file cannot be read within the limits.
+pub fn mesh_model(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result<Model, Problem> {
+    let file = inspection::read(bytes, format, limits)?;
+    let faces = file.faces();
+    Ok(Model { name: None, shape: Shape::Mesh(PolygonMesh { faces, vertices: file.mesh.vertices, interior: Interior::Auto }) })
+}
+
+fn model_of(stored: Stored) -> Result<Model, Problem> {
+    match stored {
+        Stored::Document(bytes) => read_model(&bytes),
+        Stored::Mesh(mesh) => {
+            let model = mesh_model(&mesh.bytes, Some(mesh.format), &ReadLimits::default())?;
+            Ok(Model { name: mesh.name, ..model })
+        }
+    }
+}
+
+/// Reads a job document, fetches the stored models and meshes that it names, and completes its limits.
 ///
 /// # Errors
 /// All findings, as one problem.
-pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
+pub fn read_order(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Order, Problem> {
     complete(production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?, most, find)
 }
 
@@ -137,14 +205,101 @@ pub fn read_job(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<Jo
 /// # Errors
 /// All findings, as one problem.
 pub fn read_job_in(bytes: &[u8], most: &Limits, folder: Option<&Path>) -> Result<Job, Problem> {
-    let Some(folder) = folder else { return read_job(bytes, most, &|_| None) };
+    let Some(folder) = folder else { return here(read_order(bytes, most, &|_| None)?) };
     let read = || document::read_job_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name));
-    complete(production::guarded(read)?.map_err(refused)?, most, &|_| None)
+    here(complete(production::guarded(read)?.map_err(refused)?, most, &|_| None)?)
 }
 
-fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Job, Problem> {
-    let model = |id: &str| find(id).and_then(|bytes| read_model(&bytes).ok());
-    let mut job = read.resolve(&within(&Limits::default(), most), most, model).map_err(refused)?;
+/// A job that is done at once, by whoever reads it.
+fn here(order: Order) -> Result<Job, Problem> {
+    match order.supersedes {
+        None => Ok(order.job),
+        Some(_) => Err(one_finding("/supersedes", UNKNOWN_JOB, "there is no other job to be replaced; a service has jobs")),
+    }
+}
+
+/// The code of an id that is no job's.
+const UNKNOWN_JOB: &str = "job.unknown-job";
+
+/// A job to be replaced is not there.
+#[must_use]
+pub fn unknown_job(id: &str) -> Problem {
+    let shown: String = id.chars().take(80).collect();
+    one_finding("/supersedes", UNKNOWN_JOB, &format!("there is no job {shown:?} to be replaced; leave \"supersedes\" out"))
+}
+
+/// A job document without its kind, completed; every place in it stays where it was.
+#[must_use]
+pub fn of_kind(body: &[u8], kind: JobKind) -> Vec<u8> {
+    let (Some(first), Some(last)) = (body.iter().position(|&byte| byte == b'{'), body.iter().rposition(|&byte| byte == b'}')) else {
+        // No object: the reader says what it is instead.
+        return body.to_vec();
+    };
+    if last < first {
+        return body.to_vec();
+    }
+    let comma = if body[first + 1..last].iter().all(u8::is_ascii_whitespace) { "" } else { "," };
+    let member = format!("{comma}\"kind\":\"{}\"", kind_word(kind));
+    [&body[..last], member.as_bytes(), &body[last..]].concat()
+}
+
+/// Fetches what a job names, and remembers what of it are mesh files.
+struct Fetcher<'a> {
+    find: ModelFinder<'a>,
+    references: HashMap<String, String>,
+    triangles: u64,
+    most_triangles: u64,
+    refusal: Option<Problem>,
+}
+
+impl Fetcher<'_> {
+    fn fetch(&mut self, id: &str) -> Option<Model> {
+        if self.refusal.is_some() {
+            return None;
+        }
+        let stored = (self.find)(id)?;
+        if let Stored::Mesh(mesh) = &stored {
+            self.references.insert(id.to_owned(), mesh.reference.clone());
+        }
+        match model_of(stored).and_then(|model| self.count(model)) {
+            Ok(model) => Some(model),
+            Err(problem) => {
+                self.refusal = Some(problem);
+                None
+            }
+        }
+    }
+
+    /// A short job can name a large mesh a thousand times, and every input is a mesh of its own in memory.
+    fn count(&mut self, model: Model) -> Result<Model, Problem> {
+        if let Shape::Mesh(mesh) = &model.shape {
+            self.triangles += mesh.faces.len() as u64;
+        }
+        if self.triangles <= self.most_triangles {
+            return Ok(model);
+        }
+        #[expect(clippy::cast_precision_loss, reason = "limits are shown, not computed with")]
+        let facts =
+            LimitFacts { limit: "referenced_faces", asked: self.triangles as f64, allowed: self.most_triangles as f64, remedy: None };
+        let detail = format!("the meshes that the job names have more than {} faces together", self.most_triangles);
+        Err(Problem::new(ProblemKind::Limit, detail).code("limit.referenced-faces").limit(&facts))
+    }
+}
+
+fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Order, Problem> {
+    let ids: Vec<Option<String>> = read.inputs.iter().map(|input| input.reference().map(str::to_owned)).collect();
+    let supersedes = read.supersedes.clone();
+    let mut fetcher = Fetcher { find, references: HashMap::new(), triangles: 0, most_triangles: most.triangles, refusal: None };
+    let resolved = read.resolve(&within(&Limits::default(), most), most, |id| fetcher.fetch(id));
+    if let Some(problem) = fetcher.refusal {
+        return Err(problem);
+    }
+    let mut job = resolved.map_err(refused)?;
+    let references: Vec<Option<String>> = ids.into_iter().map(|id| fetcher.references.get(&id?).cloned()).collect();
+    // A mesh file's name has named its input. The model itself has none, whoever reads it: equal work has one digest.
+    for (input, _) in job.inputs.iter_mut().zip(&references).filter(|(_, reference)| reference.is_some()) {
+        input.model.name = None;
+    }
     if job.outputs.is_empty() {
         job.outputs = default_outputs(&job).iter().map(|&name| name.to_owned()).collect();
     }
@@ -155,7 +310,7 @@ fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<J
     for (index, name) in job.outputs.iter().enumerate() {
         format(name).map_err(|problem| one_finding(&format!("/outputs/{index}"), &problem.code, &problem.detail))?;
     }
-    Ok(job)
+    Ok(Order { job, references, supersedes })
 }
 
 /// Reads a request to solve a model, and fetches the model if it is stored.
@@ -164,7 +319,7 @@ fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<J
 /// All findings, as one problem.
 pub fn read_solve(bytes: &[u8], find: ModelFinder<'_>) -> Result<(Model, BTreeMap<String, f64>), Problem> {
     let read = production::guarded(|| document::read_solve(bytes, &DocumentLimits::default()))?.map_err(refused)?;
-    let model = read.input.resolve(|id| find(id).and_then(|bytes| read_model(&bytes).ok()));
+    let model = read.input.resolve(|id| find(id).and_then(|stored| model_of(stored).ok()));
     Ok((model.map_err(|diagnostic| refused(vec![diagnostic]))?, read.values))
 }
 
@@ -207,7 +362,7 @@ fn default_outputs(job: &Job) -> &'static [&'static str] {
     match job.kind {
         JobKind::Intersect if job.params.operation.is_none() => &[],
         JobKind::Solidify | JobKind::Intersect => &["3mf"],
-        JobKind::Evaluate => &["obj"],
+        JobKind::Evaluate | JobKind::Convert => &["obj"],
         JobKind::Slice => &["svg"],
         JobKind::Measure => &[],
     }
@@ -225,17 +380,14 @@ pub fn within(default: &Limits, most: &Limits) -> Limits {
     }
 }
 
-/// The document from which a worker does the job: canonical, models in full and limits complete.
-#[must_use]
-pub fn order_document(job: &Job) -> String {
-    document::write_job(job)
-}
-
 /// Digest of the canonical job document with the default limits: equal for equal work, because limits
 /// decide whether there is a result but not which.
 #[must_use]
 pub fn job_digest(job: &Job) -> Digest {
-    Digest::of(document::write_job(&Job { limits: Limits::default(), ..job.clone() }).as_bytes())
+    let mut sink = DigestSink::default();
+    // A digest takes everything.
+    let _ = document::write_job_to(job, &Limits::default(), &mut sink);
+    sink.finish()
 }
 
 /// The canonical document of a model.
@@ -261,11 +413,11 @@ pub fn read_address_question(bytes: &[u8], find: ModelFinder<'_>) -> Result<(Mod
     let model = match read.input.source {
         ModelSource::Inline(model) => *model,
         ModelSource::Stored(id) => {
-            let bytes = find(&id).ok_or_else(|| {
+            let stored = find(&id).ok_or_else(|| {
                 let message = format!("no model is stored as {id:?}; store it first, or send it as \"model\"");
                 one_finding(&read.input.pointer, code::UNKNOWN_MODEL, &message)
             })?;
-            read_model(&bytes)?
+            model_of(stored)?
         }
     };
     Ok((model, read.sought))
@@ -386,7 +538,7 @@ mod tests {
 
     fn job(kind: &str, units: &str, length: &str, radius: &str, rest: &str) -> Result<Job, Problem> {
         let text = JOB.replace("KIND", kind).replace("UNITS", units).replace("LENGTH", length);
-        read_job(text.replace("RADIUS", radius).replace("REST", rest).as_bytes(), &Limits::default(), &|_| None)
+        read_order(text.replace("RADIUS", radius).replace("REST", rest).as_bytes(), &Limits::default(), &|_| None).map(|order| order.job)
     }
 
     #[test]
@@ -394,7 +546,7 @@ mod tests {
         let cm = job("measure", "cm", "1", "", "").unwrap();
         let mm = job("measure", "mm", "10", "", r#","limits":{"seconds":5}"#).unwrap();
         assert_eq!(job_digest(&cm), job_digest(&mm));
-        assert_ne!(order_document(&cm), order_document(&mm));
+        assert_ne!(document::write_job(&cm), document::write_job(&mm));
         assert_ne!(job_digest(&cm), job_digest(&job("measure", "mm", "11", "", "").unwrap()));
     }
 
@@ -402,7 +554,7 @@ mod tests {
     fn a_worker_reads_the_same_job() {
         let first = job("solidify", "in", "1", r#","radius_mm":0.4"#, "").unwrap();
         assert_eq!(first.outputs, ["3mf"]);
-        let again = read_job(order_document(&first).as_bytes(), &Limits::default(), &|_| None).unwrap();
+        let again = read_order(document::write_job(&first).as_bytes(), &Limits::default(), &|_| None).unwrap().job;
         assert_eq!(first, again);
     }
 

@@ -10,10 +10,12 @@ pub mod addresses;
 pub mod cli;
 pub mod clock;
 pub mod config;
+pub mod config_file;
 pub mod digest;
 pub mod documents;
 pub mod files;
 pub mod http;
+pub mod inspection;
 pub mod jobs;
 pub mod metrics;
 pub mod openapi;
@@ -21,6 +23,7 @@ pub mod problem;
 pub mod production;
 pub mod routes;
 pub mod store;
+pub mod trades;
 pub mod verify;
 
 /// Locks a mutex whose data stays whole even if a holder panicked: every change under our locks is one

@@ -19,6 +19,10 @@ pub struct SolveRequest {}
 #[derive(ToSchema)]
 pub struct AddressQuestion {}
 
+/// Stands for a job document without its kind: its schema is made of the job's.
+#[derive(ToSchema)]
+pub struct ShortOrder {}
+
 /// The description as indented JSON, with a line end: what is committed.
 #[must_use]
 pub fn text() -> String {
@@ -43,6 +47,7 @@ pub fn document() -> Value {
         { "name": "studies", "description": "What can be said without computing the shape." },
         { "name": "jobs", "description": "Computations: submitted, followed, stopped." },
         { "name": "results", "description": "Files, by job and by digest." },
+        { "name": "trades", "description": "Materials and processes, each value with its source." },
         { "name": "operation", "description": "Probes, limits, the contract itself." }
     ]);
     document["security"] = json!([{ "key": [] }]);
@@ -51,7 +56,21 @@ pub fn document() -> Value {
     for (name, schema) in lacuna_exchange::document::schemas("#/components/schemas/") {
         document["components"]["schemas"][name] = schema;
     }
+    document["components"]["schemas"]["ShortOrder"] = short_order(&document["components"]["schemas"]["Job"]);
     document
+}
+
+/// A job document whose kind the address says.
+fn short_order(job: &Value) -> Value {
+    let mut schema = job.clone();
+    if let Some(members) = schema["properties"].as_object_mut() {
+        members.remove("kind");
+    }
+    if let Some(required) = schema["required"].as_array_mut() {
+        required.retain(|name| name != "kind");
+    }
+    schema["description"] = "A job document without `kind`, which the address says.".into();
+    schema
 }
 
 #[cfg(test)]

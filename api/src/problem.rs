@@ -22,6 +22,9 @@ pub enum ProblemKind {
     /// No key, or one that is not known.
     #[serde(rename = "/problems/unauthenticated")]
     Unauthenticated,
+    /// The key is known and may not do this.
+    #[serde(rename = "/problems/forbidden")]
+    Forbidden,
     /// There is no such thing, or it belongs to another key.
     #[serde(rename = "/problems/not-found")]
     NotFound,
@@ -103,6 +106,7 @@ impl ProblemKind {
             Self::MalformedJson => (400, 3, "malformed-json", "The body is not JSON"),
             Self::BadRequest => (400, 2, "bad-request", "A header or parameter cannot be understood"),
             Self::Unauthenticated => (401, 5, "unauthenticated", "A valid key is needed"),
+            Self::Forbidden => (403, 5, "forbidden", "The key does not allow this"),
             Self::NotFound => (404, 6, "not-found", "There is no such resource"),
             Self::MethodNotAllowed => (405, 2, "method-not-allowed", "The resource does not have this method"),
             Self::RequestTimeout => (408, 5, "request-timeout", "The request was not finished in time"),
@@ -128,6 +132,50 @@ impl ProblemKind {
             Self::CheckFailed => (422, 1, "check-failed", "A check failed"),
             Self::ServiceUnreachable => (503, 5, "service-unreachable", "The service cannot be reached"),
         }
+    }
+
+    /// All kinds.
+    pub const ALL: [Self; 28] = [
+        Self::MalformedJson,
+        Self::BadRequest,
+        Self::Unauthenticated,
+        Self::Forbidden,
+        Self::NotFound,
+        Self::MethodNotAllowed,
+        Self::RequestTimeout,
+        Self::IdempotencyInProgress,
+        Self::StateConflict,
+        Self::BodyTooLarge,
+        Self::UnsupportedMedia,
+        Self::Range,
+        Self::InvalidModel,
+        Self::InvalidFile,
+        Self::IdempotencyMismatch,
+        Self::Unreachable,
+        Self::Limit,
+        Self::TooManyJobs,
+        Self::RateLimited,
+        Self::Cancelled,
+        Self::Interrupted,
+        Self::Internal,
+        Self::InputOutput,
+        Self::ShuttingDown,
+        Self::Timeout,
+        Self::Usage,
+        Self::CheckFailed,
+        Self::ServiceUnreachable,
+    ];
+
+    /// The kind whose address ends with a word.
+    #[must_use]
+    pub fn of_code(code: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.facts().2 == code)
+    }
+
+    /// The kind in words.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        self.facts().3
     }
 
     /// The exit code of a command that ends with this problem.
@@ -217,6 +265,7 @@ impl Problem {
     #[must_use]
     pub fn from_status(status: u16) -> Self {
         let kind = match status {
+            403 => ProblemKind::Forbidden,
             404 => ProblemKind::NotFound,
             405 => ProblemKind::MethodNotAllowed,
             408 => ProblemKind::RequestTimeout,
@@ -385,6 +434,15 @@ mod tests {
         ] {
             let kind = ProblemKind::from(kind);
             assert_eq!((kind.facts().0, kind.exit_code()), (status, exit));
+        }
+    }
+
+    #[test]
+    fn every_kind_has_an_address_of_its_own() {
+        for kind in ProblemKind::ALL {
+            let address = serde_json::to_value(kind).unwrap();
+            assert_eq!(address, format!("/problems/{}", kind.facts().2));
+            assert_eq!(ProblemKind::of_code(kind.facts().2), Some(kind));
         }
     }
 

@@ -5,11 +5,12 @@ use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
-use lacuna_exchange::format::{self, Format, FormatError, Metadata, NamedMesh, PointFile};
+use lacuna_exchange::format::{self, Fan, Format, FormatError, Metadata, NamedMesh, PointFile};
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Stack, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::model::Model;
+use lacuna_kernel::model::{Model, PolygonMesh};
+use lacuna_kernel::solid::TriMesh;
 
 use crate::digest::Digest;
 use crate::files::{PendingFile, Stoppable};
@@ -157,7 +158,14 @@ pub fn write_file(
         return Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed);
     }
     let parts = parts(&outcome.geometry);
-    let geometry = view(&outcome.geometry, &parts).ok_or_else(|| no_geometry(format))?;
+    let cut;
+    let geometry = match &outcome.geometry {
+        Geometry::Polygons { mesh, closed } => {
+            cut = Cut::of(mesh);
+            cut.geometry(*closed)
+        }
+        other => view(other, &parts).ok_or_else(|| no_geometry(format))?,
+    };
     guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
     sink.flush().map_err(failed)?;
     drop(sink);
@@ -250,7 +258,24 @@ fn view<'g>(geometry: &'g Geometry, parts: &'g [NamedMesh<'g>]) -> Option<format
         Geometry::Solid(solid) => Some(solid.into()),
         Geometry::Parts(_) => Some(parts.into()),
         Geometry::Tessellation(tessellation) => Some(tessellation.into()),
-        Geometry::Sections(_) | Geometry::None => None,
+        Geometry::Polygons { .. } | Geometry::Sections(_) | Geometry::None => None,
+    }
+}
+
+/// Polygons as the formats take them: cut into triangles, with a note of which belong together.
+struct Cut {
+    mesh: TriMesh,
+    fans: Vec<Fan>,
+}
+
+impl Cut {
+    fn of(mesh: &PolygonMesh) -> Self {
+        let (triangles, fans) = format::fanned(&mesh.faces);
+        Self { mesh: TriMesh { vertices: mesh.vertices.clone(), triangles }, fans }
+    }
+
+    fn geometry(&self, closed: bool) -> format::Geometry<'_> {
+        format::Geometry::Polygons { mesh: &self.mesh, fans: &self.fans, closed }
     }
 }
 

@@ -3,6 +3,8 @@
 //! Everything is one file per thing, written by [`crate::files`], so that a crash leaves the state before or
 //! the state after. This module is the boundary behind which a database or an object store can stand.
 
+mod uploads;
+
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -13,23 +15,27 @@ use utoipa::ToSchema;
 
 use crate::digest::Digest;
 use crate::files::{self, PENDING_ENDING, PendingFile};
+use crate::inspection::MeshReport;
 use crate::jobs::record::{Answer, JobRecord};
 
 /// What is told of a stored model.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ModelView {
     /// Its id, chosen by its contents.
     pub id: String,
     /// The author's name for it.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub name: Option<String>,
-    /// Length of the canonical document.
+    /// Length of the canonical document, or of the mesh file.
     pub bytes: u64,
     /// When it was first stored.
     pub created: String,
-    /// `sha256:` digest of the canonical document.
+    /// `sha256:` digest of the canonical document, or of the mesh file.
     #[schema(value_type = String)]
     pub digest: Digest,
+    /// What an uploaded mesh file holds; absent for model documents.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub mesh: Option<MeshReport>,
 }
 
 /// Where things are kept.
@@ -44,7 +50,7 @@ impl Store {
     /// # Errors
     /// When the folder cannot be made or written.
     pub fn open(root: &Path) -> io::Result<Self> {
-        for name in ["jobs", "documents", "models", "results", "answers"] {
+        for name in ["jobs", "documents", "models", "uploads", "results", "answers"] {
             let folder = root.join(name);
             fs::create_dir_all(&folder)?;
             for entry in fs::read_dir(&folder)? {
@@ -182,7 +188,8 @@ impl Store {
         if let Some(known) = self.model(owner, &id)? {
             return Ok((known, false));
         }
-        let view = ModelView { id, name: name.map(str::to_owned), bytes: document.len() as u64, created: crate::clock::now(), digest };
+        let view =
+            ModelView { id, name: name.map(str::to_owned), bytes: document.len() as u64, created: crate::clock::now(), digest, mesh: None };
         fs::create_dir_all(self.models(owner))?;
         files::write_whole(&self.models(owner).join(format!("{}.document", view.id)), document)?;
         files::write_whole(&self.models(owner).join(format!("{}.json", view.id)), &serde_json::to_vec(&view)?)?;

@@ -37,6 +37,15 @@ fn interpreter() -> PathBuf {
     PathBuf::from(String::from_utf8(output.stdout).unwrap().trim())
 }
 
+/// A program of the environment; the first call makes the environment.
+///
+/// # Panics
+/// As when the environment cannot be made.
+#[must_use]
+pub fn tool(name: &str) -> Command {
+    Command::new(interpreter().with_file_name(name))
+}
+
 /// A running `check.py`: one request, one report.
 #[derive(Debug)]
 pub struct Judge {

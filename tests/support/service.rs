@@ -147,6 +147,15 @@ impl Service {
         self.send("DELETE", path, &[], b"").unwrap()
     }
 
+    /// Any request, its headers and body as they are.
+    ///
+    /// # Panics
+    /// When there is no answer.
+    #[must_use]
+    pub fn request(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
+        self.send(method, path, headers, body).unwrap()
+    }
+
     /// `POST` of JSON.
     #[must_use]
     pub fn post(&self, path: &str, body: &Value) -> Answer {

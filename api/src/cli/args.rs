@@ -15,6 +15,13 @@ use lacuna_kernel::measure::Primitive;
 #[derive(Debug, Parser)]
 #[command(name = "lacuna", version, verbatim_doc_comment)]
 pub(super) struct Cli {
+    /// Let a service do the work: solidify, evaluate, measure, intersect, slice, convert, run, plan, validate and jobs go
+    /// to it; every other command works here. Its key is taken from LACUNA_API_KEY alone.
+    #[arg(long, global = true, value_name = "URL", env = "LACUNA_SERVER")]
+    pub(super) server: Option<String>,
+    /// Work here, whatever LACUNA_SERVER says.
+    #[arg(long, global = true)]
+    pub(super) local: bool,
     /// How progress is told on stderr.
     #[arg(long, global = true, value_enum, default_value_t = ProgressMode::Auto)]
     pub(super) progress: ProgressMode,
@@ -92,8 +99,18 @@ pub(super) enum Command {
     Convert(ConvertArgs),
     /// List the classics of the library as JSON, or give the model document of one.
     Library(LibraryArgs),
+    /// List materials with their densities and sources; JSON on stdout.
+    Materials,
+    /// List the numbers of processes with their ranges and sources, or of one; JSON on stdout.
+    Profiles {
+        /// `sla`, `cast` or `panels`; all when absent.
+        process: Option<String>,
+    },
     /// Do the cases below a folder and compare with what they expect; exit code 1 when one fails.
     Verify(VerifyArgs),
+    /// Jobs of a service, one step at a time; of the service that runs on this machine without --server.
+    #[command(subcommand)]
+    Jobs(JobsCommand),
     /// Serve HTTP.
     Serve(ServeArgs),
     /// Ask a running service whether it is ready; exit code 5 when not.
@@ -111,6 +128,62 @@ pub(super) enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum JobsCommand {
+    /// Submit a job document and print the job; do not wait for it.
+    Submit {
+        /// The job document.
+        job: PathBuf,
+        /// The same key gives the same job again; a new one when absent.
+        #[arg(long, value_name = "KEY")]
+        idempotency_key: Option<String>,
+    },
+    /// Print a page of jobs, the newest first.
+    List {
+        /// Only jobs in this state.
+        #[arg(long)]
+        state: Option<String>,
+        /// Only jobs of this kind.
+        #[arg(long)]
+        kind: Option<String>,
+        /// Jobs of the page, 1 to 200.
+        #[arg(long)]
+        limit: Option<String>,
+        /// `next` of the page before.
+        #[arg(long)]
+        cursor: Option<String>,
+    },
+    /// Print a job as it stands.
+    Show {
+        /// Its id.
+        id: String,
+    },
+    /// Print a job's events as lines of JSON until it ends; the exit code is that of its end.
+    Watch {
+        /// Its id.
+        id: String,
+    },
+    /// Stop a job and print it.
+    Cancel {
+        /// Its id.
+        id: String,
+    },
+    /// Fetch a job's files: what broke off is resumed, and every file is held against its digest.
+    Fetch(FetchArgs),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct FetchArgs {
+    /// The job's id.
+    pub(super) id: String,
+    /// Folder for the files; it is made if needed.
+    #[arg(short = 'o', long = "output", value_name = "DIR")]
+    pub(super) folder: PathBuf,
+    /// Only this output, for example `3mf`; may be given several times.
+    #[arg(long = "only", value_name = "NAME")]
+    pub(super) outputs: Vec<String>,
 }
 
 /// What a computation may use.
@@ -421,6 +494,9 @@ pub(super) struct VerifyArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
+    /// File of settings (TOML), which go behind flags and environment.
+    #[arg(long, value_name = "FILE")]
+    pub(super) config: Option<PathBuf>,
     /// Address and port; port 0 takes a free one. An address beyond this machine needs LACUNA_API_KEYS.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(super) bind: Option<String>,

@@ -6,8 +6,9 @@ use std::path::Path;
 use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
 
 use super::args::ConvertArgs;
-use super::inspect::{mesh_file, topology};
+use super::inspect::mesh_file;
 use super::output::{Target, finish, start, target};
+use crate::inspection;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{format_problem, guarded};
 
@@ -20,21 +21,28 @@ pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
         // With stderr gone there is nobody left to tell.
         let _ = writeln!(std::io::stderr(), "warning: {count} shapes of the kind {word} hold no polygons and were left out");
     }
-    let closed = topology(&args.file, &file)?.is_closed_manifold();
+    let closed = inspection::topology(&file)?.is_closed_manifold();
+    let title = title(&args.file, &file.facts.object_names);
     let mut pending = Vec::with_capacity(targets.len());
     for target in &targets {
         let mut part = start(&target.path)?;
-        write(target.format, &file, closed, &mut part)?;
+        write(target.format, &file, &title, closed, &mut part)?;
         pending.push((part, &target.path));
     }
     pending.into_iter().try_for_each(|(part, path)| finish(part, path))
 }
 
-fn write(format: Format, file: &MeshFile, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
-    let title = file.facts.object_names.first().map(String::as_str);
-    let metadata = Metadata { title, ..Metadata::default() };
+/// What a mesh is called: as its first object, else as its file.
+pub(super) fn title(path: &Path, objects: &[String]) -> String {
+    let stem = path.file_stem().filter(|_| path != Path::new("-")).map(|stem| stem.to_string_lossy().into_owned());
+    objects.first().cloned().or(stem).unwrap_or_else(|| "mesh".to_owned())
+}
+
+fn write(format: Format, file: &MeshFile, title: &str, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
+    let metadata = Metadata { title: Some(title), ..Metadata::default() };
     let mut sink = BufWriter::with_capacity(1 << 16, part);
-    let written = guarded(|| format::write(format, Geometry::Polygons { file, closed }, &metadata, &mut sink))?;
+    let written =
+        guarded(|| format::write(format, Geometry::Polygons { mesh: &file.mesh, fans: &file.fans, closed }, &metadata, &mut sink))?;
     written.map_err(|error| match error {
         // The file is at fault, not a model.
         format::FormatError::CannotCarry { .. } => Problem { kind: ProblemKind::InvalidFile, ..format_problem(&error) },

@@ -7,6 +7,7 @@ mod library;
 mod operate;
 mod output;
 mod progress;
+mod remote;
 mod stop;
 mod study;
 mod work;
@@ -19,6 +20,7 @@ use clap::Parser;
 
 use crate::problem::{Problem, ProblemKind};
 use args::{Cli, Command, ErrorFormat};
+use remote::Server;
 
 /// Runs the command line and gives its exit code.
 #[must_use]
@@ -38,7 +40,8 @@ pub fn main() -> ExitCode {
 }
 
 fn dispatch(cli: Cli) -> Result<(), Problem> {
-    let manner = work::Manner { progress: cli.progress, quiet: cli.quiet };
+    let server = cli.server.filter(|_| !cli.local).map(|url| Server::at(&url)).transpose()?;
+    let manner = work::Manner { progress: cli.progress, quiet: cli.quiet, server: server.as_ref() };
     match cli.command {
         Command::Solidify(args) => work::solidify(&args, manner),
         Command::Evaluate(args) => work::evaluate(&args, manner),
@@ -46,14 +49,23 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Intersect(args) => work::intersect(&args, manner),
         Command::Slice(args) => work::slice(&args, manner),
         Command::Run(args) => work::run(&args, manner),
-        Command::Validate { model, draw } => study::validate(&model, draw.as_deref()),
+        Command::Validate { model, draw } => study::validate(&model, draw.as_deref(), manner.server),
         Command::Solve(args) => study::solve(&args, cli.quiet),
         Command::Address(args) => study::address(&args),
-        Command::Plan { job } => study::plan(&job),
+        Command::Plan { job } => study::plan(&job, manner.server),
         Command::Inspect { file } => inspect::inspect(&file),
-        Command::Convert(args) => convert::convert(&args),
+        Command::Convert(args) => match manner.server {
+            Some(server) => work::convert(&args, server, manner),
+            None => convert::convert(&args),
+        },
         Command::Library(args) => library::library(&args),
+        Command::Materials => print_json(&crate::trades::materials()),
+        Command::Profiles { process } => library::profiles(process.as_deref()),
         Command::Verify(args) => study::verify(&args, cli.quiet),
+        Command::Jobs(command) => match manner.server {
+            Some(server) => remote::jobs::jobs(server, &command, manner),
+            None => remote::jobs::jobs(&Server::at(&operate::local_url()?)?, &command, manner),
+        },
         Command::Serve(args) => operate::serve(args),
         Command::Healthcheck { url } => operate::healthcheck(url.as_deref()),
         Command::Openapi => print(crate::openapi::text().as_bytes()),

@@ -18,6 +18,7 @@ const HEALTH_TIME: Duration = Duration::from_secs(5);
 impl From<&ServeArgs> for Flags {
     fn from(args: &ServeArgs) -> Self {
         Self {
+            config: args.config.clone(),
             bind: args.bind.clone(),
             data: args.data.clone(),
             workers: args.workers,
@@ -40,7 +41,7 @@ fn environment(name: &str) -> Option<String> {
 /// `lacuna serve`.
 pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
     let (config, _) = Config::read(&Flags::from(&args), &environment)?;
-    start_log(config.log_json);
+    start_log(config.log, config.log_json);
     log_panics();
     work::use_threads(Some(config.threads))?;
     let failed = |error| Problem::io("the service cannot start", &error);
@@ -55,8 +56,7 @@ pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
     result
 }
 
-fn start_log(json: bool) {
-    let level = environment("LACUNA_LOG").and_then(|level| level.parse().ok()).unwrap_or(LevelFilter::INFO);
+fn start_log(level: LevelFilter, json: bool) {
     let builder = tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(level).with_ansi(false);
     // A second subscriber can only come from an embedding program, which then has its own.
     let _ = if json { builder.json().flatten_event(true).try_init() } else { builder.try_init() };
@@ -96,6 +96,11 @@ pub(super) fn healthcheck(url: Option<&str>) -> Result<(), Problem> {
         return Ok(());
     }
     Err(Problem::new(ProblemKind::ServiceUnreachable, format!("{address} is not ready: {status}")))
+}
+
+/// The address of the service that `serve` would start on this machine.
+pub(super) fn local_url() -> Result<String, Problem> {
+    Ok(format!("http://{}", local_address(&Config::read(&Flags::default(), &environment)?.0)))
 }
 
 /// Where the service can be reached from inside its own machine.

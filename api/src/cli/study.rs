@@ -10,6 +10,7 @@ use lacuna_fabrication::SolutionSpace;
 use lacuna_kernel::budget::Limits;
 
 use super::args::{AddressArgs, SolveArgs, VerifyArgs};
+use super::remote::{self, Server};
 use super::{DOCUMENT_BYTES, folder_of, print, print_json, read_input, stop};
 use crate::addresses;
 use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
@@ -22,10 +23,17 @@ use crate::{files, verify};
 const PLAN_TIME: Duration = Duration::from_secs(300);
 
 /// `lacuna validate`.
-pub(super) fn validate(model: &Path, draw: Option<&Path>) -> Result<(), Problem> {
+pub(super) fn validate(model: &Path, draw: Option<&Path>, server: Option<&Server>) -> Result<(), Problem> {
     let drawing = draw.map(Drawing::of).transpose()?;
     let bytes = read_input(model, DOCUMENT_BYTES)?;
-    let report = match studies::watched(PLAN_TIME, |budget| documents::validate_in(&bytes, folder_of(model), budget)) {
+    let examined = match server {
+        Some(server) => {
+            let document = remote::self_contained(bytes.clone(), |bytes| remote::whole_model(bytes, folder_of(model)));
+            remote::validate(server, &document)
+        }
+        None => studies::watched(PLAN_TIME, |budget| documents::validate_in(&bytes, folder_of(model), budget)),
+    };
+    let report = match examined {
         // What is no JSON is an invalid model as well, to whoever reads the report.
         Err(problem) if problem.kind == ProblemKind::MalformedJson => unreadable(&problem),
         other => other?,
@@ -154,8 +162,12 @@ fn sum_up(space: &SolutionSpace) {
 }
 
 /// `lacuna plan`.
-pub(super) fn plan(job: &Path) -> Result<(), Problem> {
+pub(super) fn plan(job: &Path, server: Option<&Server>) -> Result<(), Problem> {
     let bytes = read_input(job, DOCUMENT_BYTES)?;
+    if let Some(server) = server {
+        let document = remote::self_contained(bytes, |bytes| super::work::whole_job(bytes, folder_of(job)));
+        return print_json(&remote::plan(server, &document)?);
+    }
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let job = documents::read_job_in(&bytes, &most, folder_of(job))?;
     print_json(&studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)

@@ -3,31 +3,43 @@
 use std::path::Path;
 
 use lacuna_exchange::format::{self, ReadLimits};
-use lacuna_fabrication::{CutPlane, Input, Job, JobKind, Operation, Outcome, Params, Planes, Split, SplitKey, WallOrder, WallSide};
+use lacuna_fabrication::{
+    Certificate, CutPlane, Input, Job, JobKind, Operation, Outcome, Params, Planes, Split, SplitKey, WallOrder, WallSide,
+};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
-use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
+use lacuna_kernel::model::{Model, PolygonMesh, Shape};
 
 use super::args::{
-    EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SideName, SliceArgs,
-    SolidifyArgs,
+    ConvertArgs, EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SideName,
+    SliceArgs, SolidifyArgs,
 };
+use super::convert::title;
 use super::output::{Target, Written, deliver, deliver_streamed, target};
 use super::progress::Reporter;
+use super::remote::{self, Server};
 use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
+use crate::documents::Order;
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
-use crate::production::format_problem;
 use crate::{documents, files, production};
 
-/// How a command behaves towards its user.
+/// How a command behaves towards its user, and who does its work.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Manner {
+pub(super) struct Manner<'s> {
     pub(super) progress: ProgressMode,
     pub(super) quiet: bool,
+    /// The service that does it; this process without one.
+    pub(super) server: Option<&'s Server>,
+}
+
+/// An input, and the id under which a service has it if it was uploaded.
+struct Given {
+    input: Input,
+    reference: Option<String>,
 }
 
 /// `lacuna solidify`.
-pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Problem> {
+pub(super) fn solidify(args: &SolidifyArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let side = match args.side {
         SideName::Inward => WallSide::Inward,
         SideName::Outward => WallSide::Outward,
@@ -41,17 +53,17 @@ pub(super) fn solidify(args: &SolidifyArgs, manner: Manner) -> Result<(), Proble
         stability: args.stability,
         ..Params::new(args.tolerance.unwrap_or(0.0))
     };
-    make(JobKind::Solidify, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
+    make(JobKind::Solidify, vec![input_of(&args.model, manner)?], params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna evaluate`.
-pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner) -> Result<(), Problem> {
+pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let params = Params { normals: args.normals, ..Params::new(args.tolerance) };
-    make(JobKind::Evaluate, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
+    make(JobKind::Evaluate, vec![input_of(&args.model, manner)?], params, &args.output, &args.limits, manner)
 }
 
 /// `lacuna measure`.
-pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem> {
+pub(super) fn measure(args: &MeasureArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let params = Params {
         radius_mm: args.radius,
         oriented_box: args.oriented_box,
@@ -59,19 +71,22 @@ pub(super) fn measure(args: &MeasureArgs, manner: Manner) -> Result<(), Problem>
         density_g_cm3: args.density,
         ..Params::new(args.tolerance)
     };
-    let inputs = std::iter::once(&args.model).chain(&args.other).map(|path| input_of(path)).collect::<Result<_, _>>()?;
+    let inputs = std::iter::once(&args.model).chain(&args.other).map(|path| input_of(path, manner)).collect::<Result<_, _>>()?;
     tell(JobKind::Measure, inputs, params, &args.limits, manner)
 }
 
 /// Does a job that makes numbers, and prints its certificate.
-fn tell(kind: JobKind, inputs: Vec<Input>, params: Params, limit_args: &LimitArgs, manner: Manner) -> Result<(), Problem> {
-    let job = job_with(kind, inputs, params, &[], limit_args);
-    let (outcome, _) = perform(&job, limit_args, manner, |_, _| Ok(Vec::new()))?;
+fn tell(kind: JobKind, inputs: Vec<Given>, params: Params, limit_args: &LimitArgs, manner: Manner<'_>) -> Result<(), Problem> {
+    let order = order_of(kind, inputs, params, &[], limit_args);
+    if let Some(server) = manner.server {
+        return print_json(&remote::tell(server, &order, limit_args, manner)?);
+    }
+    let (outcome, _) = perform(&order.job, limit_args, manner, |_, _| Ok(Vec::new()))?;
     print_json(&outcome.certificate)
 }
 
 /// `lacuna intersect`.
-pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Problem> {
+pub(super) fn intersect(args: &IntersectArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let operation = args.operation.map(|operation| match operation {
         OperationName::Union => Operation::Union,
         OperationName::Intersection => Operation::Intersection,
@@ -80,12 +95,12 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner) -> Result<(), Prob
         OperationName::Trim => Operation::Trim,
         OperationName::Split => Operation::Split,
     });
-    let mut inputs: Vec<Input> = args.models.iter().map(|path| input_of(path)).collect::<Result<_, _>>()?;
+    let mut inputs: Vec<Given> = args.models.iter().map(|path| input_of(path, manner)).collect::<Result<_, _>>()?;
     match args.radius.as_slice() {
         [] => {}
-        [one] => inputs.iter_mut().for_each(|input| input.radius_mm = Some(*one)),
+        [one] => inputs.iter_mut().for_each(|given| given.input.radius_mm = Some(*one)),
         each if each.len() == inputs.len() => {
-            inputs.iter_mut().zip(each).for_each(|(input, radius)| input.radius_mm = Some(*radius));
+            inputs.iter_mut().zip(each).for_each(|(given, radius)| given.input.radius_mm = Some(*radius));
         }
         each => {
             let detail = format!("{} radii are given for {} models; give one for all, or one for each", each.len(), inputs.len());
@@ -132,15 +147,36 @@ fn cutting(args: &IntersectArgs) -> Result<(Option<CutPlane>, Option<Split>), Pr
 }
 
 /// `lacuna slice`.
-pub(super) fn slice(args: &SliceArgs, manner: Manner) -> Result<(), Problem> {
+pub(super) fn slice(args: &SliceArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let planes = Planes { normal: args.normal.into(), offsets_mm: args.at.clone(), step_mm: args.step };
     let params = Params { radius_mm: args.radius, planes: Some(planes), ..Params::new(args.tolerance) };
-    make(JobKind::Slice, vec![input_of(&args.model)?], params, &args.output, &args.limits, manner)
+    make(JobKind::Slice, vec![input_of(&args.model, manner)?], params, &args.output, &args.limits, manner)
+}
+
+/// `lacuna convert` at a service: as a job, with the tolerance that single precision carries at the mesh's size.
+pub(super) fn convert(args: &ConvertArgs, server: &Server, manner: Manner<'_>) -> Result<(), Problem> {
+    let bytes = read_input(&args.file, ReadLimits::default().file_bytes)?;
+    let view = server.upload(&bytes)?;
+    let corners = view.mesh.as_ref().and_then(|mesh| mesh.bbox_mm).unwrap_or_default();
+    let extent = corners.as_flattened().iter().map(|end| end.abs()).fold(f64::MIN_POSITIVE / f64::EPSILON, f64::max);
+    let name = title(&args.file, view.mesh.as_ref().map(|mesh| mesh.objects.as_slice()).unwrap_or_default());
+    let model = Model { name: None, shape: Shape::Mesh(PolygonMesh::default()) };
+    let given = Given { input: Input { name, model, radius_mm: None }, reference: Some(view.id) };
+    let output = OutputArgs { outputs: args.outputs.clone(), format: args.format.clone(), certificate: None, preview: None };
+    let limits = LimitArgs { limit_triangles: None, limit_memory: None, limit_seconds: None, threads: None };
+    // Two units in the last place: rounding takes less.
+    let params = Params::new(2.0 * f64::from(f32::EPSILON) * extent);
+    make(JobKind::Convert, vec![given], params, &output, &limits, manner)
 }
 
 /// `lacuna run`.
-pub(super) fn run(args: &RunArgs, manner: Manner) -> Result<(), Problem> {
+pub(super) fn run(args: &RunArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let bytes = read_input(&args.job, DOCUMENT_BYTES)?;
+    if let Some(server) = manner.server {
+        let document = remote::self_contained(bytes, |bytes| whole_job(bytes, folder_of(&args.job)));
+        let (certificate, written) = remote::run(server, document, &args.folder, &args.limits, manner)?;
+        return print_json(&serde_json::json!({ "outputs": written, "certificate": certificate }));
+    }
     // Whoever sits at the machine may ask for as much of it as there is.
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let mut job = documents::read_job_in(&bytes, &most, folder_of(&args.job))?;
@@ -157,13 +193,19 @@ pub(super) fn run(args: &RunArgs, manner: Manner) -> Result<(), Problem> {
     print_json(&serde_json::json!({ "outputs": written, "certificate": outcome.certificate }))
 }
 
+/// The document of a job whose mesh files are in it.
+pub(super) fn whole_job(bytes: &[u8], folder: Option<&Path>) -> Result<String, Problem> {
+    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    documents::read_job_in(bytes, &most, folder).map(|job| Order::new(job, Vec::new()).document())
+}
+
 fn make(
     kind: JobKind,
-    inputs: Vec<Input>,
+    inputs: Vec<Given>,
     params: Params,
     output: &OutputArgs,
     limit_args: &LimitArgs,
-    manner: Manner,
+    manner: Manner<'_>,
 ) -> Result<(), Problem> {
     let mut targets: Vec<Target> = output
         .outputs
@@ -172,12 +214,20 @@ fn make(
         .collect::<Result<_, _>>()?;
     check_distinct(&targets, output)?;
     let names: Vec<&str> = targets.iter().filter_map(|target| target.name).collect();
-    let job = job_with(kind, inputs, params, &names, limit_args);
+    let order = order_of(kind, inputs, params, &names, limit_args);
     if let Some(path) = &output.preview {
         targets.push(Target { name: None, ..target(path, Some("png"))? });
     }
-    let title = job.inputs.first().map(|input| input.name.clone());
     let certificate = output.certificate.as_deref();
+    if let Some(server) = manner.server {
+        let (certificate, written) = remote::make(server, &order, &targets, certificate, limit_args, manner)?;
+        if !manner.quiet {
+            summarize(&certificate, &written);
+        }
+        return Ok(());
+    }
+    let job = order.job;
+    let title = job.inputs.first().map(|input| input.name.clone());
     let (outcome, written) = watched(&job, limit_args, manner, |budget| {
         // Points need not be held to be written.
         if let Some(done) = deliver_streamed(&job, title.as_deref(), &targets, certificate, budget)? {
@@ -186,7 +236,7 @@ fn make(
         computed(&job, budget, |outcome, budget| deliver(outcome, title.as_deref(), &targets, certificate, budget))
     })?;
     if !manner.quiet {
-        summarize(&outcome, &written);
+        summarize(&outcome.certificate, &written);
     }
     Ok(())
 }
@@ -202,29 +252,35 @@ fn check_distinct(targets: &[Target], output: &OutputArgs) -> Result<(), Problem
     }
 }
 
-fn job_with(kind: JobKind, inputs: Vec<Input>, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Job {
+fn order_of(kind: JobKind, inputs: Vec<Given>, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Order {
     let mut names: Vec<String> = Vec::new();
     for output in outputs {
         if !names.iter().any(|name| name == output) {
             names.push((*output).to_owned());
         }
     }
-    Job { kind, inputs, params, outputs: names, limits: limits(Limits::default(), limit_args) }
+    let (inputs, references) = inputs.into_iter().map(|given| (given.input, given.reference)).unzip();
+    Order::new(Job { kind, inputs, params, outputs: names, limits: limits(Limits::default(), limit_args) }, references)
 }
 
-/// An argument as an input: a model document, or a mesh file, which is called by its name.
-fn input_of(path: &Path) -> Result<Input, Problem> {
+/// An argument as an input: a model document, or a mesh file, which is called by its name. A service gets the file.
+fn input_of(path: &Path, manner: Manner<'_>) -> Result<Given, Problem> {
     let reading = ReadLimits::default();
     let bytes = read_input(path, DOCUMENT_BYTES.max(reading.file_bytes))?;
     let is_document = bytes.iter().find(|byte| !byte.is_ascii_whitespace()).is_none_or(|&byte| byte == b'{');
     if is_document || format::detect(&bytes).is_none() {
         let model = documents::read_model_in(&bytes, folder_of(path))?;
-        return Ok(Input { name: model.name.clone().unwrap_or_else(|| "shape".to_owned()), model, radius_mm: None });
+        let input = Input { name: model.name.clone().unwrap_or_else(|| "shape".to_owned()), model, radius_mm: None };
+        return Ok(Given { input, reference: None });
     }
-    let file = production::guarded(|| format::read(&bytes, None, &reading))?.map_err(|error| format_problem(&error))?;
     let name = path.file_stem().map_or_else(|| "mesh".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let shape = Shape::Mesh(PolygonMesh { faces: file.faces(), vertices: file.mesh.vertices, interior: Interior::Auto });
-    Ok(Input { model: Model { name: Some(name.clone()), shape }, name, radius_mm: None })
+    if let Some(server) = manner.server {
+        let reference = Some(server.upload(&bytes)?.id);
+        let model = Model { name: None, shape: Shape::Mesh(PolygonMesh::default()) };
+        return Ok(Given { input: Input { name, model, radius_mm: None }, reference });
+    }
+    let model = documents::mesh_model(&bytes, None, &reading)?;
+    Ok(Given { input: Input { model, name, radius_mm: None }, reference: None })
 }
 
 fn limits(asked: Limits, args: &LimitArgs) -> Limits {
@@ -240,7 +296,7 @@ fn limits(asked: Limits, args: &LimitArgs) -> Limits {
 fn perform(
     job: &Job,
     limit_args: &LimitArgs,
-    manner: Manner,
+    manner: Manner<'_>,
     deliver: impl FnOnce(&mut Outcome, &Budget) -> Result<Vec<Written>, Problem>,
 ) -> Result<(Outcome, Vec<Written>), Problem> {
     watched(job, limit_args, manner, |budget| computed(job, budget, deliver))
@@ -258,7 +314,12 @@ fn computed(
 }
 
 /// Works under the eyes of the clock and of the user.
-fn watched<T>(job: &Job, limit_args: &LimitArgs, manner: Manner, work: impl FnOnce(&Budget) -> Result<T, Problem>) -> Result<T, Problem> {
+fn watched<T>(
+    job: &Job,
+    limit_args: &LimitArgs,
+    manner: Manner<'_>,
+    work: impl FnOnce(&Budget) -> Result<T, Problem>,
+) -> Result<T, Problem> {
     use_threads(limit_args.threads)?;
     let reporter = Reporter::new(manner.progress, manner.quiet);
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: reporter.sink() };
@@ -275,9 +336,8 @@ pub(super) fn use_threads(threads: Option<usize>) -> Result<(), Problem> {
     pool.map_err(|error| Problem::internal(format!("no pool of {threads} threads: {error}")))
 }
 
-fn summarize(outcome: &Outcome, written: &[Written]) {
+fn summarize(certificate: &Certificate, written: &[Written]) {
     use std::io::Write;
-    let certificate = &outcome.certificate;
     let mut stderr = std::io::stderr().lock();
     for file in written {
         let _ = writeln!(stderr, "{}: {} bytes", file.file.display(), file.bytes);

@@ -5,14 +5,21 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, Method, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
-use axum::response::Response;
+use axum::response::{IntoResponse, Response};
+use lacuna_kernel::error::LimitFacts;
 
 use super::state::Shared;
 use crate::config::Config;
+use crate::config_file::Scope;
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
+
+/// What may be called how often.
+pub const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+/// What is left of it.
+pub const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 
 /// Whose request it is: part of a key's digest, or everybody on this machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,59 +28,114 @@ pub struct Owner(pub String);
 /// Lets requests with a known key pass and tells the handlers whose they are.
 ///
 /// # Errors
-/// 401 without a known key, 429 above the rate.
+/// 401 without a known key, 403 if it may not, 429 above the rate.
 pub async fn require_key(State(state): State<Shared>, mut request: Request, next: Next) -> Result<Response, Problem> {
-    let owner = identify(&state.config, request.headers())?;
-    if request.method() == Method::POST {
-        state.limiter.admit(&owner)?;
+    let (owner, scope) = identify(&state.config, request.headers())?;
+    let needed = match *request.method() {
+        _ if request.uri().path() == "/metrics" => Scope::Admin,
+        Method::GET | Method::HEAD => Scope::Read,
+        _ => Scope::Run,
+    };
+    if scope < needed {
+        let detail = format!("This key has the scope {scope:?}, and {needed:?} is needed; ask whoever gave it to you").to_lowercase();
+        return Err(Problem::new(ProblemKind::Forbidden, detail));
     }
-    request.extensions_mut().insert(owner);
-    Ok(next.run(request).await)
+    // Without keys everybody is one, and whoever polls would take it from the others: then only submissions are counted.
+    let limiter = match *request.method() {
+        Method::POST => Some(&state.submissions),
+        _ if state.config.keys.is_empty() => None,
+        _ => Some(&state.calls),
+    };
+    let left = limiter.map(|limiter| limiter.admit(&owner));
+    let mut response = match left {
+        Some(Err(Left { seconds, .. })) => {
+            let allowed = limiter.map_or(0.0, |limiter| limiter.per_minute);
+            let name = limiter.map_or("", |limiter| limiter.name);
+            let facts = LimitFacts { limit: "per_minute", asked: allowed + 1.0, allowed, remedy: None };
+            let problem = Problem::new(ProblemKind::RateLimited, format!("{allowed} {name} per minute are allowed for a key"));
+            problem.limit(&facts).retry_after(seconds).into_response()
+        }
+        _ => {
+            request.extensions_mut().insert(owner);
+            next.run(request).await
+        }
+    };
+    if let (Some(limiter), Some(Ok(left) | Err(left))) = (limiter, left) {
+        limiter.tell(left, response.headers_mut());
+    }
+    Ok(response)
 }
 
-fn identify(config: &Config, headers: &HeaderMap) -> Result<Owner, Problem> {
+fn identify(config: &Config, headers: &HeaderMap) -> Result<(Owner, Scope), Problem> {
     if config.keys.is_empty() {
-        return Ok(Owner("local".to_owned()));
+        return Ok((Owner("local".to_owned()), Scope::Admin));
     }
     let given = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let (scheme, key) = given.split_once(' ').unwrap_or_default();
     let digest = Digest::of(key.trim().as_bytes());
     // All keys are compared, so that the time does not tell which one came close.
-    let known = config.keys.iter().fold(false, |known, key| key.same_in_constant_time(&digest) | known);
-    if known && scheme.eq_ignore_ascii_case("bearer") {
-        return Ok(Owner(digest.hex()[..32].to_owned()));
+    let known = config.keys.iter().fold(None, |known, key| if key.digest.same_in_constant_time(&digest) { Some(key.scope) } else { known });
+    if let Some(scope) = known.filter(|_| scheme.eq_ignore_ascii_case("bearer")) {
+        return Ok((Owner(digest.hex()[..32].to_owned()), scope));
     }
     Err(Problem::new(ProblemKind::Unauthenticated, "Send a key of this service: Authorization: Bearer KEY"))
+}
+
+/// What an owner has left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Left {
+    /// Calls that would pass now.
+    calls: u64,
+    /// Seconds after which there is one more.
+    seconds: u64,
 }
 
 /// A bucket of tokens per owner, filled evenly through the minute.
 #[derive(Debug)]
 pub struct RateLimiter {
+    name: &'static str,
     per_minute: f64,
     buckets: Mutex<HashMap<String, (f64, Instant)>>,
 }
 
 impl RateLimiter {
-    /// So many calls per minute and owner.
+    /// So many calls per minute and owner, under a name that answers tell.
     #[must_use]
-    pub fn new(per_minute: u32) -> Self {
-        Self { per_minute: f64::from(per_minute), buckets: Mutex::default() }
+    pub fn new(name: &'static str, per_minute: u32) -> Self {
+        Self { name, per_minute: f64::from(per_minute), buckets: Mutex::default() }
     }
 
-    fn admit(&self, owner: &Owner) -> Result<(), Problem> {
+    /// The policy and what is left of it, as the draft of the header fields `RateLimit` has them.
+    fn tell(&self, left: Left, headers: &mut HeaderMap) {
+        let policy = format!("\"{}\";q={};w=60", self.name, self.per_minute);
+        let state = format!("\"{}\";r={};t={}", self.name, left.calls, left.seconds);
+        for (name, value) in [(RATE_LIMIT_POLICY, policy), (RATE_LIMIT, state)] {
+            if let Ok(value) = HeaderValue::from_str(&value) {
+                headers.insert(name, value);
+            }
+        }
+    }
+
+    fn admit(&self, owner: &Owner) -> Result<Left, Left> {
         let now = Instant::now();
         let mut buckets = crate::locked(&self.buckets);
         let (tokens, last) = buckets.entry(owner.0.clone()).or_insert((self.per_minute, now));
         let filled = *tokens + now.duration_since(*last).as_secs_f64() * self.per_minute / 60.0;
         (*tokens, *last) = (filled.min(self.per_minute), now);
-        if *tokens < 1.0 {
-            let detail = format!("{} submissions per minute are allowed", self.per_minute);
-            // A token comes back after 60 / rate seconds, which is under a second for any rate above 60.
-            return Err(Problem::new(ProblemKind::RateLimited, detail).retry_after(1 + u64::from(self.per_minute < 60.0) * 59));
+        let passes = *tokens >= 1.0;
+        if passes {
+            *tokens -= 1.0;
         }
-        *tokens -= 1.0;
-        Ok(())
+        let left = left(*tokens, self.per_minute);
+        if passes { Ok(left) } else { Err(left) }
     }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "tokens are at most the rate, seconds are clamped")]
+fn left(tokens: f64, per_minute: f64) -> Left {
+    // The share of a token that is missing comes back at the rate; a rate of 0 never gives one, and a day says so.
+    let seconds = ((1.0 - tokens.fract()) * 60.0 / per_minute).ceil().clamp(1.0, 86_400.0);
+    Left { calls: tokens as u64, seconds: seconds as u64 }
 }
 
 #[cfg(test)]
@@ -101,10 +163,15 @@ mod tests {
 
     #[test]
     fn a_bucket_runs_dry_for_its_owner_alone() {
-        let limiter = RateLimiter::new(2);
+        let limiter = RateLimiter::new("submissions", 2);
         let (ada, bob) = (Owner("ada".into()), Owner("bob".into()));
         assert!(limiter.admit(&ada).is_ok() && limiter.admit(&ada).is_ok());
-        assert_eq!(limiter.admit(&ada).unwrap_err().kind, ProblemKind::RateLimited);
-        assert!(limiter.admit(&bob).is_ok());
+        let left = limiter.admit(&ada).unwrap_err();
+        assert!(left.calls == 0 && (29..=30).contains(&left.seconds), "{left:?}");
+        assert_eq!(limiter.admit(&bob).unwrap().calls, 1);
+        let mut headers = HeaderMap::new();
+        limiter.tell(Left { calls: 1, seconds: 30 }, &mut headers);
+        assert_eq!(headers[RATE_LIMIT_POLICY], "\"submissions\";q=2;w=60");
+        assert_eq!(headers[RATE_LIMIT], "\"submissions\";r=1;t=30");
     }
 }

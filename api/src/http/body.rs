@@ -1,5 +1,6 @@
 //! Bodies of requests: JSON by its media type, within a length and a time.
 
+use std::io::Write as _;
 use std::time::Duration;
 
 use axum::body::Bytes;
@@ -8,6 +9,7 @@ use axum::http::{HeaderMap, header};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 
 use super::state::Shared;
+use crate::files::PendingFile;
 use crate::problem::{Problem, ProblemKind};
 use lacuna_kernel::error::LimitFacts;
 
@@ -41,6 +43,52 @@ async fn read(request: Request, state: &Shared) -> Result<Bytes, Problem> {
     }
 }
 
+/// Bytes that are collected before they go to the disk.
+const PIECE: usize = 1 << 20;
+
+/// Receives a body into a file, piece by piece; between two of them no more time than `idle` may pass.
+///
+/// # Errors
+/// When the body is longer than allowed, too slow or breaks off, or the device fails.
+pub async fn receive(request: Request, mut file: PendingFile, allowed: u64, idle: Duration) -> Result<PendingFile, Problem> {
+    let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
+    if let Some(announced) = announced.filter(|&announced| announced > allowed) {
+        return Err(file_too_large(announced, allowed));
+    }
+    let (mut body, mut length, mut waiting) = (request.into_body(), 0_u64, Vec::new());
+    loop {
+        let frame = tokio::time::timeout(idle, body.frame()).await.map_err(|_| {
+            let detail = format!("nothing of the file arrived for {} s, after {length} bytes", idle.as_secs());
+            Problem::new(ProblemKind::RequestTimeout, detail)
+        })?;
+        let Some(frame) = frame else { break };
+        let frame =
+            frame.map_err(|error| Problem::new(ProblemKind::BadRequest, format!("the file broke off after {length} bytes: {error}")))?;
+        let Ok(data) = frame.into_data() else { continue };
+        length += data.len() as u64;
+        if length > allowed {
+            return Err(file_too_large(length, allowed));
+        }
+        waiting.extend_from_slice(&data);
+        if waiting.len() >= PIECE {
+            file = append(file, std::mem::take(&mut waiting)).await?;
+        }
+    }
+    append(file, waiting).await
+}
+
+async fn append(mut file: PendingFile, piece: Vec<u8>) -> Result<PendingFile, Problem> {
+    let written = tokio::task::spawn_blocking(move || file.write_all(&piece).map(|()| file)).await;
+    let written = written.map_err(|error| Problem::internal(format!("a piece was not written: {error}")))?;
+    written.map_err(|error| Problem::io("the file could not be kept", &error))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
+fn file_too_large(asked: u64, allowed: u64) -> Problem {
+    let facts = LimitFacts { limit: "upload_bytes", asked: asked as f64, allowed: allowed as f64, remedy: None };
+    Problem::new(ProblemKind::BodyTooLarge, format!("mesh files of at most {allowed} bytes are taken")).limit(&facts)
+}
+
 #[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
 fn too_large(announced: Option<usize>, allowed: usize) -> Problem {
     let asked = announced.unwrap_or(allowed + 1);
@@ -48,12 +96,19 @@ fn too_large(announced: Option<usize>, allowed: usize) -> Problem {
     Problem::new(ProblemKind::BodyTooLarge, format!("at most {allowed} bytes of JSON are read")).limit(&facts)
 }
 
-fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
+/// Whether a body is said to be JSON, by any of its names.
+#[must_use]
+pub fn is_json(headers: &HeaderMap) -> bool {
     let given = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let media_type = given.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
-    if media_type == "application/json" || media_type.starts_with("application/") && media_type.ends_with("+json") {
+    media_type == "application/json" || media_type.starts_with("application/") && media_type.ends_with("+json")
+}
+
+fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
+    if is_json(headers) {
         return Ok(());
     }
+    let given = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let detail = format!("the body is announced as {given:?}; application/json is read here");
     Err(Problem::new(ProblemKind::UnsupportedMedia, detail))
 }

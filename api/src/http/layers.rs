@@ -11,14 +11,14 @@ use axum::response::{IntoResponse, Response};
 use futures_util::FutureExt;
 use uuid::Uuid;
 
+use super::auth::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::state::Shared;
 use crate::problem::{Problem, ProblemKind};
 
 /// The header with a request's id.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-const EXPOSED: &str =
-    "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link";
+const EXPOSED: &str = "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link, RateLimit, RateLimit-Policy";
 
 /// Gives a request its id, tells the log and the metrics of it, and every error its form.
 pub async fn observe(State(state): State<Shared>, request: Request, next: Next) -> Response {
@@ -42,7 +42,7 @@ pub async fn observe(State(state): State<Shared>, request: Request, next: Next) 
 
 /// Runs the request within its time; a panic becomes our problem.
 async fn guard(state: &Shared, request: Request, next: Next) -> Response {
-    let time = Duration::from_secs(state.config.answer_seconds);
+    let time = Duration::from_secs(time_of(state, &request));
     let work = AssertUnwindSafe(next.run(request)).catch_unwind();
     match tokio::time::timeout(time, work).await {
         Ok(Ok(response)) => response,
@@ -51,13 +51,21 @@ async fn guard(state: &Shared, request: Request, next: Next) -> Response {
     }
 }
 
+/// Seconds for an answer: a large file may take long to arrive.
+fn time_of(state: &Shared, request: &Request) -> u64 {
+    let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
+    let uploads = request.method() == Method::POST && route == Some("/v1/models");
+    if uploads { state.config.upload_seconds.max(state.config.answer_seconds) } else { state.config.answer_seconds }
+}
+
 fn as_problem(mut response: Response, id: &str) -> Response {
     let mut problem = response.extensions_mut().remove::<Problem>().unwrap_or_else(|| Problem::from_status(response.status().as_u16()));
     if problem.is_defect() {
         tracing::error!(request_id = %id, code = %problem.code, detail = %problem.detail, "defect");
     }
     problem.request_id = Some(id.to_owned());
-    let kept = [header::ALLOW, header::CONTENT_RANGE].map(|name| (name.clone(), response.headers().get(&name).cloned()));
+    let kept = [header::ALLOW, header::CONTENT_RANGE, RATE_LIMIT, RATE_LIMIT_POLICY]
+        .map(|name| (name.clone(), response.headers().get(&name).cloned()));
     let mut answer = problem.into_response();
     for (name, value) in kept {
         if let Some(value) = value {

@@ -8,7 +8,7 @@ use utoipa_axum::routes;
 use super::state::Shared;
 use super::{auth, layers};
 use crate::problem::{Problem, ProblemKind};
-use crate::routes::{capabilities, docs, events, health, jobs, library, models, results, studies};
+use crate::routes::{capabilities, docs, events, health, jobs, library, models, problems, results, shortcuts, studies, trades};
 
 /// Every address with its description; the public ones apart, because the others need a key.
 fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
@@ -16,6 +16,7 @@ fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
         .routes(routes!(health::version))
+        .routes(routes!(problems::problem))
         .routes(routes!(docs::openapi))
         .routes(routes!(docs::docs));
     let private = OpenApiRouter::new()
@@ -28,12 +29,17 @@ fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
         .routes(routes!(studies::solve))
         .routes(routes!(studies::automaton))
         .routes(routes!(studies::address))
+        .routes(routes!(shortcuts::measure))
+        .routes(routes!(shortcuts::evaluate))
         .routes(routes!(jobs::submit, jobs::list))
         .routes(routes!(jobs::show, jobs::forget))
         .routes(routes!(jobs::cancel))
         .routes(routes!(events::events))
         .routes(routes!(results::output))
         .routes(routes!(results::result))
+        .routes(routes!(trades::materials))
+        .routes(routes!(trades::profiles))
+        .routes(routes!(trades::profile))
         .routes(routes!(capabilities::capabilities))
         .routes(routes!(health::metrics));
     (public, private)

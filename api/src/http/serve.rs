@@ -112,6 +112,16 @@ async fn sweep(state: Shared) {
         if let Err(problem) = swept {
             tracing::error!(detail = %problem.detail, "not swept");
         }
+        let uploads = state.beside(move |state| {
+            // A job that waits may be the only one that still needs a file.
+            let idle = state.desk.all().iter().all(|job| job.state().is_final());
+            let swept = if idle { state.store.sweep_uploads(age) } else { Ok(0) };
+            swept.map_err(|error| Problem::io("sweeping uploads", &error))
+        });
+        match uploads.await {
+            Ok(removed) => tracing::info!(removed, "uploads swept"),
+            Err(problem) => tracing::error!(detail = %problem.detail, "uploads not swept"),
+        }
         tokio::time::sleep(SWEEP_EVERY).await;
     }
 }

@@ -6,6 +6,7 @@ use tokio::sync::{Semaphore, watch};
 
 use super::auth::{Owner, RateLimiter};
 use crate::config::Config;
+use crate::documents::Stored;
 use crate::jobs::desk::{Desk, DeskLimits};
 use crate::metrics::Metrics;
 use crate::problem::Problem;
@@ -26,8 +27,10 @@ pub struct AppState {
     pub closing: watch::Sender<bool>,
     /// Who does the jobs.
     pub engine: Engine,
-    /// Who called how often.
-    pub limiter: RateLimiter,
+    /// Who submitted how often.
+    pub submissions: RateLimiter,
+    /// Who called otherwise how often.
+    pub calls: RateLimiter,
     /// Places for work on documents beside the event loop.
     blocking: Arc<Semaphore>,
 }
@@ -54,17 +57,18 @@ impl AppState {
         let metrics = Arc::new(Metrics::default());
         let limits = DeskLimits { queued: config.queued, per_owner: config.jobs_per_key };
         let desk = Arc::new(Desk::open(Arc::clone(&store), limits, Arc::clone(&metrics)).map_err(failed)?);
-        let limiter = RateLimiter::new(config.submissions_per_minute);
+        let submissions = RateLimiter::new("submissions", config.submissions_per_minute);
+        let calls = RateLimiter::new("calls", config.calls_per_minute);
         // Twice the workers: reading documents is short, but must not take the memory of many at once.
         let blocking = Arc::new(Semaphore::new(config.workers * 2));
-        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, limiter, blocking }))
+        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, submissions, calls, blocking }))
     }
 
-    /// Finds the models that an owner has stored.
-    pub fn models_of(&self, owner: &Owner) -> impl Fn(&str) -> Option<Vec<u8>> {
+    /// Finds the models and mesh files that an owner has stored.
+    pub fn models_of(&self, owner: &Owner) -> impl Fn(&str) -> Option<Stored> {
         let (store, owner) = (Arc::clone(&self.store), owner.0.clone());
         move |id| {
-            store.model_document(&owner, id).unwrap_or_else(|error| {
+            store.stored(&owner, id).unwrap_or_else(|error| {
                 tracing::error!(%error, "a stored model could not be read");
                 None
             })

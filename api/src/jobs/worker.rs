@@ -71,7 +71,7 @@ fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) {
 fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Result<Answer, Problem> {
     let (document, input) = job.with(|record| (record.document, record.view.input_digest.clone()));
     let bytes = desk.store.document(document).map_err(|error| Problem::io("the job document could not be read", &error))?;
-    let order = documents::read_job(&bytes, most, &|_| None)?;
+    let order = documents::read_order(&bytes, most, &|reference| desk.store.referred(reference))?.job;
     let budget = budget(job, order.limits);
     let _watchdog =
         Watchdog::start(&job.cancel, order.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;

@@ -3,12 +3,14 @@
 use axum::Json;
 use axum::extract::State;
 use lacuna_exchange::format::FORMATS;
+use lacuna_exchange::library::CLASSICS;
 use lacuna_fabrication::JobKind;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::http::state::Shared;
 use crate::problem::Problem;
+use crate::trades::PROFILES;
 
 /// What the service can do.
 #[derive(Debug, Serialize, ToSchema)]
@@ -19,6 +21,10 @@ pub struct Capabilities {
     formats: Vec<FormatCapability>,
     /// Limits.
     limits: LimitCapability,
+    /// Classics of the library.
+    library: Vec<&'static str>,
+    /// Processes with a profile.
+    profiles: Vec<&'static str>,
     /// The kernel's version: the same input and version give the same bytes.
     kernel_version: &'static str,
 }
@@ -30,6 +36,8 @@ pub struct FormatCapability {
     name: &'static str,
     /// Its media type.
     media_type: &'static str,
+    /// Whether files of it can be uploaded.
+    reads: bool,
     /// What it has room for: `solid`, `surface`, `wires`, `points`.
     carries: Vec<&'static str>,
 }
@@ -39,6 +47,8 @@ pub struct FormatCapability {
 pub struct LimitCapability {
     /// Bytes of a JSON body.
     body_bytes: usize,
+    /// Bytes of an uploaded mesh file.
+    upload_bytes: u64,
     /// Seconds that `Prefer: wait` may ask.
     wait_seconds: u64,
     /// Most wall time of a job, in seconds.
@@ -57,6 +67,8 @@ pub struct LimitCapability {
     jobs_per_key: usize,
     /// Submissions per minute and key.
     submissions_per_minute: u32,
+    /// Other calls per minute and key.
+    calls_per_minute: u32,
     /// Hours after which ended jobs are forgotten.
     retention_hours: u64,
 }
@@ -71,13 +83,14 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
         let carries =
             [(row.carries.solid, "solid"), (row.carries.surface, "surface"), (row.carries.wires, "wires"), (row.carries.points, "points")];
         let carries = carries.into_iter().filter_map(|(carried, word)| carried.then_some(word)).collect();
-        FormatCapability { name: row.ending, media_type: row.media_type, carries }
+        FormatCapability { name: row.ending, media_type: row.media_type, reads: row.reads, carries }
     });
     Json(Capabilities {
-        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure, JobKind::Intersect, JobKind::Slice],
+        kinds: vec![JobKind::Evaluate, JobKind::Solidify, JobKind::Measure, JobKind::Intersect, JobKind::Slice, JobKind::Convert],
         formats: formats.collect(),
         limits: LimitCapability {
             body_bytes: config.body_bytes,
+            upload_bytes: config.upload_bytes,
             wait_seconds: crate::http::headers::LONGEST_WAIT.as_secs(),
             seconds: config.job_limits.seconds,
             memory_bytes: config.job_limits.memory_bytes,
@@ -87,8 +100,11 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
             queued_jobs: config.queued,
             jobs_per_key: config.jobs_per_key,
             submissions_per_minute: config.submissions_per_minute,
+            calls_per_minute: config.calls_per_minute,
             retention_hours: config.retention_hours,
         },
+        library: CLASSICS.iter().map(|classic| classic.name).collect(),
+        profiles: PROFILES.iter().map(|profile| profile.name).collect(),
         kernel_version: env!("CARGO_PKG_VERSION"),
     })
 }

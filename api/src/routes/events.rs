@@ -29,7 +29,7 @@ const RETRY: Duration = Duration::from_secs(2);
 ///
 /// A client that lost the stream sends `Last-Event-ID` and gets what it missed.
 #[utoipa::path(
-    get, path = "/v1/jobs/{id}/events", tag = "jobs",
+    get, path = "/v1/jobs/{id}/events", operation_id = "job_events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
         ("Last-Event-ID" = Option<u64>, Header, description = "The last event that arrived")),
     responses((status = 200, content_type = "text/event-stream", body = String),
@@ -79,7 +79,10 @@ impl Listener {
                 self.over = event.name == "done";
                 return Some(Sent::default().id(event.id.to_string()).event(event.name).retry(RETRY).data(event.data));
             }
-            if self.job.state().is_final() && self.job.events.after(self.last).is_empty() {
+            // The state is final a moment before its last events are there: only `done` is the end.
+            if self.job.state().is_final()
+                && self.job.events.after(0).last().is_some_and(|last| last.name == "done" && last.id <= self.last)
+            {
                 return None;
             }
             tokio::select! {

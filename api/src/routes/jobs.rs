@@ -35,6 +35,7 @@ pub struct JobQuery {
     /// Only jobs of this kind.
     kind: Option<JobKind>,
     /// Items of the page, 1 to 200; 50 when absent.
+    #[param(minimum = 1, maximum = 200)]
     limit: Option<usize>,
     /// `next` of the page before.
     cursor: Option<String>,
@@ -56,7 +57,7 @@ pub struct JobPage {
 /// The job's own failure is in its `problem`, never in the status. An `Idempotency-Key` makes a repeated
 /// submission give the first one's job. Equal work that was finished before is not done again.
 #[utoipa::path(
-    post, path = "/v1/jobs", tag = "jobs", request_body = Job,
+    post, path = "/v1/jobs", operation_id = "submit_job", tag = "jobs", request_body = Job,
     params(("Prefer" = Option<String>, Header, description = "`wait=10`, `respond-async`"),
         ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 characters, the caller's choice")),
     responses((status = 200, body = JobView, description = "It has ended"), (status = 202, body = JobView, description = "It is accepted"),
@@ -69,11 +70,21 @@ pub async fn submit(
     headers: HeaderMap,
     JsonBody(body): JsonBody,
 ) -> Result<Response, Problem> {
-    let key = idempotency_key(&headers)?;
-    let preference = Preference::of(&headers);
+    take(state, owner, &headers, body.to_vec(), Duration::ZERO).await
+}
+
+/// Accepts a job and waits for it as long as the caller prefers, or else as long as is usual there.
+///
+/// # Errors
+/// What is wrong with the job, or why none is accepted.
+pub(super) async fn take(state: Shared, owner: Owner, headers: &HeaderMap, body: Vec<u8>, usual: Duration) -> Result<Response, Problem> {
+    let key = idempotency_key(headers)?;
+    let preference = Preference::of(headers);
     let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
     let (job, replayed) = state.beside(move |state| accept(state, &owner, &body, used)).await?;
-    let view = job.wait(preference.wait.unwrap_or(Duration::ZERO)).await;
+    // Whoever asks for an answer at once gets it, wherever others wait.
+    let usual = if preference.respond_async { Duration::ZERO } else { usual };
+    let view = job.wait(preference.wait.unwrap_or(usual)).await;
     let ended = view.state.is_final();
     let mut response = answer(view);
     if let Some(applied) = preference.applied(ended).and_then(|applied| HeaderValue::from_str(&applied).ok()) {
@@ -92,8 +103,11 @@ fn accept(
     body: &[u8],
     idempotency: Option<Idempotency>,
 ) -> Result<(std::sync::Arc<crate::jobs::live::LiveJob>, bool), Problem> {
-    let job = documents::read_job(body, &state.config.job_limits, &state.models_of(owner))?;
-    match predict(state.engine, &job, PLAN_TIME) {
+    let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
+    let job = &order.job;
+    let replaced = order.supersedes.as_deref().map(|id| state.desk.find(&owner.0, id).ok_or_else(|| documents::unknown_job(id)));
+    let replaced = replaced.transpose()?;
+    match predict(state.engine, job, PLAN_TIME) {
         // A prediction that takes too long is no reason to refuse what may be done in time.
         Err(problem) if problem.code != "limit.seconds" => return Err(problem),
         _ => {}
@@ -101,11 +115,16 @@ fn accept(
     let submission = Submission {
         owner: owner.0.clone(),
         kind: job.kind,
-        document: documents::order_document(&job).into_bytes(),
-        input_digest: documents::job_digest(&job),
+        document: order.document().into_bytes(),
+        input_digest: documents::job_digest(job),
         idempotency,
     };
-    state.desk.submit(submission)
+    let accepted = state.desk.submit(submission)?;
+    // Only now: a refusal must not cost the caller what there is. The same work twice is not replaced by itself.
+    if let Some(replaced) = replaced.filter(|replaced| !std::sync::Arc::ptr_eq(replaced, &accepted.0) && !replaced.state().is_final()) {
+        state.desk.cancel(&replaced).map_err(|error| Problem::io("the replaced job could not be stopped", &error))?;
+    }
+    Ok(accepted)
 }
 
 fn answer(view: JobView) -> Response {
@@ -120,7 +139,7 @@ fn answer(view: JobView) -> Response {
 
 /// Lists the caller's jobs.
 #[utoipa::path(
-    get, path = "/v1/jobs", tag = "jobs", params(JobQuery),
+    get, path = "/v1/jobs", operation_id = "list_jobs", tag = "jobs", params(JobQuery),
     responses((status = 200, body = JobPage), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn list(
@@ -147,7 +166,7 @@ pub async fn list(
 
 /// A job, in every state with 200.
 #[utoipa::path(
-    get, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    get, path = "/v1/jobs/{id}", operation_id = "show_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 200, body = JobView), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
@@ -162,7 +181,7 @@ pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner
 
 /// Stops a job. 200 if it has ended, 202 while it is stopping.
 #[utoipa::path(
-    post, path = "/v1/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    post, path = "/v1/jobs/{id}/cancel", operation_id = "cancel_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 200, body = JobView), (status = 202, body = JobView),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
@@ -174,7 +193,7 @@ pub async fn cancel(State(state): State<Shared>, Extension(owner): Extension<Own
 
 /// Stops a job if needed and forgets it.
 #[utoipa::path(
-    delete, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
+    delete, path = "/v1/jobs/{id}", operation_id = "forget_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn forget(

@@ -52,7 +52,7 @@ pub fn classic(name: &str) -> Result<&'static Classic, Problem> {
 
 /// Lists the library of classics.
 #[utoipa::path(
-    get, path = "/v1/library", tag = "models",
+    get, path = "/v1/library", operation_id = "list_classics", tag = "models",
     responses((status = 200, body = LibraryPage), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn list() -> Json<LibraryPage> {
@@ -61,7 +61,7 @@ pub async fn list() -> Json<LibraryPage> {
 
 /// The model document of a classic. `HEAD` gives its headers.
 #[utoipa::path(
-    get, path = "/v1/library/{name}", tag = "models", params(("name" = String, Path, description = "The classic's name")),
+    get, path = "/v1/library/{name}", operation_id = "fetch_classic", tag = "models", params(("name" = String, Path, description = "The classic's name")),
     responses((status = 200, body = Model, content_type = "application/vnd.lacuna.model+json;v=1"), (status = 304),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]

@@ -1,17 +1,22 @@
 //! Stored models.
 
 use axum::Json;
-use axum::extract::{Extension, Path, State};
+use axum::extract::{Extension, FromRequest, Path, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use lacuna_exchange::format::Format;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
+use super::uploads::{self, MeshFile, UploadQuery};
 use crate::documents;
+use crate::files;
 use crate::http::auth::Owner;
-use crate::http::body::JsonBody;
+use crate::http::body::{JsonBody, is_json};
 use crate::http::headers::{QueryOf, is_known, page_length};
+use crate::http::range;
 use crate::http::state::Shared;
+use crate::jobs::record::Output;
 use crate::openapi::Model;
 use crate::problem::{Problem, ProblemKind};
 use crate::store::ModelView;
@@ -25,6 +30,7 @@ pub(super) const MEDIA_TYPE: &str = "application/vnd.lacuna.model+json;v=1";
 #[into_params(parameter_in = Query)]
 pub struct ModelQuery {
     /// Items of the page, 1 to 200; 50 when absent.
+    #[param(minimum = 1, maximum = 200)]
     limit: Option<usize>,
     /// `next` of the page before.
     cursor: Option<String>,
@@ -40,20 +46,35 @@ pub struct ModelPage {
     next: Option<String>,
 }
 
-/// Stores a model in its canonical form. The same shape and name give the same id.
+/// Stores a model document in its canonical form, or a mesh file as it is.
+///
+/// The same shape and name, or the same file, give the same id. A mesh file is received piece by piece, read within
+/// limits and examined: `mesh` tells what it holds, and nothing of it is repaired. `model_ref` in a job names either.
 #[utoipa::path(
-    post, path = "/v1/models", tag = "models", request_body = Model,
+    post, path = "/v1/models", operation_id = "store_model", tag = "models", params(UploadQuery),
+    request_body(content((Model = "application/json"), (MeshFile = "model/stl"), (MeshFile = "model/3mf"), (MeshFile = "model/obj"),
+        (MeshFile = "model/vrml"), (MeshFile = "application/octet-stream"))),
     responses((status = 201, body = ModelView), (status = 200, body = ModelView, description = "It was stored before"),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
-pub async fn store(State(state): State<Shared>, Extension(owner): Extension<Owner>, JsonBody(body): JsonBody) -> Result<Response, Problem> {
-    let kept = state.beside(move |state| {
-        let model = documents::read_model(&body)?;
-        let document = documents::model_document(&model);
-        let kept = state.store.keep_model(&owner.0, model.name.as_deref(), document.as_bytes());
-        kept.map_err(|error| Problem::io("the model could not be stored", &error))
-    });
-    let (view, new) = kept.await?;
+pub async fn store(
+    State(state): State<Shared>,
+    Extension(owner): Extension<Owner>,
+    QueryOf(query): QueryOf<UploadQuery>,
+    request: Request,
+) -> Result<Response, Problem> {
+    let (view, new) = if is_json(request.headers()) {
+        let JsonBody(body) = JsonBody::from_request(request, &state).await?;
+        let kept = state.beside(move |state| {
+            let model = documents::read_model(&body)?;
+            let document = documents::model_document(&model);
+            let kept = state.store.keep_model(&owner.0, model.name.as_deref(), document.as_bytes());
+            kept.map_err(|error| Problem::io("the model could not be stored", &error))
+        });
+        kept.await?
+    } else {
+        uploads::receive(&state, owner, query, request).await?
+    };
     let status = if new { StatusCode::CREATED } else { StatusCode::OK };
     let headers = [(header::LOCATION, format!("/v1/models/{}", view.id)), (header::ETAG, format!("\"{}\"", view.digest))];
     Ok((status, headers, Json(view)).into_response())
@@ -61,7 +82,7 @@ pub async fn store(State(state): State<Shared>, Extension(owner): Extension<Owne
 
 /// Lists the caller's models.
 #[utoipa::path(
-    get, path = "/v1/models", tag = "models", params(ModelQuery),
+    get, path = "/v1/models", operation_id = "list_models", tag = "models", params(ModelQuery),
     responses((status = 200, body = ModelPage), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn list(
@@ -80,10 +101,13 @@ pub async fn list(
     Ok(Json(ModelPage { items, next }))
 }
 
-/// The canonical document of a model. `HEAD` gives its headers.
+/// The canonical document of a model, or a mesh file as it was uploaded. `HEAD` gives the headers.
 #[utoipa::path(
-    get, path = "/v1/models/{id}", tag = "models", params(("id" = String, Path, description = "The model's id")),
-    responses((status = 200, body = Model, content_type = "application/vnd.lacuna.model+json;v=1"), (status = 304),
+    get, path = "/v1/models/{id}", operation_id = "fetch_model", tag = "models", params(("id" = String, Path, description = "The model's id")),
+    responses((status = 200, description = "The document, or the file with its own media type",
+            content((Model = "application/vnd.lacuna.model+json;v=1"), (MeshFile = "model/stl"), (MeshFile = "model/3mf"),
+                (MeshFile = "model/obj"), (MeshFile = "model/vrml"), (MeshFile = "application/octet-stream"))),
+        (status = 206, description = "A range of a mesh file"), (status = 304),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn fetch(
@@ -94,11 +118,14 @@ pub async fn fetch(
 ) -> Result<Response, Problem> {
     let found = state.beside(move |state| {
         let failed = |error| Problem::io("the model could not be read", &error);
-        let view = state.store.model(&owner.0, &id).map_err(failed)?;
+        let view = state.store.model(&owner.0, &id).map_err(failed)?.ok_or_else(|| absent(&id))?;
         let document = state.store.model_document(&owner.0, &id).map_err(failed)?;
-        view.zip(document).ok_or_else(|| absent(&id))
+        if document.is_none() && view.mesh.is_none() { Err(absent(&id)) } else { Ok((view, document)) }
     });
     let (view, document) = found.await?;
+    let Some(document) = document else {
+        return range::answer(&headers, &state.store.upload_path(view.digest), &file_of(&view)).await;
+    };
     let etag = format!("\"{}\"", view.digest);
     let shared = [(header::ETAG, etag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
     if is_known(&headers, &etag) {
@@ -109,7 +136,7 @@ pub async fn fetch(
 
 /// Forgets a model. Jobs that used it keep what they made.
 #[utoipa::path(
-    delete, path = "/v1/models/{id}", tag = "models", params(("id" = String, Path, description = "The model's id")),
+    delete, path = "/v1/models/{id}", operation_id = "forget_model", tag = "models", params(("id" = String, Path, description = "The model's id")),
     responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn forget(
@@ -122,6 +149,14 @@ pub async fn forget(
         if known { Ok(StatusCode::NO_CONTENT) } else { Err(absent(&id)) }
     });
     forgotten.await
+}
+
+/// An uploaded mesh file as something to hand out.
+fn file_of(view: &ModelView) -> Output {
+    let facts = view.mesh.as_ref().and_then(|mesh| Format::from_name(&mesh.format)).unwrap_or(Format::Stl).facts();
+    let stem = files::safe_stem(view.name.as_deref().unwrap_or("mesh"));
+    let (name, file_name) = (facts.ending.to_owned(), format!("{stem}.{}", facts.ending));
+    Output { name, file_name, media_type: facts.media_type.to_owned(), bytes: view.bytes, digest: view.digest }
 }
 
 fn absent(id: &str) -> Problem {

@@ -26,7 +26,7 @@ pub struct OutputQuery {
 
 /// A job's output: 303 to its bytes, or the bytes with `?redirect=0`. `HEAD` gives the headers.
 #[utoipa::path(
-    get, path = "/v1/jobs/{id}/outputs/{name}", tag = "results",
+    get, path = "/v1/jobs/{id}/outputs/{name}", operation_id = "job_output", tag = "results",
     params(("id" = String, Path, description = "The job's id"), ("name" = String, Path, description = "`stl`, `3mf`, ..., `certificate.json`"),
         OutputQuery),
     responses((status = 303, description = "`Location` is the address of the bytes"),
@@ -61,7 +61,7 @@ pub async fn output(
 
 /// The bytes with a digest, if one of the caller's jobs made them. They never change. `HEAD` gives the headers.
 #[utoipa::path(
-    get, path = "/v1/results/{digest}", tag = "results",
+    get, path = "/v1/results/{digest}", operation_id = "fetch_result", tag = "results",
     params(("digest" = String, Path, description = "`sha256:` and 64 hex digits"),
         ("Range" = Option<String>, Header, description = "One range of bytes")),
     responses((status = 200, content_type = "application/octet-stream", description = "The bytes, with their own media type"),

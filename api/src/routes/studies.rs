@@ -1,5 +1,6 @@
 //! What can be said of a model or a job without doing it.
 
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use axum::Json;
@@ -8,6 +9,7 @@ use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 use lacuna_fabrication::Plan;
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::addresses::{self, AddressAnswer};
 use crate::documents::{self, SolveReport, ValidationReport};
@@ -63,7 +65,7 @@ fn prefers_dot(headers: &HeaderMap) -> bool {
 
 /// Tells where an address leads, or which addresses lead near a point.
 #[utoipa::path(
-    post, path = "/v1/address", tag = "studies", request_body = AddressQuestion,
+    post, path = "/v1/address", operation_id = "locate", tag = "studies", request_body = AddressQuestion,
     responses((status = 200, body = AddressAnswer), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn address(
@@ -73,7 +75,7 @@ pub async fn address(
 ) -> Result<Json<AddressAnswer>, Problem> {
     let answer = state.beside(move |state| {
         let (model, sought) = documents::read_address_question(&body, &state.models_of(&owner))?;
-        addresses::answer(&model, &sought, PLAN_TIME).map_err(|problem| problem.under_model())
+        aside(|| addresses::answer(&model, &sought, PLAN_TIME))?.map_err(|problem| problem.under_model())
     });
     answer.await.map(Json)
 }
@@ -91,8 +93,8 @@ pub async fn plan(
     JsonBody(body): JsonBody,
 ) -> Result<Json<Plan>, Problem> {
     let plan = state.beside(move |state| {
-        let job = documents::read_job(&body, &state.config.job_limits, &state.models_of(&owner))?;
-        predict(state.engine, &job, PLAN_TIME)
+        let order = documents::read_order(&body, &state.config.job_limits, &state.models_of(&owner))?;
+        predict(state.engine, &order.job, PLAN_TIME)
     });
     plan.await.map(Json)
 }
@@ -129,11 +131,20 @@ pub async fn solve(
 ///
 /// # Errors
 /// The work's own, or that there is no thread to watch the time.
-pub fn watched<T, E: From<Problem>>(time: Duration, work: impl FnOnce(&Budget) -> Result<T, E>) -> Result<T, E> {
+pub fn watched<T: Send, E: From<Problem> + Send>(time: Duration, work: impl FnOnce(&Budget) -> Result<T, E> + Send) -> Result<T, E> {
     let limits = Limits { seconds: time.as_secs_f64(), ..Limits::default() };
     let budget = Budget { limits, cancel: CancelToken::new(), progress: None };
     let _watchdog = Watchdog::start(&budget.cancel, limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
-    work(&budget)
+    aside(|| work(&budget))?
+}
+
+/// Works with threads of its own: in the pool that jobs share, a question that somebody waits for would stand behind all
+/// that a large job has queued there, for minutes.
+fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Problem> {
+    static POOL: OnceLock<Option<ThreadPool>> = OnceLock::new();
+    let pool = POOL.get_or_init(|| ThreadPoolBuilder::new().thread_name(|number| format!("study-{number}")).build().ok());
+    let pool = pool.as_ref().ok_or_else(|| Problem::internal("no threads for studies"))?;
+    Ok(pool.install(work))
 }
 
 /// Predicts within a time.
@@ -143,5 +154,5 @@ pub fn watched<T, E: From<Problem>>(time: Duration, work: impl FnOnce(&Budget) -
 pub fn predict(engine: Engine, job: &lacuna_fabrication::Job, time: Duration) -> Result<Plan, Problem> {
     let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
     let _watchdog = Watchdog::start(&budget.cancel, time.as_secs_f64()).map_err(|error| Problem::io("no thread", &error))?;
-    (engine.plan)(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under_model()))
+    aside(|| (engine.plan)(job, &budget))?.map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under_model()))
 }

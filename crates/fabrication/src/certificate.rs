@@ -1,13 +1,14 @@
 //! The statement of bounds, counts and digests that comes with every result.
 
+use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, CellComplex, Streamed};
 use lacuna_kernel::budget::Budget;
-use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict, Wall};
+use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
 use lacuna_kernel::error::Kind;
 use lacuna_kernel::levels::SolidLevel;
 use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
-use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh};
+use lacuna_kernel::solid::{Rounded, Solid, SolidError, Topology, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 
@@ -15,8 +16,9 @@ use crate::level::LevelStatement;
 use crate::operand::Operand;
 use crate::run::{JobError, not_carried};
 use crate::shape_measures::{OrientedBoxStatement, ThicknessStatement};
+use crate::solidify::{ClosingStatement, WallStatement};
 use crate::split::SplitStatement;
-use crate::{Operation, Part, WallOrder, WallSide};
+use crate::{Operation, Part};
 
 /// A verdict that may not have been sought: what was not checked never reads as a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -420,37 +422,6 @@ pub struct OperandStatement {
     pub mesh_volume_mm3: f64,
 }
 
-/// How gaps were filled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
-pub struct ClosingStatement {
-    /// Gaps narrower than this are filled.
-    pub width_mm: f64,
-    /// Half of that. C(X) is X and all points that no ball of this radius outside of X can reach. The result holds C(D(r - inner)) and lies in
-    /// C(D(r + outer)).
-    pub ball_radius_mm: f64,
-}
-
-/// A wall along the surface of a solid M that is written as a part of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
-pub struct WallStatement {
-    /// On which side of M's surface.
-    pub side: WallSide,
-    /// The thickness that was asked.
-    pub thickness_mm: f64,
-    /// Points of that side as near to M's surface as the first belong to the wall, points farther than the second do not.
-    #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
-    pub reached_mm: Interval,
-    /// Volume that M's mesh encloses.
-    pub solid_volume_mm3: f64,
-    /// Volume of the hollow in the mesh as written: what an inward wall saves.
-    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
-    pub hollow_volume_mm3: Option<f64>,
-}
-
 /// What happens to the topology when the radius grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
@@ -540,49 +511,6 @@ impl Certificate {
         self.mass_g = self.volume_mm3.zip(density_g_cm3).map(|(volume, density)| volume.map(|v| v * 1e-3 * density));
     }
 
-    /// Says that gaps up to a width were filled. The volume and the area of the exact shape are not known then; its box is that of the dilation, as a closing
-    /// stays within the convex hull.
-    pub(crate) fn state_closing(&mut self, width_mm: f64) {
-        self.closing = Some(ClosingStatement { width_mm, ball_radius_mm: 0.5 * width_mm });
-        (self.volume_mm3, self.area_mm2) = (None, None);
-    }
-
-    /// Says that a wall was made along the surface of `solid`, of which this certificate told so far.
-    pub(crate) fn state_wall(&mut self, order: WallOrder, solid: &Solid, wall: &Wall, tolerance: Tolerance) {
-        let WallOrder { thickness_mm, side } = order;
-        let (solid_volume, wall_volume) = (volume(solid.mesh()), volume(wall.solid.mesh()));
-        let crossings = match self.self_intersections {
-            Checked::Found(SelfIntersections::Count(count)) => count,
-            _ => 0,
-        };
-        // What was counted on the solid is counted anew.
-        let counts = ["sealed voids", "separate pieces", "triangles cross"];
-        let own =
-            std::mem::take(&mut self.warnings).into_iter().filter(|warning| !counts.iter().any(|word| warning.contains(word))).collect();
-        let counted = of_one_solid(&wall.solid, crossings + wall.crossings, own, tolerance);
-        let grown = if side == WallSide::Outward { thickness_mm } else { 0.0 };
-        let moved = |end: usize| self.bbox_mm[end].map(|x| if end == 0 { x.map(|x| x - grown) } else { x.map(|x| x + grown) });
-        let reached_mm = [(thickness_mm - wall.inner_mm).max(0.0), thickness_mm + wall.outer_mm];
-        *self = Self {
-            achieved_bound_mm: self.achieved_bound_mm.max(wall.inner_mm).max(wall.outer_mm),
-            inner_bound_mm: self.inner_bound_mm,
-            outer_bound_mm: self.outer_bound_mm,
-            thickness_min_mm: Some(reached_mm[0]),
-            leaf_cells: self.leaf_cells + wall.leaf_cells,
-            bbox_mm: [moved(0), moved(1)],
-            lattice_pitch_mm: self.lattice_pitch_mm,
-            closing: self.closing,
-            wall: Some(WallStatement {
-                side,
-                thickness_mm,
-                reached_mm,
-                solid_volume_mm3: solid_volume,
-                hollow_volume_mm3: (side == WallSide::Inward).then_some(solid_volume - wall_volume),
-            }),
-            ..counted
-        };
-    }
-
     /// Adds what was found of the topology at radii nearby, `reached` around the radius.
     pub(crate) fn state_stability(&mut self, found: &Stability, radius: Radius, reached: Tolerance) {
         self.topology_stable = match found.verdict {
@@ -649,7 +577,7 @@ fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tol
 }
 
 /// As [`of_solid`], for what is made in one piece.
-fn of_one_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
+pub(crate) fn of_one_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
     let mut certificate = of_solid(solid, crossings, warnings, tolerance);
     let components = solid.topology().components;
     if components > 1 {
@@ -887,6 +815,40 @@ pub(crate) fn of_evaluation(attractor: &Attractor, tessellation: &Tessellation, 
     }
 }
 
+/// What is counted of a mesh that was only rounded, by `moved_mm` at most, from the vertices that were given.
+pub(crate) fn of_polygons(mesh: &TriMesh, topology: &Topology, given: &[DVec3], moved_mm: f64, tolerance: Tolerance) -> Certificate {
+    let closed = topology.is_closed_manifold();
+    let mut warnings = Vec::new();
+    let enclosed = Some(volume(mesh)).filter(|volume| volume.is_finite());
+    if !closed {
+        warnings.push("the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing".to_owned());
+    } else if enclosed.is_some_and(|volume| volume < 0.0) {
+        warnings.push("the faces look inwards: the enclosed volume is negative".to_owned());
+    }
+    let corner = |choose: fn(DVec3, DVec3) -> DVec3| given.iter().copied().reduce(choose).unwrap_or_default().to_array();
+    Certificate {
+        achieved_bound_mm: moved_mm,
+        leaf_cells: topology.triangles,
+        vertices: topology.vertices,
+        edges: topology.edges,
+        triangles: topology.triangles,
+        components: Some(topology.components),
+        shells: Some(topology.shells),
+        cavities: closed.then_some(topology.cavities),
+        genus: closed.then_some(topology.genus),
+        euler: Some(topology.euler),
+        boundary_edges: Some(topology.boundary_edges),
+        nonmanifold_edges: Some(topology.nonmanifold_edges),
+        nonmanifold_vertices: Some(topology.nonmanifold_vertices),
+        flipped_pairs: Some(topology.flipped_pairs),
+        degenerate_triangles: Some(topology.degenerate_triangles),
+        mesh_volume_mm3: enclosed,
+        mesh_area_mm2: Some(area(mesh)).filter(|area| area.is_finite()),
+        bbox_mm: [corner(DVec3::min), corner(DVec3::max)].map(|corner| corner.map(|end| [end, end])),
+        ..start(warnings, tolerance)
+    }
+}
+
 /// What is proven of a shape itself. Its volume and area are known when it is one mesh.
 pub(crate) fn of_shape(attractor: &Attractor, bounds: &AxisBox, tolerance: Tolerance) -> Certificate {
     let widest = bounds.low.iter().chain(&bounds.high).map(|end| end.width()).fold(0.0, f64::max);
@@ -904,7 +866,7 @@ pub(crate) fn of_shape(attractor: &Attractor, bounds: &AxisBox, tolerance: Toler
 pub(crate) use wire::interval_schema;
 
 #[cfg(feature = "wire")]
-mod wire {
+pub(crate) mod wire {
     use super::{Checked, SelfIntersections};
     use serde::de::Error as _;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};

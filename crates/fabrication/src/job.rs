@@ -20,6 +20,8 @@ pub enum JobKind {
     Intersect,
     /// Plane sections of a solid.
     Slice,
+    /// A mesh as it is, in other formats; any other model is evaluated.
+    Convert,
 }
 
 /// Parallel planes that cut a solid.

@@ -3,13 +3,14 @@
 mod boolean;
 pub mod certificate;
 mod contact;
+mod convert;
 pub mod job;
 pub mod level;
 mod operand;
 pub mod run;
 pub mod shape_measures;
 mod slice;
-mod solidify;
+pub mod solidify;
 pub mod solve;
 pub mod split;
 

@@ -6,7 +6,7 @@ use lacuna_kernel::dilation::{DilationError, dilate_unsimplified, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
-use lacuna_kernel::model::{Finding, Lowered, Model};
+use lacuna_kernel::model::{Finding, Lowered, Model, PolygonMesh};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
@@ -15,7 +15,7 @@ use crate::certificate::DimensionStatement;
 use crate::operand::{is_solid, surfaces};
 use crate::shape_measures::{least_thickness, no_solid, smallest_box};
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, level, slice, solidify, split};
+use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, slice, solidify, split};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +26,13 @@ pub enum Geometry {
     Parts(Vec<Part>),
     /// An evaluation.
     Tessellation(Tessellation),
+    /// A mesh with its polygons whole, in single-precision numbers.
+    Polygons {
+        /// The mesh.
+        mesh: PolygonMesh,
+        /// Whether it was counted to be a closed 2-manifold.
+        closed: bool,
+    },
     /// A solid and planes that cut it.
     Sections(Box<Stack>),
     /// Numbers only.
@@ -229,6 +236,10 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
             None => contact::contact(job, tolerance, budget),
         },
         JobKind::Slice => slice::slice(job, tolerance, budget),
+        JobKind::Convert => match convert::polygons(job) {
+            Some(mesh) => convert::convert(mesh, tolerance, budget),
+            None => evaluate(&lower(job, budget)?.attractor, tolerance, false, budget),
+        },
     }
 }
 
@@ -383,6 +394,11 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         // Nothing is made, and what a search costs shows in the search.
         JobKind::Intersect => return Ok(Plan::default()),
         JobKind::Measure if job.inputs.len() > 1 => return Ok(Plan::default()),
+        JobKind::Convert => {
+            if let Some(mesh) = convert::polygons(job) {
+                return Ok(convert::plan(mesh));
+            }
+        }
         JobKind::Evaluate | JobKind::Solidify | JobKind::Measure => {}
     }
     let radius = radius(job)?;
@@ -394,7 +410,7 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         (radius, _) => radius,
     };
     if job.kind == JobKind::Evaluate || radius.is_none() {
-        let counted = if job.kind == JobKind::Evaluate { leaf_cells } else { 0.0 };
+        let counted = if matches!(job.kind, JobKind::Evaluate | JobKind::Convert) { leaf_cells } else { 0.0 };
         return Ok(Plan { leaf_cells, memory_bytes: counted * BYTES_PER_CELL, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };

@@ -1,14 +1,92 @@
 //! Printable solids: the shape dilated by a ball, closed, and hollowed, as far as the job asks.
 
 use lacuna_kernel::budget::Budget;
-use lacuna_kernel::dilation::{close, dilate, dilate_unsimplified, stability, wall};
+use lacuna_kernel::dilation::{Wall, close, dilate, dilate_unsimplified, stability, wall};
 use lacuna_kernel::error::Kind;
+use lacuna_kernel::measure::mass::volume;
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 
+use crate::certificate::{Checked, Interval, SelfIntersections, of_one_solid};
 use crate::operand::{Source, solid_of};
 use crate::run::{JobError, Outcome, lower, radius};
-use crate::{Certificate, Geometry, Job, certificate};
+use crate::{Certificate, Geometry, Job, WallOrder, WallSide, certificate};
+
+/// How gaps were filled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct ClosingStatement {
+    /// Gaps narrower than this are filled.
+    pub width_mm: f64,
+    /// Half of that. C(X) is X and all points that no ball of this radius outside of X can reach. The result holds C(D(r - inner)) and lies in
+    /// C(D(r + outer)).
+    pub ball_radius_mm: f64,
+}
+
+/// A wall along the surface of a solid M that is written as a part of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct WallStatement {
+    /// On which side of M's surface.
+    pub side: WallSide,
+    /// The thickness that was asked.
+    pub thickness_mm: f64,
+    /// Points of that side as near to M's surface as the first belong to the wall, points farther than the second do not.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::wire::interval_schema))]
+    pub reached_mm: Interval,
+    /// Volume that M's mesh encloses.
+    pub solid_volume_mm3: f64,
+    /// Volume of the hollow in the mesh as written: what an inward wall saves.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub hollow_volume_mm3: Option<f64>,
+}
+
+impl Certificate {
+    /// Says that gaps up to a width were filled. The volume and the area of the exact shape are not known then; its box is that of the dilation, as a closing
+    /// stays within the convex hull.
+    pub(crate) fn state_closing(&mut self, width_mm: f64) {
+        self.closing = Some(ClosingStatement { width_mm, ball_radius_mm: 0.5 * width_mm });
+        (self.volume_mm3, self.area_mm2) = (None, None);
+    }
+
+    /// Says that a wall was made along the surface of `solid`, of which this certificate told so far.
+    pub(crate) fn state_wall(&mut self, order: WallOrder, solid: &Solid, wall: &Wall, tolerance: Tolerance) {
+        let WallOrder { thickness_mm, side } = order;
+        let (solid_volume, wall_volume) = (volume(solid.mesh()), volume(wall.solid.mesh()));
+        let crossings = match self.self_intersections {
+            Checked::Found(SelfIntersections::Count(count)) => count,
+            _ => 0,
+        };
+        // What was counted on the solid is counted anew.
+        let counts = ["sealed voids", "separate pieces", "triangles cross"];
+        let own =
+            std::mem::take(&mut self.warnings).into_iter().filter(|warning| !counts.iter().any(|word| warning.contains(word))).collect();
+        let counted = of_one_solid(&wall.solid, crossings + wall.crossings, own, tolerance);
+        let grown = if side == WallSide::Outward { thickness_mm } else { 0.0 };
+        let moved = |end: usize| self.bbox_mm[end].map(|x| if end == 0 { x.map(|x| x - grown) } else { x.map(|x| x + grown) });
+        let reached_mm = [(thickness_mm - wall.inner_mm).max(0.0), thickness_mm + wall.outer_mm];
+        *self = Self {
+            achieved_bound_mm: self.achieved_bound_mm.max(wall.inner_mm).max(wall.outer_mm),
+            inner_bound_mm: self.inner_bound_mm,
+            outer_bound_mm: self.outer_bound_mm,
+            thickness_min_mm: Some(reached_mm[0]),
+            leaf_cells: self.leaf_cells + wall.leaf_cells,
+            bbox_mm: [moved(0), moved(1)],
+            lattice_pitch_mm: self.lattice_pitch_mm,
+            closing: self.closing,
+            wall: Some(WallStatement {
+                side,
+                thickness_mm,
+                reached_mm,
+                solid_volume_mm3: solid_volume,
+                hollow_volume_mm3: (side == WallSide::Inward).then_some(solid_volume - wall_volume),
+            }),
+            ..counted
+        };
+    }
+}
 
 /// Does a job of kind `solidify`.
 pub(crate) fn solidify(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {

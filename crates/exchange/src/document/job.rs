@@ -31,6 +31,8 @@ pub struct JobDocument {
     pub outputs: Vec<String>,
     /// What may be used, as far as the document says.
     pub limits: RequestedLimits,
+    /// The id of the job that this one replaces.
+    pub supersedes: Option<String>,
 }
 
 /// A model that a job uses.
@@ -117,6 +119,15 @@ fn fetched(source: ModelSource, pointer: String, find: &mut impl FnMut(&str) -> 
 }
 
 impl InputDocument {
+    /// The id of the stored model that it refers to, if it does.
+    #[must_use]
+    pub fn reference(&self) -> Option<&str> {
+        match &self.source {
+            ModelSource::Stored(id) => Some(id),
+            ModelSource::Inline(_) => None,
+        }
+    }
+
     /// The model, fetched by `find` if it is stored.
     ///
     /// # Errors
@@ -129,10 +140,7 @@ impl InputDocument {
 impl JobDocument {
     /// The ids of stored models that the job refers to.
     pub fn references(&self) -> impl Iterator<Item = &str> {
-        self.inputs.iter().filter_map(|input| match &input.source {
-            ModelSource::Stored(id) => Some(id.as_str()),
-            ModelSource::Inline(_) => None,
-        })
+        self.inputs.iter().filter_map(InputDocument::reference)
     }
 
     /// The job, with stored models fetched by `find` and limits that are absent taken from `default`.
@@ -172,7 +180,9 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
     let params = members.get("params").and_then(|place| params(walker, place, kind));
     let outputs = members.get("outputs").map_or(Some(Vec::new()), |place| outputs(walker, place, kind));
     let limits = members.get("limits").map_or(Some(RequestedLimits::default()), |place| limits(walker, place));
-    let document = JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits? };
+    let supersedes = stated(members.get("supersedes").map(|place| walker.name(place, "the id of a job")));
+    let document =
+        JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits?, supersedes: supersedes? };
     settle(walker, &members, &document)?;
     Some(document)
 }
@@ -226,12 +236,13 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
 }
 
 fn kind(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobKind> {
-    const KINDS: [(&str, JobKind); 5] = [
+    const KINDS: [(&str, JobKind); 6] = [
         ("evaluate", JobKind::Evaluate),
         ("solidify", JobKind::Solidify),
         ("measure", JobKind::Measure),
         ("intersect", JobKind::Intersect),
         ("slice", JobKind::Slice),
+        ("convert", JobKind::Convert),
     ];
     let text = walker.text(place, "the name of a kind of job")?;
     if let Some((_, kind)) = KINDS.iter().find(|(word, _)| *word == text) {
@@ -274,7 +285,9 @@ fn inputs(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>)
         (_, Some(JobKind::Intersect)) => inputs,
         (Some(found), Some(JobKind::Measure)) if found > 2 => walker.wrong_length(&place, found, "one input, or two to compare"),
         (_, Some(JobKind::Measure)) => inputs,
-        (Some(found), _) if found > 1 => walker.wrong_length(&place, found, "one input: evaluate, solidify and slice take one model"),
+        (Some(found), _) if found > 1 => {
+            walker.wrong_length(&place, found, "one input: evaluate, solidify, slice and convert take one model")
+        }
         _ => inputs,
     }
 }
@@ -348,9 +361,10 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
             });
             return None;
         }
-        (Some(JobKind::Evaluate), Some(radius)) => {
+        (Some(kind @ (JobKind::Evaluate | JobKind::Convert)), Some(radius)) => {
+            let word = if kind == JobKind::Evaluate { "evaluate" } else { "convert" };
             walker.fault(&radius, code::CONFLICTING_MEMBERS, || {
-                "evaluate dilates nothing and takes no \"radius_mm\"; remove it, or ask for the kind \"solidify\"".into()
+                format!("{word} dilates nothing and takes no \"radius_mm\"; remove it, or ask for the kind \"solidify\"")
             });
             return None;
         }

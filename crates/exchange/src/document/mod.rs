@@ -38,7 +38,7 @@ pub use address::{AddressQuestion, CELLS_LISTED, MOST_CELLS_LISTED, Sought};
 pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
 pub use schema::{job_schema, model_schema, schemas};
 pub use solve::SolveDocument;
-pub use write::{model_value, write_job, write_model, write_model_indented};
+pub use write::{model_value, write_job, write_job_to, write_model, write_model_indented, write_order};
 
 use lacuna_kernel::model::Model;
 

@@ -4,6 +4,8 @@
 //! defaults left out, parameters in their own order, every number the shortest that reads back to the
 //! same double, and no negative zero.
 
+use std::io::{self, Write};
+
 use super::join::SIDES;
 use glam::{DMat3, DVec2, DVec3, DVec4};
 use lacuna_fabrication::job::{Input, Job};
@@ -40,7 +42,57 @@ pub fn model_value(model: &Model) -> impl Serialize + '_ {
 /// The canonical document of a job, models in full and limits complete: what `input_digest` hashes.
 #[must_use]
 pub fn write_job(job: &Job) -> String {
-    text(&Wire(job), false)
+    write_order(job, &[])
+}
+
+/// The canonical document of a job under other limits than its own, written piece by piece: for digests of jobs whose
+/// meshes are large.
+///
+/// # Errors
+/// When the sink fails.
+pub fn write_job_to(job: &Job, limits: &Limits, sink: &mut impl Write) -> io::Result<()> {
+    Ok(serde_json::to_writer(sink, &Order { job, references: &[], limits })?)
+}
+
+/// The document of a job in which an input that has a reference is written as its `model_ref` instead of its model.
+#[must_use]
+pub fn write_order(job: &Job, references: &[Option<String>]) -> String {
+    text(&Order { job, references, limits: &job.limits }, false)
+}
+
+/// A job with references.
+struct Order<'m> {
+    job: &'m Job,
+    references: &'m [Option<String>],
+    limits: &'m Limits,
+}
+
+/// An input, and its reference if it has one.
+struct Referred<'m>(&'m Input, Option<&'m String>);
+
+impl Serialize for Order<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { job, references, limits } = self;
+        let reference = |index: usize| references.get(index).and_then(Option::as_ref);
+        let inputs: Vec<Referred<'_>> = job.inputs.iter().enumerate().map(|(index, input)| Referred(input, reference(index))).collect();
+        let mut map = Members(serializer.serialize_map(None)?);
+        map.put("lacuna", &1)?
+            .put("kind", &job.kind)?
+            .put("inputs", &inputs)?
+            .put("params", &Wire(&job.params))?
+            .put("outputs", &job.outputs)?
+            .put("limits", &Wire(*limits))?;
+        map.0.end()
+    }
+}
+
+impl Serialize for Referred<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self(input, Some(reference)) = self else { return Wire(self.0).serialize(serializer) };
+        let mut map = Members(serializer.serialize_map(None)?);
+        map.put("name", &input.name)?.put("model_ref", reference)?.put_some("radius_mm", input.radius_mm.map(Number).as_ref())?;
+        map.0.end()
+    }
 }
 
 fn text(document: &impl Serialize, indented: bool) -> String {
@@ -263,13 +315,6 @@ object! {
         .put("between", &glue.between)?
         .put_if(glue.reversed, "reversed", &true)?
         .put_some("permutation", glue.permutation.as_ref())?;
-    Job: |job, members| members
-        .put("lacuna", &1)?
-        .put("kind", &job.kind)?
-        .put("inputs", &list(&job.inputs))?
-        .put("params", &Wire(&job.params))?
-        .put("outputs", &job.outputs)?
-        .put("limits", &Wire(&job.limits))?;
     Input: |input, members| members
         .put("name", &input.name)?
         .put("model", &Wire(&input.model))?

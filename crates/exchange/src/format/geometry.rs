@@ -1,7 +1,7 @@
 //! What is written: one view on solids, parts and evaluations that every encoder shares.
 
 use super::error::{FormatError, Place};
-use super::read::{Fan, MeshFile, each_face, face_count};
+use super::read::{Fan, each_face, face_count};
 use super::{Carries, text};
 use glam::DVec3;
 use lacuna_kernel::solid::{Solid, TriMesh};
@@ -31,7 +31,9 @@ pub enum Geometry<'a> {
     /// A mesh with its polygons, as it was read; they stay polygons where the format has them (OBJ, PLY, OFF, VRML).
     Polygons {
         /// The mesh; coordinates are rounded to single precision.
-        file: &'a MeshFile,
+        mesh: &'a TriMesh,
+        /// Which of its triangles are polygons.
+        fans: &'a [Fan],
         /// Whether it is proven to be a closed 2-manifold.
         closed: bool,
     },
@@ -122,8 +124,8 @@ impl<'a> Geometry<'a> {
                 wires: !sample.segments.is_empty(),
                 points: !sample.points.is_empty(),
             },
-            Self::Polygons { file, closed } => {
-                let filled = !file.mesh.triangles.is_empty();
+            Self::Polygons { mesh, closed, .. } => {
+                let filled = !mesh.triangles.is_empty();
                 Carries { solid: filled && *closed, surface: filled && !*closed, ..Carries::default() }
             }
         }
@@ -148,9 +150,7 @@ impl<'a> Geometry<'a> {
                 normals: sample.normals.as_deref(),
                 exact: false,
             }],
-            Self::Polygons { file, .. } => {
-                vec![Piece { fans: &file.fans, exact: false, ..Piece::closed(None, &file.mesh) }]
-            }
+            Self::Polygons { mesh, fans, .. } => vec![Piece { fans, exact: false, ..Piece::closed(None, mesh) }],
         }
     }
 }

@@ -43,7 +43,7 @@ pub use error::{FormatError, Place};
 pub use geometry::{Geometry, NamedMesh};
 pub use limits::ReadLimits;
 pub use ply::PointFile;
-pub use read::{Fan, MeshFacts, MeshFile, Unit, detect, read};
+pub use read::{Fan, MeshFacts, MeshFile, Unit, detect, fanned, read};
 
 use geometry::Piece;
 use lacuna_fabrication::certificate::Certificate;

@@ -105,6 +105,20 @@ impl MeshFile {
     }
 }
 
+/// Faces of three corners or more as triangles about their first corners, and which of those are polygons.
+#[must_use]
+pub fn fanned(faces: &[Vec<u32>]) -> (Vec<[u32; 3]>, Vec<Fan>) {
+    let (mut triangles, mut fans) = (Vec::with_capacity(faces.len()), Vec::new());
+    for face in faces {
+        let first = triangles.len() as u32;
+        triangles.extend((1..face.len().saturating_sub(1)).map(|k| [face[0], face[k], face[k + 1]]));
+        if face.len() > 3 {
+            fans.push(Fan { first, count: triangles.len() as u32 - first });
+        }
+    }
+    (triangles, fans)
+}
+
 /// How many faces there are.
 pub(crate) fn face_count(triangles: &[[u32; 3]], fans: &[Fan]) -> u64 {
     triangles.len() as u64 - fans.iter().map(|fan| u64::from(fan.count) - 1).sum::<u64>()

@@ -27,11 +27,13 @@ pub(in super::super) const OPERATIONS: [(&str, Operation); 6] = [
 pub(in super::super) const WALL_SIDES: [(&str, WallSide); 2] = [("inward", WallSide::Inward), ("outward", WallSide::Outward)];
 
 /// The members that name a model.
-const SOURCE: [Member; 2] =
-    [optional("model", "The model, in full.", || reference("EmbeddedModel")), optional("model_ref", "The id of a stored model.", text)];
+const SOURCE: [Member; 2] = [
+    optional("model", "The model, in full.", || reference("EmbeddedModel")),
+    optional("model_ref", "The id of a stored model or of an uploaded mesh file.", text),
+];
 
 /// Kinds of jobs of the grammar that cannot be done yet.
-pub(in super::super) const LATER_KINDS: [&str; 5] = ["check", "sla", "cast", "panels", "convert"];
+pub(in super::super) const LATER_KINDS: [&str; 4] = ["check", "sla", "cast", "panels"];
 
 pub(in super::super) const JOB: Object = Object {
     title: "a job",
@@ -40,8 +42,8 @@ pub(in super::super) const JOB: Object = Object {
         required("lacuna", "The version of the grammar: 1.", version),
         required(
             "kind",
-            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball, or a level of an ifs), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), or slice (plane sections of a solid).",
-            || one_of_words(&["evaluate", "solidify", "measure", "intersect", "slice"]),
+            "What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball, a wall, or a level of an ifs), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), slice (plane sections of a solid), or convert (a mesh as it is, in other formats; any other model is evaluated).",
+            || one_of_words(&["evaluate", "solidify", "measure", "intersect", "slice", "convert"]),
         ),
         SOURCE[0],
         SOURCE[1],
@@ -53,6 +55,11 @@ pub(in super::super) const JOB: Object = Object {
             || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
         ),
         optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
+        optional(
+            "supersedes",
+            "For a service: the id of a job that is stopped once this one is accepted, because nobody wants it any more.",
+            text,
+        ),
     ],
 };
 
@@ -123,7 +130,7 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         ),
         optional(
             "radius_mm",
-            "The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate.",
+            "The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate and convert.",
             positive,
         ),
         optional(

@@ -1,0 +1,66 @@
+//! Meshes as they are, for other formats: nothing is computed but the rounding to single precision and what can be counted.
+
+use glam::DVec3;
+use lacuna_kernel::budget::Budget;
+use lacuna_kernel::error::{Kind, LimitFacts};
+use lacuna_kernel::model::{PolygonMesh, Shape};
+use lacuna_kernel::solid::{SolidError, Topology, TriMesh};
+use lacuna_kernel::tolerance::Tolerance;
+
+use crate::run::{Geometry, JobError, Outcome, Plan, not_carried, stl_bytes};
+use crate::{Job, certificate};
+
+/// The polygons of a job whose one input is nothing but polygons: everything else is evaluated.
+pub(crate) fn polygons(job: &Job) -> Option<&PolygonMesh> {
+    match job.inputs.as_slice() {
+        [input] => match &input.model.shape {
+            Shape::Mesh(mesh) if !mesh.faces.is_empty() && mesh.faces.iter().all(|face| face.len() > 2) => Some(mesh),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Triangles of polygons that are cut from their first corner.
+fn triangles(mesh: &PolygonMesh) -> u64 {
+    mesh.faces.iter().map(|face| face.len() as u64 - 2).sum()
+}
+
+/// Rounds the mesh to single precision and counts. Cost: linear.
+pub(crate) fn convert(mesh: &PolygonMesh, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
+    let count = triangles(mesh);
+    if count > budget.limits.triangles {
+        #[expect(clippy::cast_precision_loss, reason = "limits are shown, not computed with")]
+        let (asked, allowed) = (count as f64, budget.limits.triangles as f64);
+        let message = format!("the mesh has {count} triangles; {} are allowed", budget.limits.triangles);
+        let limit = Some(LimitFacts { limit: "triangles", asked, allowed, remedy: None });
+        return Err(JobError { limit, ..JobError::new(Kind::Limit, "convert.triangles", message) });
+    }
+    let vertices: Vec<DVec3> = mesh.vertices.iter().map(|vertex| vertex.as_vec3().as_dvec3()).collect();
+    let moved = vertices.iter().zip(&mesh.vertices).map(|(rounded, given)| rounded.distance(*given)).fold(0.0, f64::max);
+    // What the sums and the root of the distance lose; a coordinate beyond single precision is infinitely far.
+    let moved_mm = if moved.is_finite() { moved * (1.0 + 8.0 * f64::EPSILON) } else { f64::INFINITY };
+    if moved_mm > tolerance.mm() {
+        let extent = mesh.vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max);
+        return Err(not_carried(tolerance, extent, moved_mm));
+    }
+    budget.cancel.check()?;
+    let cut = |face: &Vec<u32>| (1..face.len() - 1).map(|k| [face[0], face[k], face[k + 1]]).collect::<Vec<_>>();
+    let cut = TriMesh { vertices, triangles: mesh.faces.iter().flat_map(cut).collect() };
+    let topology = Topology::of(&cut, budget).map_err(|error| match error {
+        SolidError::Stopped(stopped) => stopped.into(),
+        other => JobError::new(Kind::Invalid, "convert.mesh", other.to_string()),
+    })?;
+    let certificate = certificate::of_polygons(&cut, &topology, &mesh.vertices, moved_mm, tolerance);
+    let rounded = PolygonMesh { vertices: cut.vertices, faces: mesh.faces.clone(), interior: mesh.interior };
+    Ok(Outcome { geometry: Geometry::Polygons { mesh: rounded, closed: topology.is_closed_manifold() }, certificate })
+}
+
+/// What is known of it beforehand.
+pub(crate) fn plan(mesh: &PolygonMesh) -> Plan {
+    #[expect(clippy::cast_precision_loss, reason = "predictions are real numbers")]
+    let (count, vertices) = (triangles(mesh) as f64, mesh.vertices.len() as f64);
+    // Coordinates twice, triangles, and the edges that are counted.
+    let memory_bytes = 48.0 * vertices + 36.0 * count;
+    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: stl_bytes(count), lattice_pitch_mm: None }
+}
