@@ -8,9 +8,9 @@ use lacuna_exchange::format::Format;
 use lacuna_fabrication::{Geometry, Job, Outcome};
 use lacuna_kernel::budget::{Budget, Limits, Progress, StopReason};
 
-use super::desk::{self, ATTEMPTS, Desk};
+use super::desk::Desk;
 use super::live::LiveJob;
-use super::record::{Answer, JobState, Output};
+use super::record::{Answer, Ending, JobState, Output};
 use super::watchdog::Watchdog;
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
@@ -20,7 +20,7 @@ use crate::{documents, files};
 /// Name of the certificate among a job's outputs.
 const CERTIFICATE: &str = "certificate.json";
 
-/// Starts the workers; they end when the desk's queue is closed.
+/// Starts the workers; they end when the desk is stopped.
 ///
 /// # Errors
 /// When the system has no thread to spare.
@@ -29,46 +29,46 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> st
         .map(|number| {
             let desk = Arc::clone(desk);
             std::thread::Builder::new().name(format!("worker-{number}")).spawn(move || {
-                while let Some(id) = desk.queue.take() {
-                    if let Some(job) = desk.get(&id) {
-                        work(&desk, &job, &most, engine);
-                    }
+                while let Some(job) = desk.take() {
+                    work(&desk, &job, &most, engine);
                 }
             })
         })
         .collect()
 }
 
-/// Does a job from its taking to its record.
+/// Does a job that was taken, up to the record of its end.
 fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) {
-    let taken = job.update(|record| {
-        let view = &mut record.view;
-        if view.state != JobState::Queued {
-            return false;
-        }
-        view.state = JobState::Running;
-        view.attempt += 1;
-        view.started = Some(crate::clock::now());
-        true
-    });
-    // Recorded before the work: a job that brings the process down is known by its attempt.
-    desk.keep(job);
-    let (id, kind) = job.with(|record| (record.view.id.clone(), record.view.kind));
+    let kind = job.with(|record| record.view.kind);
     let start = Instant::now();
-    let result = if taken {
-        // The kernel's panics are caught where it is called; this catches our own, so that a worker never dies.
-        production::guarded(|| perform(desk, job, most, engine)).and_then(|result| result)
-    } else {
-        Err(Problem::new(ProblemKind::Cancelled, "stopped before the start"))
+    // The kernel's panics are caught where it is called; this catches our own, so that a worker never dies.
+    let result = production::guarded(|| perform(desk, job, most, engine)).and_then(|result| result);
+    let ending = match result {
+        Ok(answer) => Ending::Done(Box::new(answer)),
+        Err(_) if job.cancel.reason() == Some(StopReason::Cancelled) => Ending::Stopped,
+        Err(problem) => {
+            if problem.is_defect() {
+                tracing::error!(job = %job.id(), code = %problem.code, detail = %problem.detail, "defect");
+            }
+            Ending::Failed(Box::new(problem.in_public()))
+        }
     };
-    let state = conclude(job, result);
-    desk.keep(job);
+    let Some(state) = desk.conclude(job, &ending) else {
+        tracing::warn!(job = %job.id(), "the job is no longer this worker's");
+        return;
+    };
+    if let (JobState::Cancelled, Some(time)) = (state, job.stopped_for()) {
+        desk.metrics.stopped_after(time);
+    }
     let time = start.elapsed();
     desk.metrics.ended(documents::kind_word(kind), state, time);
-    tracing::info!(job = %id, kind = documents::kind_word(kind), state = state.word(), milliseconds = time.as_millis(), "job ended");
+    tracing::info!(job = %job.id(), kind = documents::kind_word(kind), state = state.word(), milliseconds = time.as_millis(), "job ended");
 }
 
 fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Result<Answer, Problem> {
+    if job.cancel.reason().is_some() {
+        return Err(Problem::new(ProblemKind::Cancelled, "stopped before the start"));
+    }
     let (document, input) = job.with(|record| (record.document, record.view.input_digest.clone()));
     let bytes = desk.store.document(document).map_err(|error| Problem::io("the job document could not be read", &error))?;
     let order = documents::read_job(&bytes, most, &|_| None)?;
@@ -79,11 +79,7 @@ fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Re
         outcome.certificate.input_digest = input;
         keep_files(desk, &order, outcome, &budget)
     });
-    let answer = made.map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
-    if let Err(error) = desk.store.keep_answer(desk::answer_key(documents::job_digest(&order)), &answer) {
-        tracing::warn!(%error, "finished work cannot be found again");
-    }
-    Ok(answer)
+    made.map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
 }
 
 fn budget(job: &Arc<LiveJob>, limits: Limits) -> Budget {
@@ -136,28 +132,4 @@ fn keep_certificate(desk: &Desk, outcome: &Outcome) -> Result<Output, Problem> {
     desk.store.keep_result(pending, digest).map_err(failed)?;
     let name = CERTIFICATE.to_owned();
     Ok(Output { file_name: name.clone(), name, media_type: "application/json".to_owned(), bytes: bytes.len() as u64, digest })
-}
-
-fn conclude(job: &LiveJob, result: Result<Answer, Problem>) -> JobState {
-    let stopped = job.cancel.reason() == Some(StopReason::Cancelled);
-    job.update(|record| {
-        let (id, view) = (record.view.id.clone(), &mut record.view);
-        match result {
-            // What was finished in time is handed out even if somebody wished to stop it meanwhile.
-            Ok(answer) => desk::finish(view, answer.outputs, answer.certificate, false),
-            Err(_) if stopped && view.state == JobState::Cancelling => desk::end_cancelled(view),
-            Err(_) if stopped && view.attempt >= ATTEMPTS => {
-                desk::fail(view, Problem::new(ProblemKind::Interrupted, "The service stopped during the work"));
-            }
-            // The service goes down: the next start takes the job up again.
-            Err(_) if stopped => view.state = JobState::Queued,
-            Err(problem) => {
-                if problem.is_defect() {
-                    tracing::error!(job = %id, code = %problem.code, detail = %problem.detail, "defect");
-                }
-                desk::fail(view, problem.in_public());
-            }
-        }
-        view.state
-    })
 }
