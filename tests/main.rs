@@ -11,6 +11,8 @@
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
+//! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
+//! | `distributed` | and several, with their database and object store? |
 //! | `service` | does the running service keep them? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |
@@ -24,6 +26,8 @@ mod container;
 mod contract;
 mod corpus;
 mod determinism;
+mod distributed;
+mod faults;
 mod independent;
 mod measures;
 mod properties;

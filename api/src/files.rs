@@ -49,13 +49,21 @@ impl PendingFile {
     ///
     /// # Errors
     /// When the device fails; then nothing is in the place that was not there before.
-    pub fn commit(self, target: &Path) -> io::Result<()> {
+    pub fn commit(mut self, target: &Path) -> io::Result<()> {
+        self.settle(target)
+    }
+
+    /// As [`PendingFile::commit`]; after a failure it can be tried again.
+    ///
+    /// # Errors
+    /// As [`PendingFile::commit`].
+    pub fn settle(&mut self, target: &Path) -> io::Result<()> {
         self.rename(target)?;
         sync_folder(folder_of(target))
     }
 
     /// After a power failure there is either the whole file or what stood in its place before.
-    fn rename(self, target: &Path) -> io::Result<()> {
+    fn rename(&mut self, target: &Path) -> io::Result<()> {
         self.file.sync_all()?;
         fs::rename(&self.path, target)
     }

@@ -103,13 +103,13 @@ impl Store {
         PendingFile::create_in(&self.scratch)
     }
 
-    /// Keeps a result under its digest. The same bytes are kept once.
+    /// Keeps a result under its digest. The same bytes are kept once. After a failure it can be tried again.
     ///
     /// # Errors
     /// When the shelf fails.
-    pub fn keep_result(&self, pending: PendingFile, digest: Digest) -> io::Result<()> {
+    pub fn keep_result(&self, pending: &mut PendingFile, digest: Digest) -> io::Result<()> {
         match &self.shelf {
-            Shelf::Folder(folder) => pending.commit(&folder.path(&result_name(digest))),
+            Shelf::Folder(folder) => pending.settle(&folder.path(&result_name(digest))),
             Shelf::Bucket(bucket) => bucket.put_file(&result_name(digest), pending),
         }
     }
@@ -300,7 +300,7 @@ mod tests {
         let mut pending = store.new_result().unwrap();
         pending.write_all(b"mesh").unwrap();
         let digest = Digest::of(b"mesh");
-        store.keep_result(pending, digest).unwrap();
+        store.keep_result(&mut pending, digest).unwrap();
         let leftover = root.join("results").join(format!(".x{PENDING_ENDING}"));
         fs::write(&leftover, b"half").unwrap();
 

@@ -5,6 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -18,6 +19,7 @@ const START: Duration = Duration::from_secs(20);
 #[derive(Debug)]
 pub struct Service {
     process: Child,
+    said: Arc<Mutex<Vec<String>>>,
     /// Where it listens.
     pub address: SocketAddr,
 }
@@ -72,22 +74,54 @@ impl Service {
         // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
         let (sender, addresses) = channel();
         let pipes: [Box<dyn Read + Send>; 2] = [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
+        let said = Arc::<Mutex<Vec<String>>>::default();
         for pipe in pipes {
-            let sender = sender.clone();
+            let (sender, said) = (sender.clone(), Arc::clone(&said));
             std::thread::spawn(move || {
                 for line in BufReader::new(pipe).lines().map_while(Result::ok) {
                     if let Some(address) = address_in(&line) {
                         let _ = sender.send(address);
                     }
+                    said.lock().unwrap().push(line);
                 }
             });
         }
         match addresses.recv_timeout(START) {
-            Ok(address) => Self { process, address },
+            Ok(address) => Self { process, said, address },
             Err(_) => {
                 let _ = process.kill();
                 panic!("the service did not say where it listens: {:?}", process.wait());
             }
+        }
+    }
+
+    /// Whether a line of the log has all of these words.
+    #[must_use]
+    pub fn said(&self, words: &[&str]) -> bool {
+        self.said.lock().unwrap().iter().any(|line| words.iter().all(|word| line.contains(word)))
+    }
+
+    /// Sends the process a signal by its name, as `kill` knows it.
+    ///
+    /// # Panics
+    /// When it cannot be sent.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([format!("-{name}"), self.id().to_string()]).status().unwrap();
+        assert!(sent.success(), "kill -{name} {}", self.id());
+    }
+
+    /// Waits for the process to end by itself.
+    ///
+    /// # Panics
+    /// When that takes longer than it may.
+    pub fn end(&mut self, patience: Duration) -> std::process::ExitStatus {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.process.try_wait().unwrap() {
+                return status;
+            }
+            assert!(start.elapsed() < patience, "the service still runs after {patience:?}");
+            std::thread::sleep(Duration::from_millis(10));
         }
     }
 

@@ -1,12 +1,13 @@
 //! The workers: threads of their own, because geometry blocks and would starve the service's event loop.
 
+use std::io;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lacuna_exchange::format::Format;
 use lacuna_fabrication::{Geometry, Job, Outcome};
-use lacuna_kernel::budget::{Budget, Limits, Progress, StopReason};
+use lacuna_kernel::budget::{Budget, CancelToken, Limits, Progress, StopReason};
 
 use super::desk::Desk;
 use super::live::LiveJob;
@@ -16,6 +17,9 @@ use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Engine, Label};
 use crate::{documents, files};
+
+/// Between two tries to reach an object store that is away.
+const AWAY_PAUSE: Duration = Duration::from_millis(500);
 
 /// Name of the certificate among a job's outputs.
 const CERTIFICATE: &str = "certificate.json";
@@ -39,7 +43,8 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> st
 
 /// Does a job that was taken, up to the record of its end.
 fn work(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) {
-    let kind = job.with(|record| record.view.kind);
+    let (kind, attempt) = job.with(|record| (record.view.kind, record.view.attempt));
+    tracing::info!(job = %job.id(), kind = documents::kind_word(kind), attempt, "job started");
     let start = Instant::now();
     // The kernel's panics are caught where it is called; this catches our own, so that a worker never dies.
     let result = production::guarded(|| perform(desk, job, most, engine)).and_then(|result| result);
@@ -70,7 +75,8 @@ fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Re
         return Err(Problem::new(ProblemKind::Cancelled, "stopped before the start"));
     }
     let (document, input) = job.with(|record| (record.document, record.view.input_digest.clone()));
-    let bytes = desk.store.document(document).map_err(|error| Problem::io("the job document could not be read", &error))?;
+    let bytes = while_away(&job.cancel, || desk.store.document(document))
+        .map_err(|error| Problem::io("the job document could not be read", &error))?;
     let order = documents::read_job(&bytes, most, &|_| None)?;
     let budget = budget(job, order.limits);
     let _watchdog =
@@ -80,6 +86,18 @@ fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine) -> Re
         keep_files(desk, &order, outcome, &budget)
     });
     made.map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
+}
+
+/// Tries until the object store is back, or the job is stopped: work that is done is not thrown away.
+fn while_away<T>(token: &CancelToken, mut attempt: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    loop {
+        match attempt() {
+            Err(error) if error.kind() == io::ErrorKind::NetworkUnreachable && token.reason().is_none() => {
+                std::thread::sleep(AWAY_PAUSE);
+            }
+            done => return done,
+        }
+    }
 }
 
 fn budget(job: &Arc<LiveJob>, limits: Limits) -> Budget {
@@ -110,26 +128,26 @@ fn keep_files(desk: &Desk, order: &Job, mut outcome: Outcome, budget: &Budget) -
         let mut pending = desk.store.new_result().map_err(failed)?;
         let label = Label { title, thumbnail_png: thumbnail.as_deref() };
         let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending, &budget.cancel)?;
-        desk.store.keep_result(pending, digest).map_err(failed)?;
+        while_away(&budget.cancel, || desk.store.keep_result(&mut pending, digest)).map_err(failed)?;
         let file_name = format!("{stem}.{}", facts.ending);
         outputs.push(Output { name: facts.ending.to_owned(), file_name, media_type: facts.media_type.to_owned(), bytes, digest });
     }
     for output in &outputs {
         outcome.certificate.output_digests.insert(output.name.clone(), output.digest.to_string());
     }
-    outputs.push(keep_certificate(desk, &outcome)?);
+    outputs.push(keep_certificate(desk, &outcome, budget)?);
     desk.metrics.made(outcome.certificate.triangles, outputs.iter().map(|output| output.bytes).sum());
     Ok(Answer { outputs, certificate: outcome.certificate })
 }
 
-fn keep_certificate(desk: &Desk, outcome: &Outcome) -> Result<Output, Problem> {
+fn keep_certificate(desk: &Desk, outcome: &Outcome, budget: &Budget) -> Result<Output, Problem> {
     use std::io::Write as _;
     let bytes = production::certificate_file(&outcome.certificate)?;
     let digest = Digest::of(&bytes);
     let failed = |error| Problem::io("the certificate could not be kept", &error);
     let mut pending = desk.store.new_result().map_err(failed)?;
     pending.write_all(&bytes).map_err(failed)?;
-    desk.store.keep_result(pending, digest).map_err(failed)?;
+    while_away(&budget.cancel, || desk.store.keep_result(&mut pending, digest)).map_err(failed)?;
     let name = CERTIFICATE.to_owned();
     Ok(Output { file_name: name.clone(), name, media_type: "application/json".to_owned(), bytes: bytes.len() as u64, digest })
 }

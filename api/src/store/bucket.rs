@@ -64,7 +64,7 @@ impl Bucket {
     }
 
     /// Puts a file into its place part by part. The object appears when all of it has arrived.
-    pub(super) fn put_file(&self, name: &str, mut pending: PendingFile) -> io::Result<()> {
+    pub(super) fn put_file(&self, name: &str, pending: &mut PendingFile) -> io::Result<()> {
         let file = pending.reread()?;
         let length = file.metadata()?.len();
         if length <= PART as u64 {
