@@ -68,7 +68,21 @@ impl Service {
     /// When it does not say where it listens.
     #[must_use]
     pub fn start_with(data: &Path, environment: &[(&str, &str)]) -> Self {
-        let mut command = Command::new(lacuna());
+        Self::start_by(Command::new(lacuna()), data, environment)
+    }
+
+    /// Starts one from a shell that first does something to itself.
+    ///
+    /// # Panics
+    /// When it does not say where it listens.
+    #[must_use]
+    pub fn start_after(preparation: &str, data: &Path, environment: &[(&str, &str)]) -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("{preparation}; exec \"$0\" \"$@\"")]).arg(lacuna());
+        Self::start_by(command, data, environment)
+    }
+
+    fn start_by(mut command: Command, data: &Path, environment: &[(&str, &str)]) -> Self {
         command.args(["serve", "--bind", "127.0.0.1:0", "--data"]).arg(data).envs(environment.iter().copied());
         let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
@@ -185,6 +199,12 @@ impl Service {
     #[must_use]
     pub fn post(&self, path: &str, body: &Value) -> Answer {
         self.post_with(path, &[], body.to_string().as_bytes())
+    }
+
+    /// `POST` of JSON to a service that may be gone.
+    #[must_use]
+    pub fn try_post(&self, path: &str, body: &Value) -> Option<Answer> {
+        self.send("POST", path, &[("content-type", "application/json")], body.to_string().as_bytes()).ok()
     }
 
     /// `POST` of bytes that are said to be JSON, with headers.
