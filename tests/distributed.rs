@@ -31,7 +31,7 @@ fn order(number: u32) -> Value {
 /// Work for minutes that is quickly accepted, a different one for every number.
 fn long_order(number: u32) -> Value {
     let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
-    json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-5 + f64::from(number) / 1e9 },
+    json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
 }
 

@@ -33,7 +33,7 @@ fn small(number: usize) -> Value {
 /// Work for minutes that is quickly accepted, another one for every number.
 fn long(number: usize) -> Value {
     #[expect(clippy::cast_precision_loss, reason = "numbers are small")]
-    let tolerance = 1e-5 + number as f64 / 1e9;
+    let tolerance = 1e-6 + number as f64 / 1e10;
     let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
     json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": tolerance },
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
@@ -41,8 +41,8 @@ fn long(number: usize) -> Value {
 
 /// A file of some megabytes.
 fn large() -> Value {
-    json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"), "outputs": ["stl"],
-        "params": { "tolerance_mm": 0.001, "radius_mm": 1.0 } })
+    json!({ "lacuna": 1, "kind": "evaluate", "model": model("ifs/sierpinski_tetrahedron"), "outputs": ["obj"],
+        "params": { "tolerance_mm": 0.2 } })
 }
 
 #[track_caller]
@@ -199,12 +199,11 @@ fn a_full_disk_is_told_and_harms_nothing_that_was_accepted() {
     fs::remove_file(&ballast).unwrap();
     until("ready", || service.get("/readyz").status == 200);
     let job = service.ended(&waits);
-    let full = job["state"] == "failed" && job["problem"]["code"] == "storage-full";
-    assert!(full || job["state"] == "succeeded", "{job}");
+    assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("storage-full")), "{job}");
     assert_eq!(service.done(&small(1))["state"], "succeeded");
     service.kill();
     let again = Service::start_with(&data, &MUCH);
-    assert_eq!((state(&again, &before), again.ended(&waits)["state"].clone()), ("succeeded".to_owned(), job["state"].clone()));
+    assert_eq!((state(&again, &before).as_str(), state(&again, &waits).as_str()), ("succeeded", "failed"));
 }
 
 /// Where no file system may be mounted: no file can become longer than 64 KiB.
@@ -225,7 +224,7 @@ fn a_result_deleted_under_a_download_is_delivered_and_then_made_again() {
     let service = Service::start(scratch.path());
     let job = service.done(&large());
     let (digest, bytes) = (job["outputs"][0]["digest"].as_str().unwrap(), job["outputs"][0]["bytes"].as_u64().unwrap());
-    assert!(bytes > 4 << 20, "{bytes} bytes would fit into the buffers of a socket");
+    assert!(bytes > 8 << 20, "{bytes} bytes would fit into the buffers of a socket");
     let mut stream = TcpStream::connect(service.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
     write!(stream, "GET /v1/results/{digest} HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\n\r\n").unwrap();

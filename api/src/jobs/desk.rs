@@ -86,7 +86,7 @@ pub struct Desk {
 
 #[derive(Debug)]
 enum Ledger {
-    Embedded(Embedded),
+    Embedded(Box<Embedded>),
     Shared(Arc<Shared>),
 }
 
@@ -96,7 +96,7 @@ impl Desk {
     /// # Errors
     /// When the data folder fails.
     pub fn open(root: &Path, store: Arc<Store>, limits: DeskLimits, metrics: Arc<Metrics>) -> std::io::Result<Self> {
-        let ledger = Ledger::Embedded(Embedded::open(root, Arc::clone(&store), limits)?);
+        let ledger = Ledger::Embedded(Box::new(Embedded::open(root, Arc::clone(&store), limits)?));
         Ok(Self { ledger, stopping: AtomicBool::new(false), store, metrics })
     }
 

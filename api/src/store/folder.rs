@@ -1,7 +1,7 @@
 //! The shelf of one process: a folder with one file per thing, each there in full or not at all.
 
 use std::fs;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -41,7 +41,10 @@ impl Folder {
     }
 
     pub(super) fn probe(&self) -> io::Result<()> {
-        PendingFile::create_in(&self.root).map(drop)
+        // A full disk still takes names: only bytes tell.
+        let mut file = PendingFile::create_in(&self.root)?;
+        file.write_all(&[0; 4096])?;
+        file.reread()?.sync_data()
     }
 
     /// Where a thing is kept.
