@@ -97,14 +97,20 @@ fn the_context_holds_what_the_build_needs() {
 }
 
 #[test]
-fn the_composition_is_closed() {
-    let text = fs::read_to_string(root().join("docker/compose.yaml")).unwrap();
+fn the_compositions_are_closed() {
+    closed("compose.yaml", &["- data:/data"]);
+    let shared = ["LACUNA_ROLE: front", "LACUNA_ROLE: worker", "LACUNA_OBJECTS_URL: s3://parts/lacuna", "condition: service_healthy"];
+    closed("compose.distributed.yaml", &shared);
+}
+
+fn closed(name: &str, more: &[&str]) {
+    let text = fs::read_to_string(root().join("docker").join(name)).unwrap();
     let said = |words: &str| assert!(text.lines().any(|line| line.trim() == words), "{words:?} is not said");
+    more.iter().copied().for_each(said);
     said("read_only: true");
     said("cap_drop: [ALL]");
     said("security_opt: [\"no-new-privileges:true\"]");
     said("dockerfile: docker/Dockerfile");
-    said("- data:/data");
     assert!(!text.contains('\t'), "YAML has no tabs");
     for line in text.lines().filter(|line| !line.trim().is_empty()) {
         let spaces = line.len() - line.trim_start().len();

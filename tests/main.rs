@@ -18,6 +18,8 @@
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `splits` | do the parts of a solid add up to it? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
+//! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
+//! | `distributed` | and several, with their database and object store? |
 //! | `service` | does the running service keep them? |
 //! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
 //! | `uploads` | are mesh files taken, refused and used as models are? |
@@ -34,6 +36,8 @@ mod container;
 mod contract;
 mod corpus;
 mod determinism;
+mod distributed;
+mod faults;
 mod fuzz;
 mod hostile;
 mod independent;

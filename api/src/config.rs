@@ -23,6 +23,68 @@ pub enum Origin {
     Default,
 }
 
+/// What a process does of the service's work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// All of it.
+    All,
+    /// It answers requests; workers elsewhere do the jobs.
+    Front,
+    /// It does jobs, and answers only how it is.
+    Worker,
+}
+
+impl Role {
+    /// Whether it answers requests.
+    #[must_use]
+    pub fn answers(self) -> bool {
+        self != Self::Worker
+    }
+
+    /// Whether it does jobs.
+    #[must_use]
+    pub fn works(self) -> bool {
+        self != Self::Front
+    }
+}
+
+impl std::str::FromStr for Role {
+    type Err = ();
+
+    fn from_str(word: &str) -> Result<Self, ()> {
+        [Self::All, Self::Front, Self::Worker].into_iter().find(|role| role.to_string() == word).ok_or(())
+    }
+}
+
+impl std::fmt::Display for Role {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Self::All => "all",
+            Self::Front => "front",
+            Self::Worker => "worker",
+        })
+    }
+}
+
+/// A text that is not shown.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Secret(pub String);
+
+impl std::fmt::Debug for Secret {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("***")
+    }
+}
+
+/// What several processes share.
+#[derive(Clone, Debug)]
+pub struct SharedPlaces {
+    /// Address of the database, with a password perhaps.
+    pub database: Secret,
+    /// Address of the bucket.
+    pub objects: String,
+}
+
 /// What the command line of `serve` may say.
 #[derive(Clone, Debug, Default)]
 pub struct Flags {
@@ -36,6 +98,10 @@ pub struct Flags {
     pub workers: Option<usize>,
     /// `--threads`.
     pub threads: Option<usize>,
+    /// `--role`.
+    pub role: Option<Role>,
+    /// `--objects-url`.
+    pub objects: Option<String>,
     /// `--log-format`.
     pub log_json: Option<bool>,
 }
@@ -45,8 +111,14 @@ pub struct Flags {
 pub struct Config {
     /// Address and port to listen on; port 0 takes a free one.
     pub bind: SocketAddr,
-    /// The data folder.
+    /// The data folder; where things are shared it only holds what is being written.
     pub data: PathBuf,
+    /// What this process does.
+    pub role: Role,
+    /// What it shares with other processes, if it does.
+    pub shared: Option<SharedPlaces>,
+    /// Time after which a worker that was not heard of counts as gone, in seconds.
+    pub lease_seconds: u64,
     /// Jobs that are done at the same time.
     pub workers: usize,
     /// Threads that they share; 0 for one per core.
@@ -144,6 +216,18 @@ impl Reader<'_> {
         Ok(value)
     }
 
+    /// A text that may be absent; `shown` makes of it what may be told.
+    fn perhaps(&mut self, name: &'static str, flag: Option<String>, shown: fn(&str) -> String) -> Option<String> {
+        let (value, origin) = match (flag, (self.environment)(name)) {
+            (Some(value), _) => (Some(value), Origin::Flag),
+            (None, Some(text)) => (Some(text), Origin::Environment),
+            (None, None) => (None, Origin::Default),
+        };
+        let value = value.map(|text| text.trim().to_owned()).filter(|text| !text.is_empty());
+        self.told.push(Told { name, value: value.as_deref().map(shown).unwrap_or_default(), origin });
+        value
+    }
+
     fn list(&mut self, name: &'static str, secret: bool) -> Vec<String> {
         let (text, origin) = self.stated(name).unwrap_or((String::new(), Origin::Default));
         let items: Vec<String> = text.split(',').map(str::trim).filter(|item| !item.is_empty()).map(str::to_owned).collect();
@@ -173,8 +257,12 @@ impl Config {
             expected: "an address and a port are expected, for example 127.0.0.1:7878 or [::1]:7878",
         })?;
         let data = reader.take("LACUNA_DATA", flags.data.as_ref().map(|d| d.display().to_string()), "lacuna-data".to_owned(), "")?;
+        let shared = read_shared(&mut reader, flags)?;
         let defaults = Limits::default();
         let config = Self {
+            role: reader.take("LACUNA_ROLE", flags.role, Role::All, "all, front or worker is expected")?,
+            shared,
+            lease_seconds: reader.take("LACUNA_LEASE_SECONDS", None, 15, COUNT)?.clamp(1, 3600),
             bind: address,
             data: PathBuf::from(data),
             workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
@@ -207,8 +295,15 @@ impl Config {
         Ok((config, reader.told))
     }
 
-    /// A service on the network with nobody to ask for a key is an accident, not a setting.
+    /// A service on the network with nobody to ask for a key is an accident, not a setting; so is a part without a whole.
     fn check(&self, bind: &str) -> Result<(), BadSetting> {
+        if self.shared.is_none() && self.role != Role::All {
+            return Err(BadSetting {
+                name: "LACUNA_ROLE",
+                value: self.role.to_string(),
+                expected: "without LACUNA_DATABASE_URL and LACUNA_OBJECTS_URL one process does all: leave it out, or set both",
+            });
+        }
         if self.keys.is_empty() && !self.bind.ip().is_loopback() {
             return Err(BadSetting {
                 name: "LACUNA_BIND",
@@ -228,6 +323,45 @@ fn read_keys(reader: &mut Reader<'_>, filed: Vec<Key>) -> Vec<Key> {
     }
     let plain = plain.iter().map(|key| Key { digest: Digest::of(key.as_bytes()), scope: Scope::Admin });
     plain.chain(filed).collect()
+}
+
+/// Database and object store: both or neither.
+fn read_shared(reader: &mut Reader<'_>, flags: &Flags) -> Result<Option<SharedPlaces>, BadSetting> {
+    // No flag: everybody on a machine can read the command lines of its processes.
+    let database = reader.perhaps("LACUNA_DATABASE_URL", None, without_password);
+    let objects = reader.perhaps("LACUNA_OBJECTS_URL", flags.objects.clone(), str::to_owned);
+    for name in ["AWS_ENDPOINT_URL", "AWS_REGION"] {
+        reader.perhaps(name, None, str::to_owned);
+    }
+    for name in ["AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"] {
+        reader.perhaps(name, None, |_| "set".to_owned());
+    }
+    let bad = |name, value: &str, expected| Err(BadSetting { name, value: value.to_owned(), expected });
+    match (database, objects) {
+        (None, None) => Ok(None),
+        (Some(database), Some(objects)) => {
+            if !database.starts_with("postgres://") && !database.starts_with("postgresql://") {
+                return bad("LACUNA_DATABASE_URL", "***", "postgres://USER:PASSWORD@HOST:PORT/DATABASE is expected");
+            }
+            if !objects.strip_prefix("s3://").is_some_and(|rest| !rest.is_empty() && !rest.starts_with('/')) {
+                return bad("LACUNA_OBJECTS_URL", &objects, "s3://BUCKET or s3://BUCKET/FOLDER is expected");
+            }
+            Ok(Some(SharedPlaces { database: Secret(database), objects }))
+        }
+        (Some(_), None) => bad("LACUNA_OBJECTS_URL", "", "with LACUNA_DATABASE_URL it must name a bucket: s3://BUCKET/FOLDER"),
+        (None, Some(objects)) => bad("LACUNA_DATABASE_URL", "", "with LACUNA_OBJECTS_URL it must name a database: postgres://...")
+            .map_err(|error| BadSetting { value: objects, ..error }),
+    }
+}
+
+/// A database's address as it may be told: without the password and without parameters, which may hold one.
+fn without_password(address: &str) -> String {
+    let plain = address.split('?').next().unwrap_or_default();
+    let Some((scheme, rest)) = plain.split_once("://") else { return "***".to_owned() };
+    match rest.rsplit_once('@') {
+        Some((user, host)) => format!("{scheme}://{}:***@{host}", user.split(':').next().unwrap_or_default()),
+        None => format!("{scheme}://{rest}"),
+    }
 }
 
 #[cfg(test)]
@@ -275,6 +409,25 @@ mod tests {
         std::fs::write(&path, text + "[colour]\n").unwrap();
         assert!(Config::read(&flags, &environment).unwrap_err().value.contains("colour"));
         std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn a_part_of_a_service_needs_what_it_shares() {
+        let with = |pairs: &'static [(&str, &str)]| {
+            let find = |name: &str| pairs.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned());
+            Config::read(&Flags::default(), &find)
+        };
+        const DATABASE: (&str, &str) = ("LACUNA_DATABASE_URL", "postgres://ada:s3cret@db.example:5432/lacuna?sslmode=require");
+        const OBJECTS: (&str, &str) = ("LACUNA_OBJECTS_URL", "s3://parts/lacuna");
+        assert_eq!(with(&[("LACUNA_ROLE", "front")]).unwrap_err().name, "LACUNA_ROLE");
+        assert_eq!(with(&[("LACUNA_ROLE", "boss"), DATABASE, OBJECTS]).unwrap_err().value, "boss");
+        assert_eq!(with(&[DATABASE]).unwrap_err().name, "LACUNA_OBJECTS_URL");
+        assert_eq!(with(&[OBJECTS]).unwrap_err().name, "LACUNA_DATABASE_URL");
+        assert_eq!(with(&[DATABASE, ("LACUNA_OBJECTS_URL", "/parts")]).unwrap_err().name, "LACUNA_OBJECTS_URL");
+        let (config, told) = with(&[DATABASE, OBJECTS, ("LACUNA_ROLE", "worker"), ("AWS_SECRET_ACCESS_KEY", "s3cret")]).unwrap();
+        assert!(config.role.works() && !config.role.answers());
+        assert_eq!(told.iter().find(|t| t.name == DATABASE.0).unwrap().value, "postgres://ada:***@db.example:5432/lacuna");
+        assert!(!format!("{config:?}{told:?}").contains("s3cret"));
     }
 
     #[test]

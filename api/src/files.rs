@@ -49,10 +49,23 @@ impl PendingFile {
     ///
     /// # Errors
     /// When the device fails; then nothing is in the place that was not there before.
-    pub fn commit(self, target: &Path) -> io::Result<()> {
-        self.file.sync_all()?;
-        fs::rename(&self.path, target)?;
+    pub fn commit(mut self, target: &Path) -> io::Result<()> {
+        self.settle(target)
+    }
+
+    /// As [`PendingFile::commit`]; after a failure it can be tried again.
+    ///
+    /// # Errors
+    /// As [`PendingFile::commit`].
+    pub fn settle(&mut self, target: &Path) -> io::Result<()> {
+        self.rename(target)?;
         sync_folder(folder_of(target))
+    }
+
+    /// After a power failure there is either the whole file or what stood in its place before.
+    fn rename(&mut self, target: &Path) -> io::Result<()> {
+        self.file.sync_all()?;
+        fs::rename(&self.path, target)
     }
 }
 
@@ -127,6 +140,17 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut pending = PendingFile::create_beside(target)?;
     pending.write_all(bytes)?;
     pending.commit(target)
+}
+
+/// Writes a whole file at once, which outlives the process; a power failure soon after may bring back what stood in its
+/// place before.
+///
+/// # Errors
+/// When the device fails.
+pub fn write_soon(target: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut pending = PendingFile::create_beside(target)?;
+    pending.write_all(bytes)?;
+    pending.rename(target)
 }
 
 /// What a model's name leaves for a file name: letters, digits, `-` and `_` of ASCII, 64 at most.

@@ -73,7 +73,7 @@ impl Metrics {
         crate::locked(&self.jobs).entry((kind.to_owned(), state.word())).or_default().observe(time);
     }
 
-    /// Counts the time from a wish to stop to the stop.
+    /// Counts the time from a wish to stop, as the worker heard of it, to the record of the stop.
     pub fn stopped_after(&self, time: Duration) {
         crate::locked(&self.cancelled).observe(time);
     }

@@ -1,6 +1,7 @@
 //! What went wrong, for clients: RFC 9457 problems. The only file with HTTP status codes and exit codes.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 
 use axum::body::Body;
 use axum::http::{HeaderValue, Response, StatusCode, header};
@@ -82,6 +83,9 @@ pub enum ProblemKind {
     /// A file or a device failed.
     #[serde(rename = "/problems/input-output")]
     InputOutput,
+    /// What the service needs is away or full for now.
+    #[serde(rename = "/problems/unavailable")]
+    Unavailable,
     /// The service is going down.
     #[serde(rename = "/problems/shutting-down")]
     ShuttingDown,
@@ -126,6 +130,7 @@ impl ProblemKind {
             Self::Interrupted => (503, 5, "interrupted", "The service stopped during the work"),
             Self::Internal => (500, 70, "internal", "A defect of lacuna"),
             Self::InputOutput => (500, 6, "input-output", "A file or device failed"),
+            Self::Unavailable => (503, 6, "unavailable", "Something that the service needs is away for now"),
             Self::ShuttingDown => (503, 5, "shutting-down", "The service is going down"),
             Self::Timeout => (504, 5, "timeout", "The answer took too long"),
             Self::Usage => (400, 2, "usage", "The command line is wrong"),
@@ -282,7 +287,14 @@ impl Problem {
     /// A failure of a file or of a device; `what` says what was being done, in words for the caller.
     #[must_use]
     pub fn io(what: impl std::fmt::Display, error: &std::io::Error) -> Self {
-        Self::new(ProblemKind::InputOutput, format!("{what}: {error}"))
+        let detail = format!("{what}: {error}");
+        match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+                Self::new(ProblemKind::Unavailable, detail).code("storage-full").retry_after(30)
+            }
+            ErrorKind::NetworkUnreachable => Self::new(ProblemKind::Unavailable, detail).code("objects-unreachable").retry_after(5),
+            _ => Self::new(ProblemKind::InputOutput, detail),
+        }
     }
 
     /// Our own defect. The detail is for the log and for the command line; the service does not send it.

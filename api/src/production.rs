@@ -293,8 +293,12 @@ pub fn format_problem(error: &FormatError) -> Problem {
         detail = format!("{detail}: {cause}");
         source = cause.source();
     }
+    if let FormatError::Stream(cause) = error {
+        let problem = Problem::io("the file could not be written", cause);
+        // A full disk is nobody's defect, and says when to come back.
+        return if problem.is_defect() { problem.code(error.code()) } else { problem };
+    }
     let kind = match (error, error.kind()) {
-        (FormatError::Stream(_), _) => ProblemKind::InputOutput,
         (FormatError::CannotCarry { .. } | FormatError::Empty, _) => ProblemKind::InvalidModel,
         (_, Kind::Invalid) => ProblemKind::InvalidFile,
         (_, kind) => kind.into(),

@@ -1,22 +1,42 @@
-//! The data folder: job records, documents, models and result files.
+//! Documents, models and result files, by their digests: in the data folder of one process, or in a bucket that
+//! several share.
 //!
-//! Everything is one file per thing, written by [`crate::files`], so that a crash leaves the state before or
-//! the state after. This module is the boundary behind which a database or an object store can stand.
+//! Results and documents never change, so every shelf needs only six verbs. A thing is there in full or not at all.
 
-mod uploads;
-
-use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
-use serde::de::DeserializeOwned;
+use axum::body::Body;
 use serde::{Deserialize, Serialize};
+use tokio::runtime::Handle;
 use utoipa::ToSchema;
 
 use crate::digest::Digest;
-use crate::files::{self, PENDING_ENDING, PendingFile};
+use crate::files::PendingFile;
 use crate::inspection::MeshReport;
-use crate::jobs::record::{Answer, JobRecord};
+
+/// Does the same on either shelf.
+macro_rules! on_shelf {
+    ($store:expr, $shelf:ident => $call:expr) => {
+        match &$store.shelf {
+            Shelf::Folder($shelf) => $call,
+            Shelf::Bucket($shelf) => $call,
+        }
+    };
+}
+
+mod bucket;
+pub mod folder;
+mod uploads;
+
+use bucket::Bucket;
+use folder::Folder;
+
+/// Age below which nothing is swept: what a running job has made is kept before its record names it.
+const SWEPT_AFTER: Duration = Duration::from_secs(3600);
+
+const ROOMS: [&str; 4] = ["documents", "models", "uploads", "results"];
 
 /// What is told of a stored model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -38,37 +58,55 @@ pub struct ModelView {
     pub mesh: Option<MeshReport>,
 }
 
-/// Where things are kept.
+/// A file that never changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum File {
+    /// What a job made.
+    Result(Digest),
+    /// A mesh file that was uploaded.
+    Upload(Digest),
+}
+
+/// Where things are kept. Its methods block, but for [`Store::part`].
 #[derive(Debug)]
 pub struct Store {
-    root: PathBuf,
+    shelf: Shelf,
+    /// Where results are written before they take their place.
+    scratch: PathBuf,
+}
+
+#[derive(Debug)]
+enum Shelf {
+    Folder(Folder),
+    Bucket(Bucket),
 }
 
 impl Store {
-    /// Opens a data folder, makes what is missing in it and removes what an earlier process left half written.
+    /// Opens a data folder.
     ///
     /// # Errors
     /// When the folder cannot be made or written.
     pub fn open(root: &Path) -> io::Result<Self> {
-        for name in ["jobs", "documents", "models", "uploads", "results", "answers"] {
-            let folder = root.join(name);
-            fs::create_dir_all(&folder)?;
-            for entry in fs::read_dir(&folder)? {
-                let path = entry?.path();
-                if path.to_string_lossy().ends_with(PENDING_ENDING) {
-                    fs::remove_file(path)?;
-                }
-            }
-        }
-        Ok(Self { root: root.to_owned() })
+        Ok(Self { shelf: Shelf::Folder(Folder::open(root, &ROOMS)?), scratch: root.join("results") })
     }
 
-    /// Whether the folder can be written now.
+    /// Opens a bucket, `s3://BUCKET/FOLDER`; the data folder only holds what is being written.
+    ///
+    /// # Errors
+    /// When the address cannot be understood or the folder cannot be written.
+    pub fn open_bucket(address: &str, root: &Path, runtime: Handle) -> io::Result<Self> {
+        // Several processes may have the same folder: none clears what another is writing.
+        let scratch = root.join("scratch");
+        std::fs::create_dir_all(&scratch)?;
+        Ok(Self { shelf: Shelf::Bucket(Bucket::open(address, runtime)?), scratch })
+    }
+
+    /// Whether it can be used now.
     ///
     /// # Errors
     /// When it cannot.
     pub fn probe(&self) -> io::Result<()> {
-        PendingFile::create_in(&self.root).map(drop)
+        on_shelf!(self, shelf => shelf.probe())
     }
 
     /// A file to write a result into.
@@ -76,36 +114,69 @@ impl Store {
     /// # Errors
     /// When the device fails.
     pub fn new_result(&self) -> io::Result<PendingFile> {
-        PendingFile::create_in(&self.root.join("results"))
+        PendingFile::create_in(&self.scratch)
     }
 
-    /// Keeps a result under its digest. The same bytes are kept once.
+    /// Keeps a result under its digest. The same bytes are kept once. After a failure it can be tried again.
     ///
     /// # Errors
-    /// When the device fails.
-    pub fn keep_result(&self, pending: PendingFile, digest: Digest) -> io::Result<()> {
-        pending.commit(&self.result_path(digest))
+    /// When the shelf fails.
+    pub fn keep_result(&self, pending: &mut PendingFile, digest: Digest) -> io::Result<()> {
+        self.keep_file(pending, &result_name(digest))
     }
 
-    /// Where a result is kept.
-    #[must_use]
-    pub fn result_path(&self, digest: Digest) -> PathBuf {
-        self.root.join("results").join(digest.hex())
+    fn keep_file(&self, pending: &mut PendingFile, name: &str) -> io::Result<()> {
+        match &self.shelf {
+            Shelf::Folder(folder) => pending.settle(&folder.path(name)),
+            Shelf::Bucket(bucket) => bucket.put_file(name, pending),
+        }
     }
 
-    /// Removes the results that `needed` does not want, and tells how many.
+    /// Whether a result is there. If it is, no sweep of the next hour takes it.
     ///
     /// # Errors
-    /// When the device fails.
-    pub fn sweep_results(&self, needed: impl Fn(Digest) -> bool) -> io::Result<usize> {
-        let mut removed = 0;
-        for entry in fs::read_dir(self.root.join("results"))? {
-            let path = entry?.path();
-            let name = path.file_name().map(|n| format!("sha256:{}", n.to_string_lossy())).unwrap_or_default();
-            if name.parse().is_ok_and(|digest| !needed(digest)) {
-                fs::remove_file(path)?;
-                removed += 1;
+    /// When the shelf fails.
+    pub fn holds_result(&self, digest: Digest) -> io::Result<bool> {
+        match &self.shelf {
+            Shelf::Folder(folder) => folder.renew(&result_name(digest)),
+            // Here the record of the answer keeps the sweep away.
+            Shelf::Bucket(bucket) => bucket.holds(&result_name(digest)),
+        }
+    }
+
+    /// Bytes of a file, as they are asked for.
+    ///
+    /// # Errors
+    /// When it is not there or the shelf fails.
+    pub async fn part(&self, file: File, first: u64, length: u64) -> io::Result<Body> {
+        let name = match file {
+            File::Result(digest) => result_name(digest),
+            File::Upload(digest) => uploads::upload_name(digest),
+        };
+        on_shelf!(self, shelf => shelf.part(&name, first, length).await)
+    }
+
+    /// Removes the results and job documents that nobody needs, unless they are new, and tells how many. `needed` is asked
+    /// once, after the shelf was looked through.
+    ///
+    /// # Errors
+    /// When the shelf or the question fails.
+    pub fn sweep<E: From<io::Error>>(&self, needed: impl FnOnce() -> Result<std::collections::HashSet<Digest>, E>) -> Result<usize, E> {
+        let mut candidates = Vec::new();
+        for room in ["documents", "results"] {
+            for (name, since) in on_shelf!(self, shelf => shelf.list(room))? {
+                let digest: Option<Digest> = format!("sha256:{name}").parse().ok();
+                let old = SystemTime::now().duration_since(since).is_ok_and(|age| age >= SWEPT_AFTER);
+                if let (Some(digest), true) = (digest, old) {
+                    candidates.push((room, digest));
+                }
             }
+        }
+        let needed = needed()?;
+        let mut removed = 0;
+        for (room, digest) in candidates.into_iter().filter(|(_, digest)| !needed.contains(digest)) {
+            on_shelf!(self, shelf => shelf.remove(&format!("{room}/{}", digest.hex())))?;
+            removed += 1;
         }
         Ok(removed)
     }
@@ -113,75 +184,29 @@ impl Store {
     /// Keeps a job document under its digest.
     ///
     /// # Errors
-    /// When the device fails.
+    /// When the shelf fails.
     pub fn keep_document(&self, digest: Digest, bytes: &[u8]) -> io::Result<()> {
-        let path = self.root.join("documents").join(digest.hex());
-        if path.exists() { Ok(()) } else { files::write_whole(&path, bytes) }
+        let name = document_name(digest);
+        match &self.shelf {
+            Shelf::Folder(folder) if folder.renew(&name)? => Ok(()),
+            Shelf::Folder(folder) => folder.put(&name, bytes),
+            Shelf::Bucket(bucket) => bucket.put(&name, bytes),
+        }
     }
 
     /// A job document.
     ///
     /// # Errors
-    /// When it is not there or the device fails.
+    /// When it is not there or the shelf fails.
     pub fn document(&self, digest: Digest) -> io::Result<Vec<u8>> {
-        fs::read(self.root.join("documents").join(digest.hex()))
-    }
-
-    /// Keeps a job's record in place of its earlier one.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn keep_job(&self, record: &JobRecord) -> io::Result<()> {
-        files::write_whole(&self.job_path(&record.view.id), &serde_json::to_vec(record)?)
-    }
-
-    /// Forgets a job's record.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn forget_job(&self, id: &str) -> io::Result<()> {
-        absent_is_fine(fs::remove_file(self.job_path(id)))
-    }
-
-    /// All records that can be read; one that cannot is told to the log and left alone.
-    ///
-    /// # Errors
-    /// When the folder cannot be read.
-    pub fn jobs(&self) -> io::Result<Vec<JobRecord>> {
-        let mut records = Vec::new();
-        for entry in fs::read_dir(self.root.join("jobs"))? {
-            let path = entry?.path();
-            match read_json(&path) {
-                Ok(Some(record)) => records.push(record),
-                Ok(None) => {}
-                Err(error) => tracing::error!(file = %path.display(), %error, "unreadable job record"),
-            }
-        }
-        Ok(records)
-    }
-
-    /// What the same work left earlier, if it was done by this version.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn answer(&self, key: Digest) -> io::Result<Option<Answer>> {
-        let answer: Option<Answer> = read_json(&self.answer_path(key))?;
-        // Its files may have been swept since.
-        Ok(answer.filter(|a| a.outputs.iter().all(|output| self.result_path(output.digest).exists())))
-    }
-
-    /// Keeps what work left.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn keep_answer(&self, key: Digest, answer: &Answer) -> io::Result<()> {
-        files::write_whole(&self.answer_path(key), &serde_json::to_vec(answer)?)
+        let found = on_shelf!(self, shelf => shelf.get(&document_name(digest)))?;
+        found.ok_or_else(|| io::Error::new(ErrorKind::NotFound, "the job document is no longer kept"))
     }
 
     /// Keeps a model of an owner; tells what is kept and whether it is new.
     ///
     /// # Errors
-    /// When the device fails.
+    /// When the shelf fails.
     pub fn keep_model(&self, owner: &str, name: Option<&str>, document: &[u8]) -> io::Result<(ModelView, bool)> {
         let digest = Digest::of(document);
         let id = format!("mdl_{}", &digest.hex()[..32]);
@@ -190,43 +215,40 @@ impl Store {
         }
         let view =
             ModelView { id, name: name.map(str::to_owned), bytes: document.len() as u64, created: crate::clock::now(), digest, mesh: None };
-        fs::create_dir_all(self.models(owner))?;
-        files::write_whole(&self.models(owner).join(format!("{}.document", view.id)), document)?;
-        files::write_whole(&self.models(owner).join(format!("{}.json", view.id)), &serde_json::to_vec(&view)?)?;
+        on_shelf!(self, shelf => shelf.put(&model_name(owner, &view.id, "document"), document))?;
+        on_shelf!(self, shelf => shelf.put(&model_name(owner, &view.id, "json"), &serde_json::to_vec(&view)?))?;
         Ok((view, true))
     }
 
     /// What is told of an owner's model.
     ///
     /// # Errors
-    /// When the device fails.
+    /// When the shelf fails.
     pub fn model(&self, owner: &str, id: &str) -> io::Result<Option<ModelView>> {
-        if is_id(id) { read_json(&self.models(owner).join(format!("{id}.json"))) } else { Ok(None) }
+        if !is_id(id) {
+            return Ok(None);
+        }
+        let found = on_shelf!(self, shelf => shelf.get(&model_name(owner, id, "json")))?;
+        found.map(|bytes| serde_json::from_slice(&bytes).map_err(io::Error::from)).transpose()
     }
 
     /// The canonical document of an owner's model.
     ///
     /// # Errors
-    /// When the device fails.
+    /// When the shelf fails.
     pub fn model_document(&self, owner: &str, id: &str) -> io::Result<Option<Vec<u8>>> {
-        if is_id(id) { read_if_there(&self.models(owner).join(format!("{id}.document"))) } else { Ok(None) }
+        if is_id(id) { on_shelf!(self, shelf => shelf.get(&model_name(owner, id, "document"))) } else { Ok(None) }
     }
 
     /// An owner's models, sorted by id.
     ///
     /// # Errors
-    /// When the device fails.
+    /// When the shelf fails.
     pub fn list_models(&self, owner: &str) -> io::Result<Vec<ModelView>> {
-        let entries = match fs::read_dir(self.models(owner)) {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-            entries => entries?,
-        };
+        let names = on_shelf!(self, shelf => shelf.list(&format!("models/{owner}")))?;
         let mut views = Vec::new();
-        for entry in entries {
-            let path = entry?.path();
-            if path.extension().is_some_and(|ending| ending == "json") {
-                views.extend(read_json::<ModelView>(&path)?);
-            }
+        for id in names.iter().filter_map(|(name, _)| name.strip_suffix(".json")) {
+            views.extend(self.model(owner, id)?);
         }
         views.sort_by(|a, b| a.id.cmp(&b.id));
         Ok(views)
@@ -235,28 +257,28 @@ impl Store {
     /// Forgets an owner's model; tells whether it was there.
     ///
     /// # Errors
-    /// When the device fails.
+    /// When the shelf fails.
     pub fn forget_model(&self, owner: &str, id: &str) -> io::Result<bool> {
         let known = self.model(owner, id)?.is_some();
         if known {
-            fs::remove_file(self.models(owner).join(format!("{id}.json")))?;
-            absent_is_fine(fs::remove_file(self.models(owner).join(format!("{id}.document"))))?;
+            on_shelf!(self, shelf => shelf.remove(&model_name(owner, id, "json")))?;
+            on_shelf!(self, shelf => shelf.remove(&model_name(owner, id, "document")))?;
         }
         Ok(known)
     }
+}
 
-    fn job_path(&self, id: &str) -> PathBuf {
-        self.root.join("jobs").join(format!("{id}.json"))
-    }
+fn result_name(digest: Digest) -> String {
+    format!("results/{}", digest.hex())
+}
 
-    fn answer_path(&self, key: Digest) -> PathBuf {
-        self.root.join("answers").join(format!("{}.json", key.hex()))
-    }
+fn document_name(digest: Digest) -> String {
+    format!("documents/{}", digest.hex())
+}
 
-    /// One folder per owner: what is not in it does not exist for that owner.
-    fn models(&self, owner: &str) -> PathBuf {
-        self.root.join("models").join(owner)
-    }
+/// One room per owner: what is not in it does not exist for that owner.
+fn model_name(owner: &str, id: &str, ending: &str) -> String {
+    format!("models/{owner}/{id}.{ending}")
 }
 
 /// Ids come from addresses; only what we could have made may become part of a path.
@@ -264,31 +286,15 @@ fn is_id(id: &str) -> bool {
     id.len() <= 64 && id.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
 
-fn read_if_there(path: &Path) -> io::Result<Option<Vec<u8>>> {
-    match fs::read(path) {
-        Ok(bytes) => Ok(Some(bytes)),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
-fn read_json<T: DeserializeOwned>(path: &Path) -> io::Result<Option<T>> {
-    read_if_there(path)?.map(|bytes| serde_json::from_slice(&bytes).map_err(io::Error::from)).transpose()
-}
-
-fn absent_is_fine(result: io::Result<()>) -> io::Result<()> {
-    match result {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        other => other,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::collections::HashSet;
+    use std::fs;
     use std::io::Write as _;
 
     use super::*;
+    use crate::files::PENDING_ENDING;
 
     fn folder() -> PathBuf {
         std::env::temp_dir().join(format!("lacuna-store-{}", uuid::Uuid::now_v7()))
@@ -316,14 +322,27 @@ mod tests {
         let mut pending = store.new_result().unwrap();
         pending.write_all(b"mesh").unwrap();
         let digest = Digest::of(b"mesh");
-        store.keep_result(pending, digest).unwrap();
+        store.keep_result(&mut pending, digest).unwrap();
         let leftover = root.join("results").join(format!(".x{PENDING_ENDING}"));
         fs::write(&leftover, b"half").unwrap();
 
         let store = Store::open(&root).unwrap();
         assert!(!leftover.exists());
-        assert_eq!(fs::read(store.result_path(digest)).unwrap(), b"mesh");
-        assert_eq!(store.sweep_results(|kept| kept != digest).unwrap(), 1);
+        let place = root.join(result_name(digest));
+        assert_eq!(fs::read(&place).unwrap(), b"mesh");
+        let nobody = || Ok::<_, io::Error>(HashSet::new());
+        assert_eq!(store.sweep(nobody).unwrap(), 0, "it is new");
+        let age = |hours: u64| {
+            let since = SystemTime::now() - Duration::from_secs(3600 * hours);
+            fs::File::open(&place).unwrap().set_modified(since).unwrap();
+        };
+        age(2);
+        assert_eq!(store.sweep(|| Ok::<_, io::Error>(HashSet::from([digest]))).unwrap(), 0, "somebody needs it");
+        assert!(store.holds_result(digest).unwrap());
+        assert_eq!(store.sweep(nobody).unwrap(), 0, "somebody has just asked for it");
+        age(2);
+        assert_eq!(store.sweep(nobody).unwrap(), 1);
+        assert!(!store.holds_result(digest).unwrap());
         fs::remove_dir_all(root).unwrap();
     }
 }

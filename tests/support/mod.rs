@@ -5,6 +5,8 @@
 pub mod binary;
 pub mod cases;
 pub mod inside;
+pub mod objects;
+pub mod postgres;
 pub mod python;
 pub mod random;
 pub mod scratch;

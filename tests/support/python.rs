@@ -27,7 +27,7 @@ pub fn system_python() -> Command {
 ///
 /// # Panics
 /// When it cannot be made: a suite that silently leaves its judge out is worth nothing.
-fn interpreter() -> PathBuf {
+pub(super) fn interpreter() -> PathBuf {
     let script = root().join("tests/independent/environment.py");
     let made = system_python().arg(script).arg(root().join(".venv")).output();
     let hint = "they need Python 3.11 or newer, and the package index once; LACUNA_SKIP_INDEPENDENT=1 leaves them out";

@@ -5,6 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -18,6 +19,7 @@ const START: Duration = Duration::from_secs(20);
 #[derive(Debug)]
 pub struct Service {
     process: Child,
+    said: Arc<Mutex<Vec<String>>>,
     /// Where it listens.
     pub address: SocketAddr,
 }
@@ -66,28 +68,74 @@ impl Service {
     /// When it does not say where it listens.
     #[must_use]
     pub fn start_with(data: &Path, environment: &[(&str, &str)]) -> Self {
-        let mut command = Command::new(lacuna());
+        Self::start_by(Command::new(lacuna()), data, environment)
+    }
+
+    /// Starts one from a shell that first does something to itself.
+    ///
+    /// # Panics
+    /// When it does not say where it listens.
+    #[must_use]
+    pub fn start_after(preparation: &str, data: &Path, environment: &[(&str, &str)]) -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("{preparation}; exec \"$0\" \"$@\"")]).arg(lacuna());
+        Self::start_by(command, data, environment)
+    }
+
+    fn start_by(mut command: Command, data: &Path, environment: &[(&str, &str)]) -> Self {
         command.args(["serve", "--bind", "127.0.0.1:0", "--data"]).arg(data).envs(environment.iter().copied());
         let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
         let (sender, addresses) = channel();
         let pipes: [Box<dyn Read + Send>; 2] = [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
+        let said = Arc::<Mutex<Vec<String>>>::default();
         for pipe in pipes {
-            let sender = sender.clone();
+            let (sender, said) = (sender.clone(), Arc::clone(&said));
             std::thread::spawn(move || {
                 for line in BufReader::new(pipe).lines().map_while(Result::ok) {
                     if let Some(address) = address_in(&line) {
                         let _ = sender.send(address);
                     }
+                    said.lock().unwrap().push(line);
                 }
             });
         }
         match addresses.recv_timeout(START) {
-            Ok(address) => Self { process, address },
+            Ok(address) => Self { process, said, address },
             Err(_) => {
                 let _ = process.kill();
                 panic!("the service did not say where it listens: {:?}", process.wait());
             }
+        }
+    }
+
+    /// Whether a line of the log has all of these words.
+    #[must_use]
+    pub fn said(&self, words: &[&str]) -> bool {
+        self.said.lock().unwrap().iter().any(|line| words.iter().all(|word| line.contains(word)))
+    }
+
+    /// Sends the process a signal by its name, as `kill` knows it.
+    ///
+    /// # Panics
+    /// When it cannot be sent.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([format!("-{name}"), self.id().to_string()]).status().unwrap();
+        assert!(sent.success(), "kill -{name} {}", self.id());
+    }
+
+    /// Waits for the process to end by itself.
+    ///
+    /// # Panics
+    /// When that takes longer than it may.
+    pub fn end(&mut self, patience: Duration) -> std::process::ExitStatus {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.process.try_wait().unwrap() {
+                return status;
+            }
+            assert!(start.elapsed() < patience, "the service still runs after {patience:?}");
+            std::thread::sleep(Duration::from_millis(10));
         }
     }
 
@@ -160,6 +208,12 @@ impl Service {
     #[must_use]
     pub fn post(&self, path: &str, body: &Value) -> Answer {
         self.post_with(path, &[], body.to_string().as_bytes())
+    }
+
+    /// `POST` of JSON to a service that may be gone.
+    #[must_use]
+    pub fn try_post(&self, path: &str, body: &Value) -> Option<Answer> {
+        self.send("POST", path, &[("content-type", "application/json")], body.to_string().as_bytes()).ok()
     }
 
     /// `POST` of bytes that are said to be JSON, with headers.

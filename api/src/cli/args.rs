@@ -7,6 +7,8 @@ use lacuna_exchange::document::MOST_CELLS_LISTED;
 use lacuna_exchange::document::with::{self, PRIMITIVES};
 use lacuna_kernel::measure::Primitive;
 
+use crate::config::Role;
+
 /// Fabrication-oriented geometry: fractals, curves and meshes to certified, printable solids.
 ///
 /// Lengths are mm. stdout carries data only. `-` stands for stdin or stdout.
@@ -509,9 +511,20 @@ pub(super) struct ServeArgs {
     /// Threads that the jobs share; one per core when absent.
     #[arg(long, value_name = "COUNT")]
     pub(super) threads: Option<usize>,
+    /// What this process does: `all`, `front` (answers) or `worker` (does jobs). The last two need LACUNA_DATABASE_URL and
+    /// a bucket.
+    #[arg(long, value_name = "ROLE", value_parser = role)]
+    pub(super) role: Option<Role>,
+    /// Bucket for documents and results that several processes share.
+    #[arg(long, value_name = "s3://BUCKET/FOLDER")]
+    pub(super) objects_url: Option<String>,
     /// Log as JSON.
     #[arg(long)]
     pub(super) log_json: bool,
+}
+
+fn role(text: &str) -> Result<Role, String> {
+    text.parse().map_err(|()| "all, front or worker is expected".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -23,6 +23,8 @@ impl From<&ServeArgs> for Flags {
             data: args.data.clone(),
             workers: args.workers,
             threads: args.threads,
+            role: args.role,
+            objects: args.objects_url.clone(),
             log_json: args.log_json.then_some(true),
         }
     }

@@ -1,21 +1,13 @@
 //! Files over HTTP: whole, one range of them, or "you have it".
 
-use std::io::SeekFrom;
-use std::path::Path;
-
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::response::IntoResponse;
-use futures_util::stream;
-use tokio::fs::File;
-use tokio::io::{AsyncReadExt, AsyncSeekExt};
 
 use super::headers::is_known;
 use crate::jobs::record::Output;
 use crate::problem::{Problem, ProblemKind};
-
-/// Bytes that are read from the disk at once.
-const CHUNK: u64 = 1 << 16;
+use crate::store::{File, Store};
 
 /// What a `Range` header asks of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +41,7 @@ pub fn part(range: Option<&str>, length: u64) -> Part {
 ///
 /// # Errors
 /// When the file is gone or fails.
-pub async fn answer(request: &HeaderMap, path: &Path, output: &Output) -> Result<Response<Body>, Problem> {
+pub async fn answer(request: &HeaderMap, store: &Store, file: File, output: &Output) -> Result<Response<Body>, Problem> {
     let etag = format!("\"{}\"", output.digest);
     let mut response = Response::new(Body::empty());
     immutable_headers(response.headers_mut(), output, &etag)?;
@@ -57,10 +49,6 @@ pub async fn answer(request: &HeaderMap, path: &Path, output: &Output) -> Result
         *response.status_mut() = StatusCode::NOT_MODIFIED;
         return Ok(response);
     }
-    let mut file = File::open(path).await.map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => Problem::new(ProblemKind::NotFound, "the result is no longer kept; submit the job again"),
-        _ => Problem::io("the result could not be opened", &error),
-    })?;
     let text = |name| request.get(name).and_then(|value| value.to_str().ok());
     // A range of another version must not be glued to this one.
     let range = text(header::RANGE).filter(|_| text(header::IF_RANGE).is_none_or(|tag| tag == etag));
@@ -74,20 +62,12 @@ pub async fn answer(request: &HeaderMap, path: &Path, output: &Output) -> Result
             (first, last - first + 1)
         }
     };
-    file.seek(SeekFrom::Start(first)).await.map_err(|error| Problem::io("the result could not be read", &error))?;
     response.headers_mut().insert(header::CONTENT_LENGTH, HeaderValue::from(length));
-    *response.body_mut() = Body::from_stream(stream::try_unfold((file, length), next_chunk));
+    *response.body_mut() = store.part(file, first, length).await.map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => Problem::new(ProblemKind::NotFound, "the result is no longer kept; submit the job again"),
+        _ => Problem::io("the result could not be read", &error),
+    })?;
     Ok(response)
-}
-
-async fn next_chunk((mut file, left): (File, u64)) -> std::io::Result<Option<(Bytes, (File, u64))>> {
-    if left == 0 {
-        return Ok(None);
-    }
-    let mut chunk = vec![0; usize::try_from(left.min(CHUNK)).unwrap_or(0)];
-    file.read_exact(&mut chunk).await?;
-    let left = left - chunk.len() as u64;
-    Ok(Some((Bytes::from(chunk), (file, left))))
 }
 
 fn immutable_headers(headers: &mut HeaderMap, output: &Output, etag: &str) -> Result<(), Problem> {

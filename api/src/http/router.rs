@@ -57,6 +57,16 @@ pub fn description() -> utoipa::openapi::OpenApi {
 /// The service as a router: addresses and layers over a state.
 pub fn router(state: Shared) -> Router {
     let (public, private) = tables();
+    layered(state, public, private)
+}
+
+/// What a worker without a front end answers: how it is.
+pub fn probes(state: Shared) -> Router {
+    let public = OpenApiRouter::new().routes(routes!(health::livez)).routes(routes!(health::readyz)).routes(routes!(health::version));
+    layered(state, public, OpenApiRouter::new().routes(routes!(health::metrics)))
+}
+
+fn layered(state: Shared, public: OpenApiRouter<Shared>, private: OpenApiRouter<Shared>) -> Router {
     let private = Router::from(private).route_layer(from_fn_with_state(state.clone(), auth::require_key));
     Router::from(public)
         .merge(private)

@@ -14,7 +14,7 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::net::{TcpListener, TcpStream};
 use tower::ServiceExt;
 
-use super::router::router;
+use super::router::{probes, router};
 use super::state::{AppState, Shared};
 use crate::config::Config;
 use crate::jobs::worker;
@@ -31,12 +31,13 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
     let failed = |error| Problem::io(format!("cannot listen on {}", config.bind), &error);
     let listener = TcpListener::bind(config.bind).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
-    let state = AppState::open(config)?;
-    let workers = worker::start(&state.desk, state.config.workers, state.config.job_limits, state.engine)
+    let state = AppState::open(config).await?;
+    let count = if state.config.role.works() { state.config.workers } else { 0 };
+    let workers = worker::start(&state.desk, count, state.config.job_limits, state.engine)
         .map_err(|error| Problem::io("no threads for the workers", &error))?;
     let sweeper = tokio::spawn(sweep(state.clone()));
     told(address);
-    tracing::info!(%address, workers = workers.len(), "serving");
+    tracing::info!(%address, role = %state.config.role, workers = workers.len(), "serving");
 
     let connections = GracefulShutdown::new();
     let accepting = accept(&listener, &state, &connections);
@@ -60,7 +61,7 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
 }
 
 async fn accept(listener: &TcpListener, state: &Shared, connections: &GracefulShutdown) {
-    let app = router(state.clone());
+    let app = if state.config.role.answers() { router(state.clone()) } else { probes(state.clone()) };
     loop {
         match listener.accept().await {
             Ok((stream, _)) => attend(stream, app.clone(), state, connections),
@@ -108,13 +109,13 @@ fn end_workers(desk: &crate::jobs::desk::Desk, workers: Vec<std::thread::JoinHan
 async fn sweep(state: Shared) {
     let age = Duration::from_secs(state.config.retention_hours.saturating_mul(3600));
     loop {
-        let swept = state.beside(move |state| state.desk.sweep(age).map_err(|error| Problem::io("sweeping", &error))).await;
-        if let Err(problem) = swept {
-            tracing::error!(detail = %problem.detail, "not swept");
+        match state.beside(move |state| state.desk.sweep(age)).await {
+            Ok(removed) => tracing::info!(removed, "swept"),
+            Err(problem) => tracing::error!(detail = %problem.detail, "not swept"),
         }
+        // A job that waits may be the only one that still needs a file.
+        let idle = state.desk.gauges().await.is_ok_and(|gauges| gauges.queued + gauges.running == 0);
         let uploads = state.beside(move |state| {
-            // A job that waits may be the only one that still needs a file.
-            let idle = state.desk.all().iter().all(|job| job.state().is_final());
             let swept = if idle { state.store.sweep_uploads(age) } else { Ok(0) };
             swept.map_err(|error| Problem::io("sweeping uploads", &error))
         });

@@ -1,7 +1,9 @@
 //! What every handler may see.
 
 use std::sync::Arc;
+use std::time::Duration;
 
+use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 
 use super::auth::{Owner, RateLimiter};
@@ -19,7 +21,7 @@ pub struct AppState {
     pub config: Config,
     /// The desk for jobs.
     pub desk: Arc<Desk>,
-    /// The data folder.
+    /// Where documents and results are kept.
     pub store: Arc<Store>,
     /// What is counted.
     pub metrics: Arc<Metrics>,
@@ -39,29 +41,54 @@ pub struct AppState {
 pub type Shared = Arc<AppState>;
 
 impl AppState {
-    /// Opens the data folder and takes up what is in it. Nothing runs yet: see [`super::serve`].
+    /// Opens what the settings name, the data folder or the database and the object store, and takes up what is in it.
+    /// Nothing runs yet: see [`super::serve`].
+    ///
+    /// # Errors
+    /// When it cannot be used.
+    pub async fn open(config: Config) -> Result<Shared, Problem> {
+        let Some(places) = &config.shared else {
+            return Self::with_engine(config, Engine::KERNEL);
+        };
+        let failed = |error| Problem::io("the object store of LACUNA_OBJECTS_URL cannot be used", &error);
+        let root = config.data.clone();
+        // One provider of cryptography for both; a second call finds the first one's.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let store = Arc::new(Store::open_bucket(&places.objects, &root, Handle::current()).map_err(failed)?);
+        let metrics = Arc::new(Metrics::default());
+        let lease = Duration::from_secs(config.lease_seconds);
+        let desk = Desk::open_shared(&places.database.0, lease, Arc::clone(&store), limits(&config), Arc::clone(&metrics)).await?;
+        Ok(Self::over(config, Engine::KERNEL, desk))
+    }
+
+    /// One process over its data folder, with somebody to do the jobs.
     ///
     /// # Errors
     /// When the data folder fails.
-    pub fn open(config: Config) -> Result<Shared, Problem> {
-        Self::with_engine(config, Engine::KERNEL)
-    }
-
-    /// As [`AppState::open`], with something else in the kernel's place.
-    ///
-    /// # Errors
-    /// As [`AppState::open`].
     pub fn with_engine(config: Config, engine: Engine) -> Result<Shared, Problem> {
         let failed = |error| Problem::io(format!("the data folder {} cannot be used", config.data.display()), &error);
         let store = Arc::new(Store::open(&config.data).map_err(failed)?);
-        let metrics = Arc::new(Metrics::default());
-        let limits = DeskLimits { queued: config.queued, per_owner: config.jobs_per_key };
-        let desk = Arc::new(Desk::open(Arc::clone(&store), limits, Arc::clone(&metrics)).map_err(failed)?);
+        let desk = Desk::open(&config.data, store, limits(&config), Arc::default()).map_err(failed)?;
+        Ok(Self::over(config, engine, desk))
+    }
+
+    fn over(config: Config, engine: Engine, desk: Desk) -> Shared {
+        let (store, metrics) = (Arc::clone(&desk.store), Arc::clone(&desk.metrics));
         let submissions = RateLimiter::new("submissions", config.submissions_per_minute);
         let calls = RateLimiter::new("calls", config.calls_per_minute);
         // Twice the workers: reading documents is short, but must not take the memory of many at once.
         let blocking = Arc::new(Semaphore::new(config.workers * 2));
-        Ok(Arc::new(Self { config, desk, store, metrics, closing: watch::Sender::new(false), engine, submissions, calls, blocking }))
+        Arc::new(Self {
+            config,
+            desk: Arc::new(desk),
+            store,
+            metrics,
+            closing: watch::Sender::new(false),
+            engine,
+            submissions,
+            calls,
+            blocking,
+        })
     }
 
     /// Finds the models and mesh files that an owner has stored.
@@ -92,4 +119,8 @@ impl AppState {
         });
         task.await.unwrap_or_else(|error| Err(Problem::internal(format!("a request's work failed: {error}"))))
     }
+}
+
+fn limits(config: &Config) -> DeskLimits {
+    DeskLimits { queued: config.queued, per_owner: config.jobs_per_key }
 }

@@ -95,7 +95,7 @@ impl Service {
     }
 
     async fn ended(&self, id: &str) -> Value {
-        let job = self.state.desk.get(id).unwrap();
+        let job = self.state.desk.find("local", id).await.unwrap().unwrap();
         serde_json::to_value(job.wait(Duration::from_secs(20)).await).unwrap()
     }
 }
@@ -165,7 +165,9 @@ async fn a_running_job_stops_soon_and_its_events_tell() {
     let place = headers["location"].to_str().unwrap().to_owned();
     let id = job["id"].as_str().unwrap();
     let running = Instant::now();
-    while service.state.desk.get(id).unwrap().view().progress.is_none() && running.elapsed() < Duration::from_secs(20) {
+    while service.state.desk.find("local", id).await.unwrap().unwrap().view().progress.is_none()
+        && running.elapsed() < Duration::from_secs(20)
+    {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
     let (status, _) = service.get(&format!("{place}/outputs/obj")).await;

@@ -1,24 +1,25 @@
-//! The desk: accepts jobs, knows them all, stops and forgets them, and takes them up again after a restart.
+//! The desk: accepts jobs, knows them all, hands them to workers, stops and forgets them, over either ledger.
+//!
+//! Methods that may write block, and belong beside the event loop; those that only look are `async`.
 
-use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use lacuna_fabrication::{Certificate, JobKind};
-use lacuna_kernel::budget::StopReason;
+use lacuna_fabrication::JobKind;
+use tokio::runtime::Handle;
 use uuid::Uuid;
 
+use super::embedded::Embedded;
 use super::live::LiveJob;
-use super::queue::{Queue, Refusal};
-use super::record::{Idempotency, JobRecord, JobState, JobView, Output};
+use super::record::{Ending, Idempotency, JobRecord, JobState, JobView, Output};
+use super::refusal;
+use super::shared::Shared;
 use crate::digest::Digest;
 use crate::metrics::Metrics;
-use crate::problem::{Problem, ProblemKind};
+use crate::problem::Problem;
 use crate::store::Store;
-
-/// How often a job is started before it counts as the one that brings the service down.
-pub const ATTEMPTS: u32 = 2;
 
 /// A job that was read and found legal.
 #[derive(Clone, Debug)]
@@ -44,240 +45,231 @@ pub struct DeskLimits {
     pub per_owner: usize,
 }
 
+/// Which jobs are listed.
+#[derive(Clone, Debug, Default)]
+pub struct JobFilter {
+    /// Only jobs in this state.
+    pub state: Option<JobState>,
+    /// Only jobs of this kind.
+    pub kind: Option<JobKind>,
+    /// Only jobs with smaller ids.
+    pub before: Option<String>,
+}
+
+impl JobFilter {
+    pub(super) fn wants(&self, view: &JobView) -> bool {
+        self.state.is_none_or(|state| view.state == state) && self.kind.is_none_or(|kind| view.kind == kind)
+    }
+}
+
+/// How many jobs there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gauges {
+    /// Jobs that wait.
+    pub queued: u64,
+    /// Jobs that workers are at.
+    pub running: u64,
+    /// Jobs whose record is kept.
+    pub kept: u64,
+}
+
 /// The desk.
 #[derive(Debug)]
 pub struct Desk {
-    jobs: Mutex<BTreeMap<String, Arc<LiveJob>>>,
-    keys: Mutex<HashMap<(String, Digest), Option<String>>>,
-    limits: DeskLimits,
+    ledger: Ledger,
     stopping: AtomicBool,
-    /// Where things are kept.
+    /// Where documents and results are kept.
     pub store: Arc<Store>,
-    /// What waits.
-    pub queue: Queue,
     /// What is counted.
     pub metrics: Arc<Metrics>,
 }
 
+#[derive(Debug)]
+enum Ledger {
+    Embedded(Box<Embedded>),
+    Shared(Arc<Shared>),
+}
+
 impl Desk {
-    /// Opens the desk and takes up what an earlier process left: jobs that waited wait again, jobs that ran
-    /// run once more, and those that had been started twice have failed.
+    /// Opens the ledger of a data folder and takes up what an earlier process left in it.
     ///
     /// # Errors
     /// When the data folder fails.
-    pub fn open(store: Arc<Store>, limits: DeskLimits, metrics: Arc<Metrics>) -> std::io::Result<Self> {
-        let mut records = store.jobs()?;
-        records.sort_by(|a, b| a.view.id.cmp(&b.view.id));
-        let desk = Self {
-            jobs: Mutex::default(),
-            keys: Mutex::default(),
-            limits,
-            stopping: AtomicBool::new(false),
-            store,
-            queue: Queue::new(limits.queued),
-            metrics,
-        };
-        for mut record in records {
-            take_up(&mut record);
-            let (id, state) = (record.view.id.clone(), record.view.state);
-            desk.store.keep_job(&record)?;
-            if let Some(used) = &record.idempotency {
-                crate::locked(&desk.keys).insert((record.owner.clone(), used.key), Some(id.clone()));
-            }
-            crate::locked(&desk.jobs).insert(id.clone(), Arc::new(LiveJob::new(record)));
-            if state == JobState::Queued {
-                desk.queue.restore(id);
-            }
-        }
-        Ok(desk)
+    pub fn open(root: &Path, store: Arc<Store>, limits: DeskLimits, metrics: Arc<Metrics>) -> std::io::Result<Self> {
+        let ledger = Ledger::Embedded(Box::new(Embedded::open(root, Arc::clone(&store), limits)?));
+        Ok(Self { ledger, stopping: AtomicBool::new(false), store, metrics })
+    }
+
+    /// Opens the ledger of a database; a worker is given up when nothing was heard of it for the time of its lease.
+    ///
+    /// # Errors
+    /// When the database cannot be reached or used.
+    pub async fn open_shared(
+        database: &str,
+        lease: Duration,
+        store: Arc<Store>,
+        limits: DeskLimits,
+        metrics: Arc<Metrics>,
+    ) -> Result<Self, Problem> {
+        let ledger = Ledger::Shared(Shared::open(database, lease, Arc::clone(&store), limits, Handle::current()).await?);
+        Ok(Self { ledger, stopping: AtomicBool::new(false), store, metrics })
     }
 
     /// Accepts a job, or hands out the one that the same idempotency key made; tells which of the two.
     ///
     /// # Errors
-    /// When the queue is full, the service stops, the key was used otherwise, or the data folder fails.
+    /// When too many jobs wait, the service stops, the key was used otherwise, or the ledger or the store fails.
     pub fn submit(&self, submission: Submission) -> Result<(Arc<LiveJob>, bool), Problem> {
-        if let Some(used) = submission.idempotency.clone() {
-            if let Some(known) = self.reserve(&submission.owner, &used)? {
-                return Ok((known, true));
-            }
-            let accepted = self.accept(submission.clone());
-            let place = (submission.owner, used.key);
-            let mut keys = crate::locked(&self.keys);
-            match &accepted {
-                Ok(job) => keys.insert(place, Some(job.with(|record| record.view.id.clone()))),
-                // A refusal is not an answer to keep: the same request may pass later.
-                Err(_) => keys.remove(&place),
-            };
-            return accepted.map(|job| (job, false));
-        }
-        self.accept(submission).map(|job| (job, false))
-    }
-
-    fn reserve(&self, owner: &str, used: &Idempotency) -> Result<Option<Arc<LiveJob>>, Problem> {
-        let mut keys = crate::locked(&self.keys);
-        match keys.get(&(owner.to_owned(), used.key)) {
-            None => {
-                keys.insert((owner.to_owned(), used.key), None);
-                Ok(None)
-            }
-            Some(None) => Err(Problem::new(
-                ProblemKind::IdempotencyInProgress,
-                "A request with this Idempotency-Key is being answered; repeat this one afterwards",
-            )
-            .retry_after(1)),
-            Some(Some(id)) => {
-                let Some(job) = crate::locked(&self.jobs).get(id).cloned() else {
-                    keys.insert((owner.to_owned(), used.key), None);
-                    return Ok(None);
-                };
-                if job.with(|record| record.idempotency.as_ref().map(|first| first.body)) == Some(used.body) {
-                    return Ok(Some(job));
-                }
-                Err(Problem::new(
-                    ProblemKind::IdempotencyMismatch,
-                    "This Idempotency-Key was used with another body; a new job needs a new key",
-                ))
-            }
-        }
-    }
-
-    fn accept(&self, submission: Submission) -> Result<Arc<LiveJob>, Problem> {
         if self.is_stopping() {
-            return Err(stopping());
+            return Err(refusal::stopping());
         }
-        self.check_share(&submission.owner)?;
-        let failed = |error| Problem::io("the job could not be recorded", &error);
         let document = Digest::of(&submission.document);
-        let answer = self.store.answer(answer_key(submission.input_digest)).unwrap_or_else(|error| {
-            tracing::warn!(%error, "unreadable answer, the work is done again");
-            None
-        });
-        self.store.keep_document(document, &submission.document).map_err(failed)?;
-        let mut record = new_record(submission, document);
-        if let Some(answer) = answer {
-            finish(&mut record.view, answer.outputs, answer.certificate, true);
-            self.metrics.reused();
+        self.store.keep_document(document, &submission.document).map_err(|error| Problem::io("the job could not be recorded", &error))?;
+        let record = new_record(submission, document);
+        let (job, replayed) = match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.submit(record),
+            Ledger::Shared(ledger) => ledger.submit(record),
+        }?;
+        if !replayed {
+            self.metrics.accepted();
+            if job.with(|record| record.view.reused) {
+                self.metrics.reused();
+            }
         }
-        let waits = record.view.state == JobState::Queued;
-        let id = record.view.id.clone();
-        // On the device before it is answered or started: an accepted job is never lost.
-        self.store.keep_job(&record).map_err(failed)?;
-        let job = Arc::new(LiveJob::new(record));
-        crate::locked(&self.jobs).insert(id.clone(), Arc::clone(&job));
-        if waits && let Err(refusal) = self.queue.push(id.clone()) {
-            crate::locked(&self.jobs).remove(&id);
-            let _ = self.store.forget_job(&id);
-            return Err(match refusal {
-                Refusal::Closed => stopping(),
-                Refusal::Full => too_many("all callers", self.limits.queued),
-            });
-        }
-        self.metrics.accepted();
-        Ok(job)
-    }
-
-    fn check_share(&self, owner: &str) -> Result<(), Problem> {
-        let theirs = self.all().iter().filter(|job| job.with(|r| r.owner == owner && !r.view.state.is_final())).count();
-        if theirs >= self.limits.per_owner { Err(too_many("this key", self.limits.per_owner)) } else { Ok(()) }
+        Ok((job, replayed))
     }
 
     /// An owner's job.
-    #[must_use]
-    pub fn find(&self, owner: &str, id: &str) -> Option<Arc<LiveJob>> {
-        self.get(id).filter(|job| job.with(|record| record.owner == owner))
+    ///
+    /// # Errors
+    /// When the ledger cannot be asked.
+    pub async fn find(&self, owner: &str, id: &str) -> Result<Option<Arc<LiveJob>>, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => Ok(ledger.find(owner, id)),
+            Ledger::Shared(ledger) => ledger.find(owner, id).await,
+        }
     }
 
-    /// A job, whoever owns it.
-    #[must_use]
-    pub fn get(&self, id: &str) -> Option<Arc<LiveJob>> {
-        crate::locked(&self.jobs).get(id).cloned()
-    }
-
-    /// All jobs, the oldest first.
-    #[must_use]
-    pub fn all(&self) -> Vec<Arc<LiveJob>> {
-        crate::locked(&self.jobs).values().cloned().collect()
+    /// An owner's jobs that a filter wants, the newest first.
+    ///
+    /// # Errors
+    /// As [`Desk::find`].
+    pub async fn page(&self, owner: &str, filter: &JobFilter, length: usize) -> Result<Vec<JobView>, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => Ok(ledger.page(owner, filter, length)),
+            Ledger::Shared(ledger) => ledger.page(owner, filter, length).await,
+        }
     }
 
     /// The output with this digest, if one of the owner's jobs made it.
-    #[must_use]
-    pub fn find_output(&self, owner: &str, digest: Digest) -> Option<Output> {
-        self.all().iter().rev().find_map(|job| {
-            job.with(|record| {
-                let outputs = (record.owner == owner).then_some(&record.view.outputs)?;
-                outputs.iter().find(|output| output.digest == digest).cloned()
-            })
-        })
+    ///
+    /// # Errors
+    /// As [`Desk::find`].
+    pub async fn find_output(&self, owner: &str, digest: Digest) -> Result<Option<Output>, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => Ok(ledger.find_output(owner, digest)),
+            Ledger::Shared(ledger) => ledger.find_output(owner, digest).await,
+        }
+    }
+
+    /// How many jobs there are.
+    ///
+    /// # Errors
+    /// As [`Desk::find`].
+    pub async fn gauges(&self) -> Result<Gauges, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => Ok(ledger.gauges()),
+            Ledger::Shared(ledger) => ledger.gauges().await,
+        }
     }
 
     /// Stops a job. One that waits has stopped when this returns; one that runs stops soon.
     ///
     /// # Errors
-    /// When the data folder fails.
-    pub fn cancel(&self, job: &LiveJob) -> std::io::Result<JobView> {
-        let id = job.with(|record| record.view.id.clone());
-        let waited = self.queue.remove(&id);
-        job.update(|record| match record.view.state {
-            JobState::Queued if waited => end_cancelled(&mut record.view),
-            JobState::Queued | JobState::Running => record.view.state = JobState::Cancelling,
-            _ => {}
-        });
-        job.cancel.fire(StopReason::Cancelled);
-        self.store.keep_job(&job.record())?;
-        Ok(job.view())
+    /// When the ledger fails.
+    pub fn cancel(&self, job: &LiveJob) -> Result<JobView, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.cancel(job).map_err(|error| Problem::io("the job could not be recorded", &error)),
+            Ledger::Shared(ledger) => ledger.cancel(job),
+        }
     }
 
     /// Stops a job if needed and forgets it.
     ///
     /// # Errors
-    /// When the data folder fails.
-    pub fn forget(&self, job: &LiveJob) -> std::io::Result<()> {
-        self.cancel(job)?;
-        let (id, owner, used) = job.with(|r| (r.view.id.clone(), r.owner.clone(), r.idempotency.clone()));
-        crate::locked(&self.jobs).remove(&id);
-        if let Some(used) = used {
-            crate::locked(&self.keys).remove(&(owner, used.key));
-        }
-        self.store.forget_job(&id)
-    }
-
-    /// Keeps a job's present record, unless its owner had it forgotten meanwhile.
-    pub fn keep(&self, job: &LiveJob) {
-        let record = job.record();
-        if self.get(&record.view.id).is_none() {
-            return;
-        }
-        if let Err(error) = self.store.keep_job(&record) {
-            tracing::error!(job = %record.view.id, %error, "job record not kept");
+    /// When the ledger fails.
+    pub fn forget(&self, job: &LiveJob) -> Result<(), Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.forget(job).map_err(|error| Problem::io("the job could not be forgotten", &error)),
+            Ledger::Shared(ledger) => ledger.forget(job),
         }
     }
 
-    /// Forgets jobs that ended longer ago than `age`, then removes results that no job has.
+    /// Waits for the next job to work on, whose start is recorded; none once the desk is stopped.
+    pub fn take(&self) -> Option<Arc<LiveJob>> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.take(),
+            Ledger::Shared(ledger) => ledger.take(),
+        }
+    }
+
+    /// Records how a worker's job ended and tells its state. The work is done: when it cannot be recorded now (a full
+    /// disk, a database that is away) this tries until it can, or until the service ends. None if the job is somebody
+    /// else's by now.
+    pub fn conclude(&self, job: &LiveJob, ending: &Ending) -> Option<JobState> {
+        let mut pause = Duration::from_millis(100);
+        loop {
+            let recorded = match &self.ledger {
+                Ledger::Embedded(ledger) => {
+                    ledger.conclude(job, ending).map(Some).map_err(|error| Problem::io("the end of a job could not be recorded", &error))
+                }
+                Ledger::Shared(ledger) => ledger.conclude(job, ending),
+            };
+            match recorded {
+                Ok(state) => return state,
+                Err(problem) => {
+                    tracing::error!(job = %job.id(), detail = %problem.detail, "the end of a job is not recorded yet");
+                    if self.is_stopping() && pause > Duration::from_secs(1) {
+                        // The next start, or another worker, does the work again.
+                        return None;
+                    }
+                }
+            }
+            std::thread::sleep(pause);
+            pause = (pause * 2).min(Duration::from_secs(2));
+        }
+    }
+
+    /// Whether jobs can be accepted now.
     ///
     /// # Errors
-    /// When the data folder fails.
-    pub fn sweep(&self, age: Duration) -> std::io::Result<()> {
-        let oldest = crate::clock::ago(age);
-        for job in self.all() {
-            if job.with(|record| record.view.finished.as_ref().is_some_and(|finished| *finished < oldest)) {
-                self.forget(&job)?;
-            }
+    /// When the ledger or the store cannot be used.
+    pub fn probe(&self) -> Result<(), Problem> {
+        self.store.probe().map_err(|error| Problem::io("documents and results cannot be kept", &error))?;
+        match &self.ledger {
+            Ledger::Embedded(_) => Ok(()),
+            Ledger::Shared(ledger) => ledger.probe(),
         }
-        let needed: std::collections::HashSet<Digest> =
-            self.all().iter().flat_map(|job| job.view().outputs.into_iter().map(|output| output.digest)).collect();
-        // A running job's results are kept before its record names them: sweep only when none runs.
-        if self.all().iter().all(|job| job.state().is_final()) {
-            let removed = self.store.sweep_results(|digest| needed.contains(&digest))?;
-            tracing::info!(removed, "results swept");
+    }
+
+    /// Forgets jobs that ended longer ago than `age`, then removes files that no job has. Tells how many went.
+    ///
+    /// # Errors
+    /// When the ledger or the store fails.
+    pub fn sweep(&self, age: Duration) -> Result<usize, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.sweep(age).map_err(|error| Problem::io("sweeping", &error)),
+            Ledger::Shared(ledger) => ledger.sweep(age),
         }
-        Ok(())
     }
 
     /// Accepts and hands out no more jobs.
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::SeqCst);
-        self.queue.close();
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.close(),
+            Ledger::Shared(ledger) => ledger.close(),
+        }
     }
 
     /// Whether the service goes down.
@@ -286,61 +278,18 @@ impl Desk {
         self.stopping.load(Ordering::SeqCst)
     }
 
-    /// Stops what runs, so that it is taken up again at the next start.
+    /// Stops what runs in this process, so that it is taken up again.
     pub fn interrupt(&self) {
-        for job in self.all() {
-            if job.state() == JobState::Running {
-                job.cancel.fire(StopReason::Cancelled);
-            }
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.interrupt(),
+            Ledger::Shared(ledger) => ledger.interrupt(),
         }
     }
 }
 
 /// Under which name finished work is found again: by the work and by the version that did it.
-#[must_use]
-pub fn answer_key(input: Digest) -> Digest {
+fn work_of(input: Digest) -> Digest {
     Digest::of(format!("{input} {}", env!("CARGO_PKG_VERSION")).as_bytes())
-}
-
-/// Ends a job well.
-pub fn finish(view: &mut JobView, outputs: Vec<Output>, certificate: Certificate, reused: bool) {
-    view.state = JobState::Succeeded;
-    view.finished = Some(crate::clock::now());
-    view.progress = None;
-    view.warnings.clone_from(&certificate.warnings);
-    view.outputs = outputs;
-    view.certificate = Some(certificate);
-    view.reused = reused;
-}
-
-/// Ends a job on its owner's wish.
-pub fn end_cancelled(view: &mut JobView) {
-    view.state = JobState::Cancelled;
-    view.finished = Some(crate::clock::now());
-    view.progress = None;
-    view.problem = Some(Problem::new(ProblemKind::Cancelled, "The job was stopped by its owner"));
-}
-
-/// Ends a job with a problem.
-pub fn fail(view: &mut JobView, problem: Problem) {
-    view.state = JobState::Failed;
-    view.finished = Some(crate::clock::now());
-    view.progress = None;
-    view.problem = Some(problem);
-}
-
-fn take_up(record: &mut JobRecord) {
-    let view = &mut record.view;
-    view.progress = None;
-    match view.state {
-        JobState::Cancelling => end_cancelled(view),
-        JobState::Running if view.attempt >= ATTEMPTS => {
-            let detail = format!("The service stopped during the work, {ATTEMPTS} times");
-            fail(view, Problem::new(ProblemKind::Interrupted, detail));
-        }
-        JobState::Running => view.state = JobState::Queued,
-        _ => {}
-    }
 }
 
 fn new_record(submission: Submission, document: Digest) -> JobRecord {
@@ -360,26 +309,19 @@ fn new_record(submission: Submission, document: Digest) -> JobRecord {
         warnings: Vec::new(),
         problem: None,
     };
-    JobRecord { view, owner: submission.owner, document, idempotency: submission.idempotency }
-}
-
-fn stopping() -> Problem {
-    Problem::new(ProblemKind::ShuttingDown, "The service is going down and accepts no more jobs").retry_after(10)
-}
-
-fn too_many(whose: &str, allowed: usize) -> Problem {
-    let detail = format!("{allowed} unfinished jobs of {whose} are the most that are accepted; wait for one to end");
-    Problem::new(ProblemKind::TooManyJobs, detail).retry_after(5)
+    let work = work_of(submission.input_digest);
+    JobRecord { view, owner: submission.owner, document, work, idempotency: submission.idempotency }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::problem::ProblemKind;
 
     fn desk(root: &std::path::Path) -> Desk {
         let store = Arc::new(Store::open(root).unwrap());
-        Desk::open(store, DeskLimits { queued: 2, per_owner: 10 }, Arc::default()).unwrap()
+        Desk::open(root, store, DeskLimits { queued: 2, per_owner: 10 }, Arc::default()).unwrap()
     }
 
     fn submission(body: &str, key: Option<&str>) -> Submission {
@@ -413,28 +355,73 @@ mod tests {
         std::fs::remove_dir_all(root).unwrap();
     }
 
+    fn look(desk: &Desk, owner: &str, id: &str) -> Option<Arc<LiveJob>> {
+        let Ledger::Embedded(ledger) = &desk.ledger else { panic!("a data folder is embedded") };
+        ledger.find(owner, id)
+    }
+
     #[test]
     fn a_restart_takes_jobs_up_again_once() {
         let root = folder();
         let id = {
             let desk = desk(&root);
             let (job, _) = desk.submit(submission("{}", Some("k"))).unwrap();
-            job.update(|record| (record.view.state, record.view.attempt) = (JobState::Running, 1));
-            desk.keep(&job);
-            job.view().id
+            assert!(Arc::ptr_eq(&desk.take().unwrap(), &job));
+            let view = job.view();
+            assert_eq!((view.state, view.attempt), (JobState::Running, 1));
+            view.id
         };
         {
             let desk = desk(&root);
-            let job = desk.find("ada", &id).unwrap();
-            assert_eq!((job.state(), desk.queue.len()), (JobState::Queued, 1));
+            let job = look(&desk, "ada", &id).unwrap();
+            assert_eq!(job.state(), JobState::Queued);
             assert!(desk.submit(submission("{}", Some("k"))).unwrap().1, "the key outlives the process");
-            assert!(desk.find("bob", &id).is_none());
-            job.update(|record| (record.view.state, record.view.attempt) = (JobState::Running, 2));
-            desk.keep(&job);
+            assert!(look(&desk, "bob", &id).is_none());
+            assert_eq!(desk.take().unwrap().view().attempt, 2);
         }
         let desk = desk(&root);
-        let view = desk.find("ada", &id).unwrap().view();
+        let view = look(&desk, "ada", &id).unwrap().view();
         assert_eq!((view.state, view.problem.unwrap().kind), (JobState::Failed, ProblemKind::Interrupted));
+        std::fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn equal_work_is_done_by_one_worker_for_all_who_wait() {
+        let root = folder();
+        let desk = desk(&root);
+        let (first, _) = desk.submit(submission("{}", None)).unwrap();
+        let (second, _) = desk.submit(submission("{}", None)).unwrap();
+        let taken = desk.take().unwrap();
+        assert!(Arc::ptr_eq(&taken, &first));
+        let (other, _) = desk.submit(submission("[]", None)).unwrap();
+        assert!(Arc::ptr_eq(&desk.take().unwrap(), &other), "the second waits for the first one's answer");
+        let answer = super::super::record::Answer { outputs: Vec::new(), certificate: Default::default() };
+        assert_eq!(desk.conclude(&taken, &Ending::Done(Box::new(answer))), Some(JobState::Succeeded));
+        let view = second.view();
+        assert_eq!((view.state, view.reused, view.attempt), (JobState::Succeeded, true, 0));
+        // Work that fails is done again by whoever waited for it.
+        let (first, _) = desk.submit(submission("1", None)).unwrap();
+        let (second, _) = desk.submit(submission("1", None)).unwrap();
+        assert!(Arc::ptr_eq(&desk.take().unwrap(), &first));
+        desk.conclude(&first, &Ending::Failed(Box::new(Problem::internal("as asked"))));
+        assert!(Arc::ptr_eq(&desk.take().unwrap(), &second));
+        std::fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn an_owner_has_so_many_jobs_and_no_more() {
+        let root = folder();
+        let store = Arc::new(Store::open(&root).unwrap());
+        let desk = Desk::open(&root, store, DeskLimits { queued: 10, per_owner: 2 }, Arc::default()).unwrap();
+        let (first, _) = desk.submit(submission("1", None)).unwrap();
+        let (second, _) = desk.submit(submission("2", None)).unwrap();
+        assert_eq!(desk.submit(submission("3", None)).unwrap_err().kind, ProblemKind::TooManyJobs);
+        desk.cancel(&second).unwrap();
+        desk.submit(submission("3", None)).unwrap();
+        assert_eq!(desk.submit(submission("4", None)).unwrap_err().kind, ProblemKind::TooManyJobs);
+        desk.take().unwrap();
+        desk.conclude(&first, &Ending::Failed(Box::new(Problem::internal("as asked"))));
+        desk.submit(submission("4", None)).unwrap();
         std::fs::remove_dir_all(root).unwrap();
     }
 
@@ -445,7 +432,8 @@ mod tests {
         let (job, _) = desk.submit(submission("{}", None)).unwrap();
         assert_eq!(desk.cancel(&job).unwrap().state, JobState::Cancelled);
         assert_eq!(desk.cancel(&job).unwrap().state, JobState::Cancelled);
-        assert!(desk.queue.is_empty());
+        desk.stop();
+        assert!(desk.take().is_none());
         std::fs::remove_dir_all(root).unwrap();
     }
 }

@@ -9,6 +9,9 @@ use tokio::sync::watch;
 /// How many events are kept. Only progress repeats, and a listener that missed some needs the latest alone.
 const KEPT: usize = 256;
 
+/// Binary digits of the number of events that one revision of a record can have: its warnings and outputs.
+const EVENTS_OF_A_REVISION: u32 = 12;
+
 /// An event of a job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Event {
@@ -34,6 +37,22 @@ impl Default for EventLog {
 }
 
 impl EventLog {
+    /// Leaves room in the ids for the events of earlier revisions of a record that is changed elsewhere: events get
+    /// the same ids in every process that follows it. Tells whether the revision is a later one.
+    pub fn advance(&self, revision: u64) -> bool {
+        let events = crate::locked(&self.events);
+        let first = revision << EVENTS_OF_A_REVISION;
+        let later = first > *self.latest.borrow();
+        if later {
+            self.latest.send_if_modified(|latest| {
+                *latest = first;
+                false
+            });
+        }
+        drop(events);
+        later
+    }
+
     /// Adds an event.
     pub fn push(&self, name: &'static str, data: &impl Serialize) {
         let data = serde_json::to_string(data).unwrap_or_default();

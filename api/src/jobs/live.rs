@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use lacuna_kernel::budget::{CancelToken, Progress};
+use lacuna_kernel::budget::{CancelToken, Progress, StopReason};
 
 use super::events::EventLog;
 use super::record::{JobRecord, JobState, JobView, Step};
@@ -16,6 +16,9 @@ const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 pub struct LiveJob {
     record: Mutex<JobRecord>,
     last_progress: Mutex<Option<Instant>>,
+    /// Held by whoever makes a lasting change, from reading the record to telling of the change.
+    changing: Mutex<()>,
+    stopped: Mutex<Option<Instant>>,
     /// Stops the computation.
     pub cancel: CancelToken,
     /// What happened, for listeners.
@@ -26,18 +29,80 @@ impl LiveJob {
     /// A job with its record and no listener.
     #[must_use]
     pub fn new(record: JobRecord) -> Self {
+        Self::at(record, 0)
+    }
+
+    /// A job as it stands at a revision of its record in another process.
+    #[must_use]
+    pub fn at(record: JobRecord, revision: u64) -> Self {
         let view = record.view.clone();
-        let job =
-            Self { record: Mutex::new(record), last_progress: Mutex::default(), cancel: CancelToken::new(), events: EventLog::default() };
+        let job = Self {
+            record: Mutex::new(record),
+            last_progress: Mutex::default(),
+            changing: Mutex::default(),
+            stopped: Mutex::default(),
+            cancel: CancelToken::new(),
+            events: EventLog::default(),
+        };
         // Whoever listens first learns where the job stands, even if it ended in another process.
+        job.events.advance(revision);
         job.announce(&view);
+        job.announce_progress(&view);
         job
+    }
+
+    /// Takes over what another process has made of the job, unless a later revision is known.
+    pub fn refresh(&self, record: JobRecord, revision: u64) {
+        let _alone = crate::locked(&self.changing);
+        if !self.events.advance(revision) {
+            return;
+        }
+        let view = record.view.clone();
+        let before = std::mem::replace(&mut *crate::locked(&self.record), record).view;
+        if (view.state, view.attempt) != (before.state, before.attempt) {
+            self.announce(&view);
+        }
+        if view.progress != before.progress {
+            self.announce_progress(&view);
+        }
+    }
+
+    /// Makes a change that lasts: `keep` puts the changed record in its place before anybody sees it.
+    ///
+    /// # Errors
+    /// When `keep` fails; then nothing has changed.
+    pub fn change<T, E>(&self, change: impl FnOnce(&mut JobRecord) -> T, keep: impl FnOnce(&JobRecord) -> Result<(), E>) -> Result<T, E> {
+        let _alone = crate::locked(&self.changing);
+        let before = self.record();
+        let mut after = before.clone();
+        let result = change(&mut after);
+        if after != before {
+            keep(&after)?;
+            let mut record = crate::locked(&self.record);
+            if !after.view.state.is_final() {
+                // The kernel may have told of its progress meanwhile.
+                after.view.progress.clone_from(&record.view.progress);
+            }
+            let view = after.view.clone();
+            *record = after;
+            drop(record);
+            if view.state != before.view.state {
+                self.announce(&view);
+            }
+        }
+        Ok(result)
     }
 
     /// What the owner sees now.
     #[must_use]
     pub fn view(&self) -> JobView {
         crate::locked(&self.record).view.clone()
+    }
+
+    /// Its id.
+    #[must_use]
+    pub fn id(&self) -> String {
+        self.with(|record| record.view.id.clone())
     }
 
     /// What is kept of it now.
@@ -49,19 +114,6 @@ impl LiveJob {
     /// Looks at the record without a copy.
     pub fn with<T>(&self, look: impl FnOnce(&JobRecord) -> T) -> T {
         look(&crate::locked(&self.record))
-    }
-
-    /// Changes the record and tells listeners if the state changed by it.
-    pub fn update<T>(&self, change: impl FnOnce(&mut JobRecord) -> T) -> T {
-        let mut record = crate::locked(&self.record);
-        let before = record.view.state;
-        let result = change(&mut record);
-        let view = record.view.clone();
-        drop(record);
-        if view.state != before {
-            self.announce(&view);
-        }
-        result
     }
 
     /// Takes what the kernel tells of its progress.
@@ -80,6 +132,12 @@ impl LiveJob {
         self.events.push("progress", &step);
     }
 
+    fn announce_progress(&self, view: &JobView) {
+        if let Some(step) = &view.progress {
+            self.events.push("progress", step);
+        }
+    }
+
     fn announce(&self, view: &JobView) {
         if !view.state.is_final() {
             self.events.push("state", &serde_json::json!({ "state": view.state, "attempt": view.attempt }));
@@ -92,6 +150,27 @@ impl LiveJob {
             self.events.push("output", output);
         }
         self.events.push("done", view);
+    }
+
+    /// Asks the computation to stop, and notes when.
+    pub fn stop(&self) {
+        crate::locked(&self.stopped).get_or_insert_with(Instant::now);
+        self.cancel.fire(StopReason::Cancelled);
+    }
+
+    /// How long ago the computation was first asked to stop.
+    #[must_use]
+    pub fn stopped_for(&self) -> Option<Duration> {
+        crate::locked(&self.stopped).map(|since| since.elapsed())
+    }
+
+    /// Takes note that the record is gone: listeners hear of an end.
+    pub fn vanish(&self) {
+        let mut record = self.record();
+        if !record.view.state.is_final() {
+            record.view.end_cancelled();
+            self.refresh(record, u64::from(u32::MAX));
+        }
     }
 
     /// Waits until the job has ended, but not longer than the time given.

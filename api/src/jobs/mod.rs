@@ -1,9 +1,15 @@
-//! The machine room: jobs are accepted by the desk, wait in the queue and are done by worker threads.
+//! The machine room: jobs are accepted by the desk, kept in a ledger, and done by worker threads.
+//!
+//! The ledger is the one seam between one process and many: [`embedded`] keeps everything in memory and in the data
+//! folder, [`shared`] in a database that several processes use. What a change does to a job stands in [`record`], once.
 
 pub mod desk;
+mod embedded;
 pub mod events;
+mod journal;
 pub mod live;
-pub mod queue;
 pub mod record;
+mod refusal;
+mod shared;
 pub mod watchdog;
 pub mod worker;

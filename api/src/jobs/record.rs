@@ -5,7 +5,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::digest::Digest;
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemKind};
+
+/// How often a job is started before it counts as the one that brings its worker down.
+pub const ATTEMPTS: u32 = 2;
 
 /// Where a job stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
@@ -33,6 +36,12 @@ impl JobState {
     #[must_use]
     pub fn is_final(self) -> bool {
         matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
+    }
+
+    /// The state of a word in documents.
+    #[must_use]
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| state.word() == word)
     }
 
     /// The word in documents.
@@ -114,6 +123,79 @@ pub struct JobView {
     pub problem: Option<Problem>,
 }
 
+impl JobView {
+    /// Starts it once more.
+    pub fn start(&mut self) {
+        self.state = JobState::Running;
+        self.attempt += 1;
+        self.started = Some(crate::clock::now());
+    }
+
+    /// Ends it well.
+    pub fn finish(&mut self, answer: Answer, reused: bool) {
+        self.end(JobState::Succeeded);
+        self.warnings.clone_from(&answer.certificate.warnings);
+        self.outputs = answer.outputs;
+        self.certificate = Some(answer.certificate);
+        self.reused = reused;
+    }
+
+    /// Ends it on its owner's wish.
+    pub fn end_cancelled(&mut self) {
+        self.end(JobState::Cancelled);
+        self.problem = Some(Problem::new(ProblemKind::Cancelled, "The job was stopped by its owner"));
+    }
+
+    /// Ends it with a problem.
+    pub fn fail(&mut self, problem: Problem) {
+        self.end(JobState::Failed);
+        self.problem = Some(problem);
+    }
+
+    /// Takes it up again after the worker that was at it has gone: it waits once more, or has been started often enough.
+    pub fn take_up(&mut self) {
+        self.progress = None;
+        match self.state {
+            JobState::Cancelling => self.end_cancelled(),
+            JobState::Running if self.attempt >= ATTEMPTS => {
+                let detail = format!("The work was started {ATTEMPTS} times, and each time its worker stopped before the end");
+                self.fail(Problem::new(ProblemKind::Interrupted, detail));
+            }
+            JobState::Running => self.state = JobState::Queued,
+            _ => {}
+        }
+    }
+
+    /// Takes over what a worker says of the end of its work.
+    pub fn conclude(&mut self, ending: Ending) {
+        match ending {
+            // What was finished in time is handed out even if somebody wished to stop it meanwhile.
+            Ending::Done(answer) => self.finish(*answer, false),
+            Ending::Failed(problem) => self.fail(*problem),
+            Ending::Stopped if self.state == JobState::Cancelling => self.end_cancelled(),
+            // The service goes down: somebody else takes the job up again.
+            Ending::Stopped => self.take_up(),
+        }
+    }
+
+    fn end(&mut self, state: JobState) {
+        self.state = state;
+        self.finished = Some(crate::clock::now());
+        self.progress = None;
+    }
+}
+
+/// How a worker's work on a job ended.
+#[derive(Clone, Debug)]
+pub enum Ending {
+    /// With results.
+    Done(Box<Answer>),
+    /// With a problem.
+    Failed(Box<Problem>),
+    /// Because the job's flag was fired.
+    Stopped,
+}
+
 /// The idempotency key of a submission and what it was used with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Idempotency {
@@ -132,6 +214,8 @@ pub struct JobRecord {
     pub owner: String,
     /// Digest under which the job document is kept.
     pub document: Digest,
+    /// Digest of the work and of the version that does it: equal work has the same answer.
+    pub work: Digest,
     /// Idempotency key, if one was given.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub idempotency: Option<Idempotency>,

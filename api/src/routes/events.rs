@@ -41,7 +41,7 @@ pub async fn events(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {
-    let job = find(&state, &owner, &id)?;
+    let job = find(&state, &owner, &id).await?;
     let last = headers.get("last-event-id").and_then(|value| value.to_str().ok()?.parse().ok()).unwrap_or(0);
     let stream = follow(job, last, state.closing.subscribe());
     let sse = Sse::new(stream).keep_alive(KeepAlive::new().interval(PING).text("ping"));

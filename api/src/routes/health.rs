@@ -8,7 +8,6 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::http::state::Shared;
-use crate::jobs::record::JobState;
 use crate::problem::{Problem, ProblemKind};
 
 /// What a probe learns.
@@ -35,7 +34,8 @@ pub async fn livez() -> Json<Health> {
     Json(Health { status: "ok" })
 }
 
-/// Whether the service takes work: not while it goes down, nor when its data folder cannot be written.
+/// Whether the service takes work: not while it goes down, nor while its data folder, or the database and the object
+/// store that it shares with others, cannot be used.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation", security(()),
     responses((status = 200, body = Health), (status = 503, body = Problem, content_type = "application/problem+json"))
@@ -44,10 +44,10 @@ pub async fn readyz(State(state): State<Shared>) -> Result<Json<Health>, Problem
     if state.desk.is_stopping() {
         return Err(Problem::new(ProblemKind::ShuttingDown, "the service is going down").retry_after(10));
     }
-    let probe = state.beside(|state| state.store.probe().map_err(|error| Problem::io("the data folder cannot be written", &error)));
-    probe.await.map_err(|problem| {
-        tracing::error!(detail = %problem.detail, "not ready");
-        Problem::new(ProblemKind::ShuttingDown, "the data folder cannot be written").code("not-ready").retry_after(10)
+    state.beside(|state| state.desk.probe()).await.map_err(|problem| {
+        tracing::error!(code = %problem.code, detail = %problem.detail, "not ready");
+        let detail = "what the service keeps its jobs in cannot be used; the log has the cause";
+        Problem::new(ProblemKind::Unavailable, detail).code("not-ready").retry_after(10)
     })?;
     Ok(Json(Health { status: "ok" }))
 }
@@ -64,13 +64,13 @@ pub async fn version() -> Json<Version> {
     responses((status = 200, content_type = "text/plain", body = String), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn metrics(State(state): State<Shared>) -> Response {
-    let jobs = state.desk.all();
-    let running = jobs.iter().filter(|job| matches!(job.state(), JobState::Running | JobState::Cancelling)).count();
-    let gauges = [
-        ("lacuna_jobs_queued", "jobs that wait", state.desk.queue.len() as u64),
-        ("lacuna_jobs_running", "jobs that workers are at", running as u64),
-        ("lacuna_jobs_kept", "jobs whose record is kept", jobs.len() as u64),
-        ("lacuna_workers", "workers", state.config.workers as u64),
-    ];
+    let workers = if state.config.role.works() { state.config.workers as u64 } else { 0 };
+    let mut gauges = vec![("lacuna_workers", "workers of this process", workers)];
+    // Without the database the process still tells of itself.
+    if let Ok(jobs) = state.desk.gauges().await {
+        gauges.push(("lacuna_jobs_queued", "jobs that wait", jobs.queued));
+        gauges.push(("lacuna_jobs_running", "jobs that workers are at", jobs.running));
+        gauges.push(("lacuna_jobs_kept", "jobs whose record is kept", jobs.kept));
+    }
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], state.metrics.render(&gauges)).into_response()
 }

@@ -1,5 +1,6 @@
 //! Jobs: submitted, listed, looked at, stopped, forgotten.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Json;
@@ -17,7 +18,8 @@ use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
 use crate::http::headers::{PREFERENCE_APPLIED, Preference, QueryOf, idempotency_key, page_length};
 use crate::http::state::{AppState, Shared};
-use crate::jobs::desk::Submission;
+use crate::jobs::desk::{JobFilter, Submission};
+use crate::jobs::live::LiveJob;
 use crate::jobs::record::{Idempotency, JobState, JobView};
 use crate::openapi::Job;
 use crate::problem::{Problem, ProblemKind};
@@ -97,15 +99,14 @@ pub(super) async fn take(state: Shared, owner: Owner, headers: &HeaderMap, body:
 }
 
 /// Reads, predicts and accepts: what is refused here never becomes a job.
-fn accept(
-    state: &AppState,
-    owner: &Owner,
-    body: &[u8],
-    idempotency: Option<Idempotency>,
-) -> Result<(std::sync::Arc<crate::jobs::live::LiveJob>, bool), Problem> {
+fn accept(state: &AppState, owner: &Owner, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Arc<LiveJob>, bool), Problem> {
     let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
     let job = &order.job;
-    let replaced = order.supersedes.as_deref().map(|id| state.desk.find(&owner.0, id).ok_or_else(|| documents::unknown_job(id)));
+    let replaced = order.supersedes.as_deref().map(|id| {
+        // Beside the event loop, where waiting is allowed.
+        let found = tokio::runtime::Handle::current().block_on(state.desk.find(&owner.0, id))?;
+        found.ok_or_else(|| documents::unknown_job(id))
+    });
     let replaced = replaced.transpose()?;
     match predict(state.engine, job, PLAN_TIME) {
         // A prediction that takes too long is no reason to refuse what may be done in time.
@@ -121,8 +122,9 @@ fn accept(
     };
     let accepted = state.desk.submit(submission)?;
     // Only now: a refusal must not cost the caller what there is. The same work twice is not replaced by itself.
-    if let Some(replaced) = replaced.filter(|replaced| !std::sync::Arc::ptr_eq(replaced, &accepted.0) && !replaced.state().is_final()) {
-        state.desk.cancel(&replaced).map_err(|error| Problem::io("the replaced job could not be stopped", &error))?;
+    let id_of = |job: &LiveJob| job.with(|record| record.view.id.clone());
+    if let Some(replaced) = replaced.filter(|replaced| id_of(replaced) != id_of(&accepted.0) && !replaced.state().is_final()) {
+        state.desk.cancel(&replaced)?;
     }
     Ok(accepted)
 }
@@ -148,16 +150,8 @@ pub async fn list(
     QueryOf(query): QueryOf<JobQuery>,
 ) -> Result<Json<JobPage>, Problem> {
     let length = page_length(query.limit)?;
-    let jobs = state.desk.all();
-    let theirs = jobs.iter().rev().filter(|job| {
-        job.with(|record| {
-            record.owner == owner.0
-                && query.state.is_none_or(|state| record.view.state == state)
-                && query.kind.is_none_or(|kind| record.view.kind == kind)
-                && query.cursor.as_ref().is_none_or(|cursor| record.view.id < *cursor)
-        })
-    });
-    let mut items: Vec<JobView> = theirs.take(length + 1).map(|job| job.view()).collect();
+    let filter = JobFilter { state: query.state, kind: query.kind, before: query.cursor };
+    let mut items = state.desk.page(&owner.0, &filter, length + 1).await?;
     let more = items.len() > length;
     items.truncate(length);
     let next = more.then(|| items.last().map(|view| view.id.clone())).flatten();
@@ -170,7 +164,7 @@ pub async fn list(
     responses((status = 200, body = JobView), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let view = find(&state, &owner, &id)?.view();
+    let view = find(&state, &owner, &id).await?.view();
     let ended = view.state.is_final();
     let mut response = ([(header::CACHE_CONTROL, "no-store")], Json(view)).into_response();
     if !ended {
@@ -186,9 +180,8 @@ pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn cancel(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let job = find(&state, &owner, &id)?;
-    let stop = move |state: &AppState| state.desk.cancel(&job).map_err(|error| Problem::io("the job could not be recorded", &error));
-    state.beside(stop).await.map(answer)
+    let job = find(&state, &owner, &id).await?;
+    state.beside(move |state| state.desk.cancel(&job)).await.map(answer)
 }
 
 /// Stops a job if needed and forgets it.
@@ -201,16 +194,16 @@ pub async fn forget(
     Extension(owner): Extension<Owner>,
     Path(id): Path<String>,
 ) -> Result<StatusCode, Problem> {
-    let job = find(&state, &owner, &id)?;
-    let forget = move |state: &AppState| state.desk.forget(&job).map_err(|error| Problem::io("the job could not be forgotten", &error));
-    state.beside(forget).await.map(|()| StatusCode::NO_CONTENT)
+    let job = find(&state, &owner, &id).await?;
+    state.beside(move |state| state.desk.forget(&job)).await.map(|()| StatusCode::NO_CONTENT)
 }
 
 /// The caller's job with an id; another's is as absent as one that never was.
 ///
 /// # Errors
-/// 404.
-pub fn find(state: &AppState, owner: &Owner, id: &str) -> Result<std::sync::Arc<crate::jobs::live::LiveJob>, Problem> {
+/// 404, or 503 when nobody can tell.
+pub async fn find(state: &AppState, owner: &Owner, id: &str) -> Result<Arc<LiveJob>, Problem> {
     let shown: String = id.chars().take(80).collect();
-    state.desk.find(&owner.0, id).ok_or_else(|| Problem::new(ProblemKind::NotFound, format!("there is no job {shown:?}")))
+    let found = state.desk.find(&owner.0, id).await?;
+    found.ok_or_else(|| Problem::new(ProblemKind::NotFound, format!("there is no job {shown:?}")))
 }

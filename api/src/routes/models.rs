@@ -19,7 +19,7 @@ use crate::http::state::Shared;
 use crate::jobs::record::Output;
 use crate::openapi::Model;
 use crate::problem::{Problem, ProblemKind};
-use crate::store::ModelView;
+use crate::store::{File, ModelView};
 
 /// The media type of model documents.
 pub(super) const MEDIA_TYPE: &str = "application/vnd.lacuna.model+json;v=1";
@@ -124,7 +124,7 @@ pub async fn fetch(
     });
     let (view, document) = found.await?;
     let Some(document) = document else {
-        return range::answer(&headers, &state.store.upload_path(view.digest), &file_of(&view)).await;
+        return range::answer(&headers, &state.store, File::Upload(view.digest), &file_of(&view)).await;
     };
     let etag = format!("\"{}\"", view.digest);
     let shared = [(header::ETAG, etag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];

@@ -14,6 +14,7 @@ use crate::http::headers::QueryOf;
 use crate::http::range;
 use crate::http::state::Shared;
 use crate::problem::{Problem, ProblemKind};
+use crate::store::File;
 
 /// How an output is handed out.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -40,7 +41,7 @@ pub async fn output(
     QueryOf(query): QueryOf<OutputQuery>,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
-    let view = find(&state, &owner, &id)?.view();
+    let view = find(&state, &owner, &id).await?.view();
     if !view.state.is_final() {
         let detail = format!("the job is {}; its outputs are there when it has ended", view.state.word());
         return Err(Problem::new(ProblemKind::StateConflict, detail).retry_after(1));
@@ -53,7 +54,7 @@ pub async fn output(
         )
     })?;
     if query.redirect == Some(0) {
-        return range::answer(&headers, &state.store.result_path(output.digest), output).await;
+        return range::answer(&headers, &state.store, File::Result(output.digest), output).await;
     }
     let place = [(header::LOCATION, format!("/v1/results/{}", output.digest)), (header::CACHE_CONTROL, "no-store".to_owned())];
     Ok((StatusCode::SEE_OTHER, place).into_response())
@@ -77,6 +78,6 @@ pub async fn result(
     let absent = || Problem::new(ProblemKind::NotFound, "no job of yours made such a result, or it is no longer kept");
     let digest: Digest = digest.parse().map_err(|_| absent())?;
     // A digest is not a permission: only who owns a job that made the bytes may read them.
-    let output = state.desk.find_output(&owner.0, digest).ok_or_else(absent)?;
-    range::answer(&headers, &state.store.result_path(digest), &output).await
+    let output = state.desk.find_output(&owner.0, digest).await?.ok_or_else(absent)?;
+    range::answer(&headers, &state.store, File::Result(output.digest), &output).await
 }

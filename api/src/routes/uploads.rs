@@ -143,7 +143,7 @@ fn keep(state: &AppState, owner: &Owner, told: Told, mut pending: crate::files::
     let report = inspection::report(&file, bytes.len() as u64)?;
     // The mesh may be large, and the next one waits for its memory.
     drop((file, bytes));
-    state.store.keep_upload(&owner.0, told.name, pending, digest, report).map_err(failed)
+    state.store.keep_upload(&owner.0, told.name, &mut pending, digest, report).map_err(failed)
 }
 
 #[cfg(test)]

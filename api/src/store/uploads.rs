@@ -1,18 +1,27 @@
 //! Mesh files that callers uploaded: one file for the same bytes, and a view of it for each owner.
 
 use std::collections::HashSet;
-use std::fs;
-use std::io::{self, ErrorKind};
-use std::path::PathBuf;
+use std::io;
 use std::time::{Duration, SystemTime};
 
-use lacuna_exchange::format::Format;
+use lacuna_exchange::format::{FORMATS, Format};
 
-use super::{ModelView, Store, read_if_there, read_json};
+use super::{ModelView, Shelf, Store, model_name};
 use crate::digest::Digest;
 use crate::documents::{Stored, StoredMesh};
-use crate::files::{self, PendingFile};
+use crate::files::PendingFile;
 use crate::inspection::MeshReport;
+
+/// The name of a mesh file.
+pub(super) fn upload_name(digest: Digest) -> String {
+    format!("uploads/{}", digest.hex())
+}
+
+/// The id of a mesh file that is read as a format.
+fn upload_id(format: &str, digest: Digest) -> String {
+    let key = Digest::of(format!("{format} {digest}").as_bytes());
+    format!("mdl_{}", &key.hex()[..32])
+}
 
 impl Store {
     /// A file to receive an upload.
@@ -20,7 +29,7 @@ impl Store {
     /// # Errors
     /// When the device fails.
     pub fn new_upload(&self) -> io::Result<PendingFile> {
-        PendingFile::create_in(&self.root.join("uploads"))
+        PendingFile::create_in(&self.scratch)
     }
 
     /// Keeps a mesh file of an owner; tells what is kept and whether it is new. The id depends on the contents and on the
@@ -32,26 +41,18 @@ impl Store {
         &self,
         owner: &str,
         name: Option<String>,
-        pending: PendingFile,
+        pending: &mut PendingFile,
         digest: Digest,
         report: MeshReport,
     ) -> io::Result<(ModelView, bool)> {
-        let key = Digest::of(format!("{} {digest}", report.format).as_bytes());
-        let id = format!("mdl_{}", &key.hex()[..32]);
+        let id = upload_id(&report.format, digest);
         if let Some(known) = self.model(owner, &id)? {
             return Ok((known, false));
         }
-        pending.commit(&self.upload_path(digest))?;
+        self.keep_file(pending, &upload_name(digest))?;
         let view = ModelView { id, name, bytes: report.bytes, created: crate::clock::now(), digest, mesh: Some(report) };
-        fs::create_dir_all(self.models(owner))?;
-        files::write_whole(&self.models(owner).join(format!("{}.json", view.id)), &serde_json::to_vec(&view)?)?;
+        on_shelf!(self, shelf => shelf.put(&model_name(owner, &view.id, "json"), &serde_json::to_vec(&view)?))?;
         Ok((view, true))
-    }
-
-    /// Where a mesh file is kept.
-    #[must_use]
-    pub fn upload_path(&self, digest: Digest) -> PathBuf {
-        self.root.join("uploads").join(digest.hex())
     }
 
     /// What an owner has stored under an id: a model document or a mesh file.
@@ -79,7 +80,7 @@ impl Store {
 
     fn mesh(&self, digest: Digest, format: Format, name: Option<String>) -> io::Result<Option<StoredMesh>> {
         let reference = format!("{digest}.{}", format.facts().ending);
-        let bytes = read_if_there(&self.upload_path(digest))?;
+        let bytes = on_shelf!(self, shelf => shelf.get(&upload_name(digest)))?;
         Ok(bytes.map(|bytes| StoredMesh { name, format, bytes, reference }))
     }
 
@@ -89,34 +90,42 @@ impl Store {
     /// When the device fails.
     pub fn sweep_uploads(&self, age: Duration) -> io::Result<usize> {
         let oldest = SystemTime::now().checked_sub(age).unwrap_or(SystemTime::UNIX_EPOCH);
-        let mut needed = HashSet::new();
-        for owner in fs::read_dir(self.root.join("models"))? {
-            for entry in fs::read_dir(owner?.path())? {
-                let path = entry?.path();
-                if path.extension().is_some_and(|ending| ending == "json") {
-                    needed.extend(read_json::<ModelView>(&path)?.filter(|view| view.mesh.is_some()).map(|view| view.digest.hex()));
-                }
-            }
-        }
+        let files = on_shelf!(self, shelf => shelf.list("uploads"))?;
+        let known = self.model_files()?;
         let mut removed = 0;
-        for entry in fs::read_dir(self.root.join("uploads"))? {
-            let entry = entry?;
-            let old = match entry.metadata() {
-                Err(error) if error.kind() == ErrorKind::NotFound => false,
-                metadata => metadata?.modified()? < oldest,
-            };
-            if old && !needed.contains(&*entry.file_name().to_string_lossy()) {
-                fs::remove_file(entry.path())?;
+        for (name, _) in files.into_iter().filter(|(_, since)| *since < oldest) {
+            let Ok(digest) = format!("sha256:{name}").parse::<Digest>() else { continue };
+            // Somebody has it when some owner has a view of it under one of its possible ids.
+            let needed = FORMATS.iter().any(|format| known.contains(&format!("{}.json", upload_id(format.ending, digest))));
+            if !needed {
+                on_shelf!(self, shelf => shelf.remove(&format!("uploads/{name}")))?;
                 removed += 1;
             }
         }
         Ok(removed)
+    }
+
+    /// The names of what is kept of models, of all owners.
+    fn model_files(&self) -> io::Result<HashSet<String>> {
+        let names = |found: Vec<(String, SystemTime)>| found.into_iter().map(|(name, _)| name);
+        match &self.shelf {
+            Shelf::Folder(folder) => {
+                let mut all = HashSet::new();
+                for owner in names(folder.list("models")?) {
+                    all.extend(names(folder.list(&format!("models/{owner}"))?));
+                }
+                Ok(all)
+            }
+            // A bucket has no folders: all names below are listed.
+            Shelf::Bucket(bucket) => Ok(names(bucket.list("models")?).collect()),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs;
     use std::io::Write as _;
 
     use lacuna_exchange::format::ReadLimits;
@@ -131,7 +140,7 @@ mod tests {
         pending.write_all(TRIANGLE).unwrap();
         let file = inspection::read(TRIANGLE, None, &ReadLimits::default()).unwrap();
         let report = inspection::report(&file, TRIANGLE.len() as u64).unwrap();
-        store.keep_upload(owner, Some("part".into()), pending, Digest::of(TRIANGLE), report).unwrap()
+        store.keep_upload(owner, Some("part".into()), &mut pending, Digest::of(TRIANGLE), report).unwrap()
     }
 
     #[test]

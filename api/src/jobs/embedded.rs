@@ -1,0 +1,407 @@
+//! The ledger of one process: all jobs in memory, every lasting change on the device before anybody sees it.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
+use std::io;
+use std::path::Path;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+use lacuna_kernel::budget::StopReason;
+
+use super::desk::{DeskLimits, Gauges, JobFilter};
+use super::journal::Journal;
+use super::live::LiveJob;
+use super::record::{Ending, Idempotency, JobRecord, JobState, JobView, Output};
+use super::refusal;
+use crate::digest::Digest;
+use crate::problem::Problem;
+use crate::store::Store;
+
+/// The ledger.
+#[derive(Debug)]
+pub(super) struct Embedded {
+    book: Mutex<Book>,
+    /// Something waits, or nothing more is handed out.
+    arrived: Condvar,
+    limits: DeskLimits,
+    journal: Journal,
+    store: Arc<Store>,
+}
+
+/// What is known of all jobs.
+#[derive(Debug, Default)]
+struct Book {
+    jobs: BTreeMap<String, Arc<LiveJob>>,
+    /// What idempotency keys were used for; nothing yet while the first submission is accepted.
+    keys: HashMap<(String, Digest), Option<String>>,
+    /// Jobs that wait, first come first served.
+    waiting: VecDeque<(String, Digest)>,
+    /// Work that workers are at.
+    at_work: HashSet<Digest>,
+    /// Jobs that have not ended, by owner, those that are being accepted included.
+    unfinished: HashMap<String, usize>,
+    /// Jobs that are being accepted.
+    arriving: usize,
+    /// Which jobs have a result.
+    makers: HashMap<Digest, BTreeSet<String>>,
+    closed: bool,
+}
+
+impl Book {
+    fn insert(&mut self, job: &Arc<LiveJob>) {
+        let id = job.with(|record| {
+            for output in &record.view.outputs {
+                self.makers.entry(output.digest).or_default().insert(record.view.id.clone());
+            }
+            record.view.id.clone()
+        });
+        self.jobs.insert(id, Arc::clone(job));
+    }
+
+    fn leave(&mut self, owner: &str) {
+        if let Some(count) = self.unfinished.get_mut(owner) {
+            *count -= 1;
+            if *count == 0 {
+                self.unfinished.remove(owner);
+            }
+        }
+    }
+
+    /// Takes note of a job that has just ended.
+    fn ended(&mut self, record: &JobRecord) {
+        self.leave(&record.owner);
+        // A job that was forgotten while it ran has nothing to show.
+        for output in record.view.outputs.iter().filter(|_| self.jobs.contains_key(&record.view.id)) {
+            self.makers.entry(output.digest).or_default().insert(record.view.id.clone());
+        }
+    }
+
+    fn stop_waiting(&mut self, id: &str) -> bool {
+        let before = self.waiting.len();
+        self.waiting.retain(|(waiting, _)| waiting != id);
+        self.waiting.len() < before
+    }
+}
+
+impl Embedded {
+    /// Opens the ledger and takes up what an earlier process left: jobs that waited wait again, jobs that ran run once
+    /// more, and those that had been started twice have failed.
+    pub(super) fn open(root: &Path, store: Arc<Store>, limits: DeskLimits) -> io::Result<Self> {
+        let journal = Journal::open(root)?;
+        let mut book = Book::default();
+        for mut record in journal.jobs()? {
+            if matches!(record.view.state, JobState::Running | JobState::Cancelling) {
+                record.view.take_up();
+                journal.keep(&record)?;
+            }
+            if let Some(used) = &record.idempotency {
+                book.keys.insert((record.owner.clone(), used.key), Some(record.view.id.clone()));
+            }
+            if record.view.state == JobState::Queued {
+                // Accepted before: it is not refused now.
+                book.waiting.push_back((record.view.id.clone(), record.work));
+                *book.unfinished.entry(record.owner.clone()).or_default() += 1;
+            }
+            book.insert(&Arc::new(LiveJob::new(record)));
+        }
+        Ok(Self { book: Mutex::new(book), arrived: Condvar::new(), limits, journal, store })
+    }
+
+    fn book(&self) -> std::sync::MutexGuard<'_, Book> {
+        crate::locked(&self.book)
+    }
+
+    pub(super) fn submit(&self, record: JobRecord) -> Result<(Arc<LiveJob>, bool), Problem> {
+        let Some(used) = record.idempotency.clone() else {
+            return self.accept(record).map(|job| (job, false));
+        };
+        let place = (record.owner.clone(), used.key);
+        if let Some(known) = self.reserve(&place, &used)? {
+            return Ok((known, true));
+        }
+        let accepted = self.accept(record);
+        let mut book = self.book();
+        match &accepted {
+            Ok(job) => book.keys.insert(place, Some(job.with(|record| record.view.id.clone()))),
+            // A refusal is not an answer to keep: the same request may pass later.
+            Err(_) => book.keys.remove(&place),
+        };
+        accepted.map(|job| (job, false))
+    }
+
+    fn reserve(&self, place: &(String, Digest), used: &Idempotency) -> Result<Option<Arc<LiveJob>>, Problem> {
+        let mut book = self.book();
+        match book.keys.get(place) {
+            Some(None) => Err(refusal::key_in_progress()),
+            Some(Some(id)) => match book.jobs.get(id).cloned() {
+                Some(job) if job.with(|r| r.idempotency.as_ref().map(|first| first.body)) == Some(used.body) => Ok(Some(job)),
+                Some(_) => Err(refusal::key_used_otherwise()),
+                None => {
+                    book.keys.insert(place.clone(), None);
+                    Ok(None)
+                }
+            },
+            None => {
+                book.keys.insert(place.clone(), None);
+                Ok(None)
+            }
+        }
+    }
+
+    fn accept(&self, mut record: JobRecord) -> Result<Arc<LiveJob>, Problem> {
+        let owner = record.owner.clone();
+        if let Some(answer) = self.answer(&record) {
+            record.view.finish(answer, true);
+        }
+        let waits = !record.view.state.is_final();
+        if waits {
+            let mut book = self.book();
+            let theirs = book.unfinished.get(&owner).copied().unwrap_or(0);
+            if theirs >= self.limits.per_owner {
+                return Err(refusal::too_many("this key", self.limits.per_owner));
+            }
+            if book.waiting.len() + book.arriving >= self.limits.queued {
+                return Err(refusal::too_many("all callers", self.limits.queued));
+            }
+            *book.unfinished.entry(owner.clone()).or_default() += 1;
+            book.arriving += 1;
+        }
+        // On the device before it is answered or started: an accepted job is never lost.
+        let kept = self.journal.keep(&record);
+        let (id, work) = (record.view.id.clone(), record.work);
+        let job = Arc::new(LiveJob::new(record));
+        let mut book = self.book();
+        book.arriving -= usize::from(waits);
+        if let Err(error) = kept {
+            if waits {
+                book.leave(&owner);
+            }
+            return Err(Problem::io("the job could not be recorded", &error));
+        }
+        book.insert(&job);
+        if waits {
+            book.waiting.push_back((id, work));
+            self.arrived.notify_one();
+        }
+        Ok(job)
+    }
+
+    /// What the same work left earlier, if all of it is still there.
+    fn answer(&self, record: &JobRecord) -> Option<super::record::Answer> {
+        let found = self.journal.answer(record.work).and_then(|answer| {
+            let Some(answer) = answer else { return Ok(None) };
+            for output in &answer.outputs {
+                if !self.store.holds_result(output.digest)? {
+                    return Ok(None);
+                }
+            }
+            Ok(Some(answer))
+        });
+        found.unwrap_or_else(|error| {
+            tracing::warn!(%error, "unreadable answer, the work is done again");
+            None
+        })
+    }
+
+    pub(super) fn find(&self, owner: &str, id: &str) -> Option<Arc<LiveJob>> {
+        let job = self.book().jobs.get(id).cloned();
+        job.filter(|job| job.with(|record| record.owner == owner))
+    }
+
+    pub(super) fn page(&self, owner: &str, filter: &JobFilter, length: usize) -> Vec<JobView> {
+        // Only the handles are copied under the lock.
+        let jobs: Vec<Arc<LiveJob>> = match &filter.before {
+            Some(before) => self.book().jobs.range(..before.clone()).rev().map(|(_, job)| Arc::clone(job)).collect(),
+            None => self.book().jobs.values().rev().cloned().collect(),
+        };
+        let theirs = jobs.iter().filter(|job| job.with(|record| record.owner == owner && filter.wants(&record.view)));
+        theirs.take(length).map(|job| job.view()).collect()
+    }
+
+    pub(super) fn find_output(&self, owner: &str, digest: Digest) -> Option<Output> {
+        let book = self.book();
+        book.makers.get(&digest)?.iter().rev().find_map(|id| {
+            book.jobs.get(id)?.with(|record| {
+                let outputs = (record.owner == owner).then_some(&record.view.outputs)?;
+                outputs.iter().find(|output| output.digest == digest).cloned()
+            })
+        })
+    }
+
+    pub(super) fn cancel(&self, job: &LiveJob) -> io::Result<JobView> {
+        let id = job.with(|record| record.view.id.clone());
+        let waited = self.book().stop_waiting(&id);
+        let stop = |record: &mut JobRecord| {
+            match record.view.state {
+                JobState::Queued if waited => record.view.end_cancelled(),
+                JobState::Queued | JobState::Running => record.view.state = JobState::Cancelling,
+                _ => {}
+            }
+            // The flag falls before the device is asked: stopping must not wait for it.
+            job.stop();
+        };
+        let stopped = job.change(stop, |record| self.journal.keep(record));
+        if waited {
+            let mut book = self.book();
+            match &stopped {
+                Ok(()) => job.with(|record| book.ended(record)),
+                Err(_) => book.waiting.push_front((id, job.with(|record| record.work))),
+            }
+        }
+        stopped.map(|()| job.view())
+    }
+
+    pub(super) fn forget(&self, job: &LiveJob) -> io::Result<()> {
+        self.cancel(job)?;
+        let (id, place) = job.with(|r| (r.view.id.clone(), r.idempotency.as_ref().map(|used| (r.owner.clone(), used.key))));
+        let mut book = self.book();
+        book.jobs.remove(&id);
+        if let Some(place) = place {
+            book.keys.remove(&place);
+        }
+        job.with(|record| {
+            for output in &record.view.outputs {
+                if let Some(makers) = book.makers.get_mut(&output.digest) {
+                    makers.remove(&id);
+                    if makers.is_empty() {
+                        book.makers.remove(&output.digest);
+                    }
+                }
+            }
+        });
+        drop(book);
+        self.journal.forget(&id)
+    }
+
+    /// Waits for the next job whose work nobody is at; none once the ledger is closed, whatever waits.
+    pub(super) fn take(&self) -> Option<Arc<LiveJob>> {
+        let mut book = self.book();
+        loop {
+            if book.closed {
+                return None;
+            }
+            if let Some(place) = book.waiting.iter().position(|(_, work)| !book.at_work.contains(work))
+                && let Some((id, work)) = book.waiting.remove(place)
+                && let Some(job) = book.jobs.get(&id).cloned()
+            {
+                book.at_work.insert(work);
+                drop(book);
+                self.start(&job);
+                return Some(job);
+            }
+            book = self.arrived.wait(book).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Noted before the work: a job that brings the process down is known by its attempt.
+    fn start(&self, job: &LiveJob) {
+        let note = |record: &JobRecord| {
+            if let Err(error) = self.journal.note(record) {
+                tracing::error!(job = %record.view.id, %error, "the start of a job was not noted");
+            }
+            Ok::<_, std::convert::Infallible>(())
+        };
+        let _ = job.change(
+            |record| {
+                if record.view.state == JobState::Queued {
+                    record.view.start();
+                }
+            },
+            note,
+        );
+    }
+
+    /// Records how a job ended, and ends the jobs with it that wait for the same work.
+    pub(super) fn conclude(&self, job: &LiveJob, ending: &Ending) -> io::Result<JobState> {
+        let work = job.with(|record| record.work);
+        if let Ending::Done(answer) = ending
+            && let Err(error) = self.journal.note_answer(work, answer)
+        {
+            tracing::warn!(%error, "finished work cannot be found again");
+        }
+        job.change(|record| record.view.conclude(ending.clone()), |record| self.keep_unless_forgotten(record))?;
+        let (state, id) = job.with(|record| (record.view.state, record.view.id.clone()));
+        let mut book = self.book();
+        book.at_work.remove(&work);
+        if state == JobState::Queued {
+            book.waiting.push_front((id, work));
+        } else {
+            job.with(|record| book.ended(record));
+        }
+        let followers = match ending {
+            Ending::Done(_) => self.followers(&mut book, work),
+            _ => Vec::new(),
+        };
+        // Whoever waited for this work may be taken now.
+        self.arrived.notify_all();
+        drop(book);
+        if let Ending::Done(answer) = ending {
+            for follower in followers {
+                self.answer_follower(&follower, answer);
+            }
+        }
+        Ok(state)
+    }
+
+    fn followers(&self, book: &mut Book, work: Digest) -> Vec<Arc<LiveJob>> {
+        let ids: Vec<String> = book.waiting.iter().filter(|(_, other)| *other == work).map(|(id, _)| id.clone()).collect();
+        book.waiting.retain(|(_, other)| *other != work);
+        ids.iter().filter_map(|id| book.jobs.get(id).cloned()).collect()
+    }
+
+    fn answer_follower(&self, job: &Arc<LiveJob>, answer: &super::record::Answer) {
+        let kept = job.change(|record| record.view.finish(answer.clone(), true), |record| self.keep_unless_forgotten(record));
+        let mut book = self.book();
+        match kept {
+            Ok(()) => job.with(|record| book.ended(record)),
+            Err(error) => {
+                tracing::error!(%error, "a job that has its answer could not be recorded; it waits on");
+                let place = job.with(|record| (record.view.id.clone(), record.work));
+                book.waiting.push_back(place);
+                self.arrived.notify_one();
+            }
+        }
+    }
+
+    fn keep_unless_forgotten(&self, record: &JobRecord) -> io::Result<()> {
+        if self.book().jobs.contains_key(&record.view.id) { self.journal.keep(record) } else { Ok(()) }
+    }
+
+    /// Forgets jobs that ended longer ago than `age`, then removes answers and files that no job has.
+    pub(super) fn sweep(&self, age: Duration) -> io::Result<usize> {
+        let oldest = crate::clock::ago(age);
+        let jobs: Vec<Arc<LiveJob>> = self.book().jobs.values().cloned().collect();
+        for job in &jobs {
+            if job.with(|record| record.view.finished.as_ref().is_some_and(|finished| *finished < oldest)) {
+                self.forget(job)?;
+            }
+        }
+        let needed: HashSet<Digest> = self.book().jobs.values().map(|job| job.with(|record| record.work)).collect();
+        self.journal.sweep(|work| needed.contains(&work))?;
+        self.store.sweep(|| {
+            let book = self.book();
+            let of = |job: &Arc<LiveJob>| job.with(|r| r.view.outputs.iter().map(|o| o.digest).chain([r.document]).collect::<Vec<_>>());
+            Ok(book.jobs.values().flat_map(of).collect())
+        })
+    }
+
+    pub(super) fn gauges(&self) -> Gauges {
+        let book = self.book();
+        let running = book.at_work.len() as u64;
+        Gauges { queued: book.waiting.len() as u64, running, kept: book.jobs.len() as u64 }
+    }
+
+    /// Hands out no more jobs. What waits stays for the next start.
+    pub(super) fn close(&self) {
+        self.book().closed = true;
+        self.arrived.notify_all();
+    }
+
+    /// Stops what runs, so that it is taken up again at the next start.
+    pub(super) fn interrupt(&self) {
+        let jobs: Vec<Arc<LiveJob>> = self.book().jobs.values().cloned().collect();
+        for job in jobs.iter().filter(|job| job.state() == JobState::Running) {
+            job.cancel.fire(StopReason::Cancelled);
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The records of one process on its device: jobs and the answers of finished work, one file for each.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use super::record::{Answer, JobRecord};
+use crate::digest::Digest;
+use crate::files;
+use crate::store::folder::Folder;
+
+const ROOMS: [&str; 2] = ["jobs", "answers"];
+
+/// The rooms of a data folder in which records are kept.
+#[derive(Debug)]
+pub(super) struct Journal {
+    root: PathBuf,
+}
+
+impl Journal {
+    /// Opens the rooms of a data folder and removes what an earlier process left half written.
+    pub(super) fn open(root: &Path) -> io::Result<Self> {
+        Folder::open(root, &ROOMS)?;
+        Ok(Self { root: root.to_owned() })
+    }
+
+    /// Keeps a job's record in place of its earlier one: on the device when this returns.
+    pub(super) fn keep(&self, record: &JobRecord) -> io::Result<()> {
+        files::write_whole(&self.job(&record.view.id), &serde_json::to_vec(record)?)
+    }
+
+    /// Keeps a job's record so that it outlives the process, but perhaps not the power: for what would be found out again.
+    pub(super) fn note(&self, record: &JobRecord) -> io::Result<()> {
+        files::write_soon(&self.job(&record.view.id), &serde_json::to_vec(record)?)
+    }
+
+    /// Forgets a job's record.
+    pub(super) fn forget(&self, id: &str) -> io::Result<()> {
+        match fs::remove_file(self.job(id)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            other => other,
+        }
+    }
+
+    /// All records that can be read, the oldest first; one that cannot is told to the log and left alone.
+    pub(super) fn jobs(&self) -> io::Result<Vec<JobRecord>> {
+        let mut records: Vec<JobRecord> = Vec::new();
+        for entry in fs::read_dir(self.root.join("jobs"))? {
+            let path = entry?.path();
+            match read_json(&path) {
+                Ok(Some(record)) => records.push(record),
+                Ok(None) => {}
+                Err(error) => tracing::error!(file = %path.display(), %error, "unreadable job record"),
+            }
+        }
+        records.sort_by(|a, b| a.view.id.cmp(&b.view.id));
+        Ok(records)
+    }
+
+    /// What the same work left earlier.
+    pub(super) fn answer(&self, work: Digest) -> io::Result<Option<Answer>> {
+        read_json(&self.answer_path(work))
+    }
+
+    /// Keeps what work left. If the power fails first, the work is done again.
+    pub(super) fn note_answer(&self, work: Digest, answer: &Answer) -> io::Result<()> {
+        files::write_soon(&self.answer_path(work), &serde_json::to_vec(answer)?)
+    }
+
+    /// Forgets the answers that no job has any more.
+    pub(super) fn sweep(&self, needed: impl Fn(Digest) -> bool) -> io::Result<()> {
+        for entry in fs::read_dir(self.root.join("answers"))? {
+            let path = entry?.path();
+            let stem = path.file_stem().map(|stem| format!("sha256:{}", stem.to_string_lossy())).unwrap_or_default();
+            if stem.parse().is_ok_and(|work| !needed(work)) {
+                fs::remove_file(path)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn job(&self, id: &str) -> PathBuf {
+        self.root.join("jobs").join(format!("{id}.json"))
+    }
+
+    fn answer_path(&self, work: Digest) -> PathBuf {
+        self.root.join("answers").join(format!("{}.json", work.hex()))
+    }
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> io::Result<Option<T>> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(serde_json::from_slice(&bytes)?)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+    }
+}

@@ -1,0 +1,433 @@
+//! The ledger of several processes, in a PostgreSQL database.
+//!
+//! A job is a row, and every change of it is one transaction, so that whoever is answered is answered from what is
+//! committed. A worker holds a job by a lease that it renews; the number of the attempt is the token with which it
+//! writes, and whoever lost the lease has an old one. Changes are told with `NOTIFY`; what a process missed while it was
+//! not listening it finds by looking again.
+
+use std::collections::{HashMap, HashSet};
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
+
+use tokio::runtime::Handle;
+use tokio::sync::Notify;
+use tokio_postgres::error::SqlState;
+
+use super::desk::{DeskLimits, Gauges, JobFilter};
+use super::live::LiveJob;
+use super::record::{Answer, Ending, JobRecord, JobState, JobView, Output};
+use super::refusal;
+use crate::digest::Digest;
+use crate::documents::kind_word;
+use crate::problem::Problem;
+use crate::store::Store;
+use pool::{Failure, Pool};
+
+mod pool;
+mod rows;
+mod upkeep;
+
+/// How long one question, with all its statements, may take.
+const PATIENCE: Duration = Duration::from_secs(6);
+
+/// Between two looks at the queue when nothing is told.
+const LOOK_AGAIN: Duration = Duration::from_secs(1);
+
+/// The version of the tables in `schema.sql`.
+const SCHEMA: i32 = 1;
+
+/// The ledger.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pool: Pool,
+    limits: DeskLimits,
+    lease: Duration,
+    store: Arc<Store>,
+    runtime: Handle,
+    /// Jobs that somebody in this process looks at.
+    mirrors: Mutex<HashMap<String, Weak<LiveJob>>>,
+    /// Jobs that workers of this process are at.
+    held: Mutex<HashMap<String, Arc<LiveJob>>>,
+    /// Something may wait.
+    arrived: Notify,
+    closed: AtomicBool,
+    /// Whether changes are heard as they happen.
+    listening: AtomicBool,
+}
+
+impl Shared {
+    /// Opens the ledger, makes its tables if they are not there, and starts to listen and to look after leases.
+    pub(super) async fn open(
+        database: &str,
+        lease: Duration,
+        store: Arc<Store>,
+        limits: DeskLimits,
+        runtime: Handle,
+    ) -> Result<Arc<Self>, Problem> {
+        let ledger = Arc::new(Self {
+            pool: Pool::new(database)?,
+            limits,
+            lease,
+            store,
+            runtime,
+            mirrors: Mutex::default(),
+            held: Mutex::default(),
+            arrived: Notify::new(),
+            closed: AtomicBool::new(false),
+            listening: AtomicBool::new(false),
+        });
+        ledger.within(ledger.prepare()).await?;
+        upkeep::start(&ledger);
+        Ok(ledger)
+    }
+
+    /// Makes the tables. Several processes may start at once: one makes them, the others wait for it.
+    async fn prepare(&self) -> Result<(), Failure> {
+        let mut client = self.pool.get().await?;
+        let transaction = client.transaction().await?;
+        transaction.execute("SELECT pg_advisory_xact_lock(hashtextextended('lacuna schema', 0))", &[]).await?;
+        transaction.batch_execute("CREATE TABLE IF NOT EXISTS lacuna_schema (version integer NOT NULL)").await?;
+        let found: Option<i32> = transaction.query_opt("SELECT version FROM lacuna_schema", &[]).await?.map(|row| row.get(0));
+        match found {
+            Some(SCHEMA) => {}
+            Some(version) => {
+                let detail = format!("The database has tables of version {version}; this program reads version {SCHEMA}");
+                return Err(Problem::new(crate::problem::ProblemKind::Usage, detail).code("database-version").into());
+            }
+            None => {
+                transaction.batch_execute(include_str!("schema.sql")).await?;
+                transaction.execute("INSERT INTO lacuna_schema (version) VALUES ($1)", &[&SCHEMA]).await?;
+            }
+        }
+        transaction.commit().await?;
+        client.done();
+        Ok(())
+    }
+
+    /// Asks the database, but not for longer than it may take.
+    async fn within<T>(&self, question: impl Future<Output = Result<T, Failure>>) -> Result<T, Problem> {
+        match tokio::time::timeout(PATIENCE, question).await {
+            Ok(answer) => answer.map_err(Problem::from),
+            Err(_) => Err(pool::away()),
+        }
+    }
+
+    pub(super) fn submit(&self, record: JobRecord) -> Result<(Arc<LiveJob>, bool), Problem> {
+        let known = self.runtime.block_on(self.within(self.known_answer(&record)))?;
+        // The store is asked outside of the transaction, which others wait for.
+        let whole = |answer: &Answer| answer.outputs.iter().try_fold(true, |all, o| Ok(all && self.store.holds_result(o.digest)?));
+        let known = match known.as_ref().map(whole).transpose() {
+            Ok(Some(true)) => known,
+            Ok(_) => None,
+            Err(error) => return Err(Problem::io("earlier results could not be looked for", &error)),
+        };
+        let (record, revision, replayed) = self.runtime.block_on(self.within(self.accept(record, known)))?;
+        Ok((self.mirror(record, revision), replayed))
+    }
+
+    async fn known_answer(&self, record: &JobRecord) -> Result<Option<Answer>, Failure> {
+        let client = self.pool.get().await?;
+        let row = client.query_opt("SELECT answer FROM lacuna_answers WHERE work = $1", &[&record.work.hex()]).await?;
+        client.done();
+        Ok(row.map(|row| serde_json::from_str(row.get(0))).transpose()?)
+    }
+
+    async fn accept(&self, mut record: JobRecord, known: Option<Answer>) -> Result<(JobRecord, u64, bool), Failure> {
+        let mut client = self.pool.get().await?;
+        let transaction = client.transaction().await?;
+        // One submission of an owner at a time: keys are used once, and shares are counted exactly.
+        transaction.execute("SELECT pg_advisory_xact_lock(hashtextextended('lacuna owner ' || $1, 0))", &[&record.owner]).await?;
+        if let Some(used) = &record.idempotency {
+            let question = format!("SELECT {} FROM lacuna_jobs WHERE owner = $1 AND idempotency_key = $2", rows::COLUMNS);
+            if let Some(row) = transaction.query_opt(&question, &[&record.owner, &used.key.hex()]).await? {
+                let (first, revision) = rows::read(&row)?;
+                if first.idempotency.as_ref().map(|first| first.body) != Some(used.body) {
+                    return Err(refusal::key_used_otherwise().into());
+                }
+                drop(transaction);
+                client.done();
+                return Ok((first, revision, true));
+            }
+        }
+        // Nobody sweeps the answer's files before this job, which names them, is committed.
+        let question = "SELECT answer FROM lacuna_answers WHERE work = $1 FOR KEY SHARE";
+        let kept = transaction.query_opt(question, &[&record.work.hex()]).await?.is_some();
+        match known.filter(|_| kept) {
+            Some(answer) => record.view.finish(answer, true),
+            None => {
+                let question = "SELECT count(*) FILTER (WHERE owner = $1), count(*) FILTER (WHERE state = 'queued')
+                    FROM lacuna_jobs WHERE state IN ('queued', 'running', 'cancelling')";
+                let row = transaction.query_one(question, &[&record.owner]).await?;
+                let (theirs, waiting): (i64, i64) = (row.get(0), row.get(1));
+                let reached = |count: i64, limit: usize| usize::try_from(count).is_ok_and(|count| count >= limit);
+                if reached(theirs, self.limits.per_owner) {
+                    return Err(refusal::too_many("this key", self.limits.per_owner).into());
+                }
+                if reached(waiting, self.limits.queued) {
+                    return Err(refusal::too_many("all callers", self.limits.queued).into());
+                }
+            }
+        }
+        rows::insert(&transaction, &record).await?;
+        transaction.commit().await?;
+        client.done();
+        Ok((record, 1, false))
+    }
+
+    /// The job as this process shows it: one object, however many look at it.
+    fn mirror(&self, record: JobRecord, revision: u64) -> Arc<LiveJob> {
+        let mut mirrors = crate::locked(&self.mirrors);
+        if let Some(job) = mirrors.get(&record.view.id).and_then(Weak::upgrade) {
+            drop(mirrors);
+            job.refresh(record, revision);
+            return job;
+        }
+        let id = record.view.id.clone();
+        let job = Arc::new(LiveJob::at(record, revision));
+        mirrors.insert(id, Arc::downgrade(&job));
+        job
+    }
+
+    pub(super) async fn find(&self, owner: &str, id: &str) -> Result<Option<Arc<LiveJob>>, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let question = format!("SELECT {} FROM lacuna_jobs WHERE id = $1 AND owner = $2", rows::COLUMNS);
+            let row = client.query_opt(&question, &[&id, &owner]).await?;
+            client.done();
+            row.map(|row| rows::read(&row)).transpose()
+        };
+        Ok(self.within(asked).await?.map(|(record, revision)| self.mirror(record, revision)))
+    }
+
+    pub(super) async fn page(&self, owner: &str, filter: &JobFilter, length: usize) -> Result<Vec<JobView>, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let question = format!(
+                "SELECT {} FROM lacuna_jobs WHERE owner = $1 AND ($2::text IS NULL OR state = $2) AND ($3::text IS NULL OR kind = $3)
+                AND ($4::text IS NULL OR id < $4) ORDER BY id DESC LIMIT $5",
+                rows::COLUMNS
+            );
+            let (state, kind) = (filter.state.map(JobState::word), filter.kind.map(kind_word));
+            let length = i64::try_from(length).unwrap_or(i64::MAX);
+            let rows = client.query(&question, &[&owner, &state, &kind, &filter.before, &length]).await?;
+            client.done();
+            rows.iter().map(|row| rows::read(row).map(|(record, _)| record.view)).collect()
+        };
+        self.within(asked).await
+    }
+
+    pub(super) async fn find_output(&self, owner: &str, digest: Digest) -> Result<Option<Output>, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let question = format!(
+                "SELECT {} FROM lacuna_jobs WHERE owner = $1 AND results @> ARRAY[$2::text] ORDER BY id DESC LIMIT 1",
+                rows::COLUMNS
+            );
+            let row = client.query_opt(&question, &[&owner, &digest.hex()]).await?;
+            client.done();
+            row.map(|row| rows::read(&row)).transpose()
+        };
+        let found = self.within(asked).await?;
+        Ok(found.and_then(|(record, _)| record.view.outputs.into_iter().find(|output| output.digest == digest)))
+    }
+
+    pub(super) async fn gauges(&self) -> Result<Gauges, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let question = "SELECT count(*) FILTER (WHERE state = 'queued'), count(*) FILTER (WHERE state IN ('running', 'cancelling')),
+                count(*) FROM lacuna_jobs";
+            let row = client.query_one(question, &[]).await?;
+            client.done();
+            let count = |place: usize| u64::try_from(row.get::<_, i64>(place)).unwrap_or(0);
+            Ok(Gauges { queued: count(0), running: count(1), kept: count(2) })
+        };
+        self.within(asked).await
+    }
+
+    pub(super) fn cancel(&self, job: &LiveJob) -> Result<JobView, Problem> {
+        let id = job.id();
+        let asked = async {
+            let mut client = self.pool.get().await?;
+            let transaction = client.transaction().await?;
+            let Some((mut record, mut revision)) = rows::locked(&transaction, &id).await? else { return Ok(None) };
+            let before = record.view.state;
+            match before {
+                JobState::Queued => record.view.end_cancelled(),
+                JobState::Running => record.view.state = JobState::Cancelling,
+                _ => {}
+            }
+            if record.view.state != before {
+                rows::update(&transaction, &record, self.lease).await?;
+                revision += 1;
+            }
+            transaction.commit().await?;
+            client.done();
+            Ok(Some((record, revision)))
+        };
+        if let Some((record, revision)) = self.runtime.block_on(self.within(asked))? {
+            job.refresh(record, revision);
+        }
+        Ok(job.view())
+    }
+
+    pub(super) fn forget(&self, job: &LiveJob) -> Result<(), Problem> {
+        self.cancel(job)?;
+        let id = job.id();
+        let asked = async {
+            let client = self.pool.get().await?;
+            let statement = "WITH gone AS (DELETE FROM lacuna_jobs WHERE id = $1 RETURNING id)
+                SELECT pg_notify($2, 'gone ' || id) FROM gone";
+            client.query(statement, &[&id, &rows::CHANNEL]).await?;
+            client.done();
+            Ok(())
+        };
+        self.runtime.block_on(self.within(asked))
+    }
+
+    /// Waits for the next job whose work nobody is at; none once the ledger is closed.
+    pub(super) fn take(self: &Arc<Self>) -> Option<Arc<LiveJob>> {
+        self.runtime.block_on(async {
+            loop {
+                let arrived = self.arrived.notified();
+                if self.closed.load(Ordering::SeqCst) {
+                    return None;
+                }
+                match self.within(self.take_one()).await {
+                    Ok(Some(job)) => {
+                        crate::locked(&self.held).insert(job.id(), Arc::clone(&job));
+                        upkeep::keep_alive(self, &job);
+                        return Some(job);
+                    }
+                    Ok(None) => {}
+                    Err(problem) => tracing::warn!(detail = %problem.detail, "the queue cannot be looked at"),
+                }
+                let _ = tokio::time::timeout(LOOK_AGAIN, arrived).await;
+            }
+        })
+    }
+
+    async fn take_one(&self) -> Result<Option<Arc<LiveJob>>, Failure> {
+        loop {
+            let mut client = self.pool.get().await?;
+            let transaction = client.transaction().await?;
+            let question = format!(
+                "SELECT {} FROM lacuna_jobs job WHERE state = 'queued' AND NOT EXISTS
+                (SELECT FROM lacuna_jobs other WHERE other.work = job.work AND other.state IN ('running', 'cancelling'))
+                ORDER BY number LIMIT 1 FOR UPDATE OF job SKIP LOCKED",
+                rows::COLUMNS
+            );
+            let Some(row) = transaction.query_opt(&question, &[]).await? else {
+                drop(transaction);
+                client.done();
+                return Ok(None);
+            };
+            let (mut record, revision) = rows::read(&row)?;
+            record.view.start();
+            match rows::update(&transaction, &record, self.lease).await {
+                Ok(()) => {}
+                // Another worker has just started equal work: this job waits for its answer.
+                Err(Failure::Database(error)) if error.code() == Some(&SqlState::UNIQUE_VIOLATION) => continue,
+                Err(error) => return Err(error),
+            }
+            transaction.commit().await?;
+            client.done();
+            return Ok(Some(Arc::new(LiveJob::at(record, revision + 1))));
+        }
+    }
+
+    /// Records how a job ended, and ends the jobs with it that wait for the same work; none if it is another's by now.
+    pub(super) fn conclude(&self, job: &LiveJob, ending: &Ending) -> Result<Option<JobState>, Problem> {
+        let state = self.runtime.block_on(self.within(self.record_end(job, ending)))?;
+        crate::locked(&self.held).remove(&job.id());
+        Ok(state)
+    }
+
+    async fn record_end(&self, job: &LiveJob, ending: &Ending) -> Result<Option<JobState>, Failure> {
+        let (id, attempt) = job.with(|record| (record.view.id.clone(), record.view.attempt));
+        let mut client = self.pool.get().await?;
+        let transaction = client.transaction().await?;
+        let kept = rows::locked(&transaction, &id).await?;
+        // The fence: a later attempt, or an end, was recorded by somebody else.
+        let Some((mut record, _)) = kept.filter(|(record, _)| record.view.attempt == attempt && !record.view.state.is_final()) else {
+            return Ok(None);
+        };
+        record.view.conclude(ending.clone());
+        rows::update(&transaction, &record, self.lease).await?;
+        if let Ending::Done(answer) = ending {
+            rows::keep_answer(&transaction, &record, answer).await?;
+            let question = format!("SELECT {} FROM lacuna_jobs WHERE state = 'queued' AND work = $1 FOR UPDATE SKIP LOCKED", rows::COLUMNS);
+            for row in transaction.query(&question, &[&record.work.hex()]).await? {
+                let (mut follower, _) = rows::read(&row)?;
+                follower.view.finish((**answer).clone(), true);
+                rows::update(&transaction, &follower, self.lease).await?;
+            }
+        }
+        transaction.commit().await?;
+        client.done();
+        Ok(Some(record.view.state))
+    }
+
+    pub(super) fn probe(&self) -> Result<(), Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            client.query_one("SELECT 1", &[]).await?;
+            client.done();
+            Ok(())
+        };
+        self.runtime.block_on(self.within(asked))
+    }
+
+    /// Forgets jobs that ended longer ago than `age`, then the answers and files that no job has.
+    pub(super) fn sweep(&self, age: Duration) -> Result<usize, Problem> {
+        let forgotten = async {
+            let client = self.pool.get().await?;
+            let old = "now() - $1 * interval '1 second'";
+            client.execute(&format!("DELETE FROM lacuna_jobs WHERE finished < {old}"), &[&age.as_secs_f64()]).await?;
+            let statement = format!(
+                "DELETE FROM lacuna_answers WHERE made < {old}
+                AND NOT EXISTS (SELECT FROM lacuna_jobs WHERE lacuna_jobs.work = lacuna_answers.work)"
+            );
+            client.execute(&statement, &[&age.as_secs_f64()]).await?;
+            client.done();
+            Ok(())
+        };
+        self.runtime.block_on(self.within(forgotten))?;
+        // After the answers have gone nobody can begin to need their files.
+        let needed = || {
+            let asked = self.runtime.block_on(self.within(self.needed()));
+            asked.map_err(|problem| io::Error::new(io::ErrorKind::NetworkUnreachable, problem.detail))
+        };
+        self.store.sweep(needed).map_err(|error| Problem::io("sweeping", &error))
+    }
+
+    async fn needed(&self) -> Result<HashSet<Digest>, Failure> {
+        let client = self.pool.get().await?;
+        let digest = |hex: &str| format!("sha256:{hex}").parse::<Digest>().ok();
+        let mut needed = HashSet::new();
+        for row in client.query("SELECT document, results FROM lacuna_jobs", &[]).await? {
+            needed.extend(digest(row.get(0)));
+            needed.extend(row.get::<_, Vec<&str>>(1).into_iter().filter_map(digest));
+        }
+        for row in client.query("SELECT answer FROM lacuna_answers", &[]).await? {
+            let answer: Answer = serde_json::from_str(row.get(0))?;
+            needed.extend(answer.outputs.iter().map(|output| output.digest));
+        }
+        client.done();
+        Ok(needed)
+    }
+
+    /// Hands out no more jobs.
+    pub(super) fn close(&self) {
+        self.closed.store(true, Ordering::SeqCst);
+        self.arrived.notify_waiters();
+    }
+
+    /// Stops what runs here, so that another process takes it up.
+    pub(super) fn interrupt(&self) {
+        for job in crate::locked(&self.held).values() {
+            job.cancel.fire(lacuna_kernel::budget::StopReason::Cancelled);
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Records as rows: the only file, with the schema, that has SQL for a single job.
+
+use std::time::Duration;
+
+use tokio_postgres::types::ToSql;
+use tokio_postgres::{Row, Transaction};
+
+use super::pool::Failure;
+use crate::jobs::record::{Answer, JobRecord, JobState, JobView, Output, Step};
+
+/// The channel on which changes are told.
+pub(super) const CHANNEL: &str = "lacuna";
+
+/// What a row must have for [`read`].
+pub(super) const COLUMNS: &str = "record, progress, revision";
+
+/// A record and its revision.
+pub(super) fn read(row: &Row) -> Result<(JobRecord, u64), Failure> {
+    let mut record: JobRecord = serde_json::from_str(row.try_get("record")?)?;
+    let progress: Option<&str> = row.try_get("progress")?;
+    if !record.view.state.is_final() {
+        record.view.progress = progress.map(serde_json::from_str::<Step>).transpose()?;
+    }
+    let revision: i64 = row.try_get("revision")?;
+    Ok((record, u64::try_from(revision).unwrap_or(0)))
+}
+
+/// The record of a job, which stays as it is until the transaction ends.
+pub(super) async fn locked(transaction: &Transaction<'_>, id: &str) -> Result<Option<(JobRecord, u64)>, Failure> {
+    let question = format!("SELECT {COLUMNS} FROM lacuna_jobs WHERE id = $1 FOR UPDATE");
+    transaction.query_opt(&question, &[&id]).await?.map(|row| read(&row)).transpose()
+}
+
+/// Puts a new job into its place and tells of it.
+pub(super) async fn insert(transaction: &Transaction<'_>, record: &JobRecord) -> Result<(), Failure> {
+    let statement = "INSERT INTO lacuna_jobs (id, owner, kind, state, work, document, attempt, record, idempotency_key, results, finished)
+        VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, CASE WHEN $11 THEN now() END)";
+    let view = &record.view;
+    let key = record.idempotency.as_ref().map(|used| used.key.hex());
+    let values: [&(dyn ToSql + Sync); 11] = [
+        &view.id,
+        &record.owner,
+        &crate::documents::kind_word(view.kind),
+        &view.state.word(),
+        &record.work.hex(),
+        &record.document.hex(),
+        &attempt(view),
+        &serde_json::to_string(record)?,
+        &key,
+        &results(&view.outputs),
+        &view.state.is_final(),
+    ];
+    transaction.execute(statement, &values).await?;
+    tell(transaction, view).await
+}
+
+/// Changes a job's record, which is [`locked`], and tells of it; the lease is the time for which a worker has it.
+pub(super) async fn update(transaction: &Transaction<'_>, record: &JobRecord, lease: Duration) -> Result<(), Failure> {
+    let statement = "UPDATE lacuna_jobs SET state = $2, attempt = $3, record = $4, results = $5, revision = revision + 1, progress = NULL,
+        finished = CASE WHEN $6 THEN now() END,
+        lease_until = CASE WHEN $7 THEN now() + $8 * interval '1 second' ELSE lease_until END
+        WHERE id = $1";
+    let view = &record.view;
+    let values: [&(dyn ToSql + Sync); 8] = [
+        &view.id,
+        &view.state.word(),
+        &attempt(view),
+        &serde_json::to_string(record)?,
+        &results(&view.outputs),
+        &view.state.is_final(),
+        &(view.state == JobState::Running),
+        &lease.as_secs_f64(),
+    ];
+    transaction.execute(statement, &values).await?;
+    tell(transaction, view).await
+}
+
+/// What the same work left.
+pub(super) async fn keep_answer(transaction: &Transaction<'_>, record: &JobRecord, answer: &Answer) -> Result<(), Failure> {
+    let statement = "INSERT INTO lacuna_answers (work, answer) VALUES ($1, $2)
+        ON CONFLICT (work) DO UPDATE SET answer = excluded.answer, made = now()";
+    transaction.execute(statement, &[&record.work.hex(), &serde_json::to_string(answer)?]).await?;
+    Ok(())
+}
+
+/// Heard by every process when the transaction is committed.
+async fn tell(transaction: &Transaction<'_>, view: &JobView) -> Result<(), Failure> {
+    let payload = format!("{} {}", view.state.word(), view.id);
+    transaction.execute("SELECT pg_notify($1, $2)", &[&CHANNEL, &payload]).await?;
+    Ok(())
+}
+
+/// The attempt as the database counts it.
+pub(super) fn attempt(view: &JobView) -> i32 {
+    i32::try_from(view.attempt).unwrap_or(i32::MAX)
+}
+
+fn results(outputs: &[Output]) -> Vec<String> {
+    outputs.iter().map(|output| output.digest.hex()).collect()
+}

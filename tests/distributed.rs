@@ -1,0 +1,304 @@
+//! Front ends and workers as processes of their own, over a real PostgreSQL and an S3 server.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use lacuna_tests::support::binary::lacuna;
+use lacuna_tests::support::cases;
+use lacuna_tests::support::objects::Objects;
+use lacuna_tests::support::postgres::Postgres;
+use lacuna_tests::support::scratch::Scratch;
+use lacuna_tests::support::service::Service;
+use serde_json::{Value, json};
+
+/// Seconds of a worker's lease: short, so that tests need not wait long for a dead one.
+const LEASE: &str = "2";
+
+/// How long anything may take that takes a moment on an idle machine.
+const PATIENCE: Duration = Duration::from_secs(90);
+
+fn model(name: &str) -> Value {
+    serde_json::from_slice(&std::fs::read(cases::named(name).model()).unwrap()).unwrap()
+}
+
+/// A small solid, a different one for every number.
+fn order(number: u32) -> Value {
+    json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"), "outputs": ["stl", "3mf"],
+        "params": { "tolerance_mm": 0.05, "radius_mm": 1.0 + f64::from(number) / 64.0 } })
+}
+
+/// Work for minutes that is quickly accepted, a different one for every number.
+fn long_order(number: u32) -> Value {
+    let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
+    json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
+        "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
+}
+
+/// A database, an object store and a folder for scratch files.
+struct Stage {
+    database: Postgres,
+    objects: Objects,
+    scratch: Scratch,
+}
+
+impl Stage {
+    fn set() -> Option<Self> {
+        Some(Self { database: Postgres::start()?, objects: Objects::start()?, scratch: Scratch::new() })
+    }
+
+    fn start(&self, role: &str, name: &str) -> Service {
+        let (database, endpoint) = (self.database.url(), self.objects.endpoint());
+        let environment = [
+            ("LACUNA_ROLE", role),
+            ("LACUNA_DATABASE_URL", database.as_str()),
+            ("LACUNA_OBJECTS_URL", "s3://parts/lacuna"),
+            ("AWS_ENDPOINT_URL", endpoint.as_str()),
+            ("AWS_REGION", "us-east-1"),
+            ("AWS_ACCESS_KEY_ID", "tests"),
+            ("AWS_SECRET_ACCESS_KEY", "hidden-from-everybody"),
+            ("LACUNA_LEASE_SECONDS", LEASE),
+            ("LACUNA_WORKERS", "1"),
+            ("LACUNA_SUBMISSIONS_PER_MINUTE", "100000"),
+        ];
+        Service::start_with(&self.scratch.join(name), &environment)
+    }
+}
+
+/// Submits and gives the id.
+#[track_caller]
+fn submit(front: &Service, order: &Value) -> String {
+    let answer = front.post("/v1/jobs", order);
+    assert!(matches!(answer.status, 200 | 202), "{}: {}", answer.status, answer.json());
+    answer.json()["id"].as_str().unwrap().to_owned()
+}
+
+fn view(front: &Service, id: &str) -> Value {
+    front.get(&format!("/v1/jobs/{id}")).json()
+}
+
+#[track_caller]
+fn until(what: &str, mut reached: impl FnMut() -> bool) -> Duration {
+    let start = Instant::now();
+    while !reached() {
+        assert!(start.elapsed() < PATIENCE, "not reached: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    start.elapsed()
+}
+
+/// The number of the worker that says it has started a job.
+fn taker(workers: &[Option<Service>], id: &str, attempt: u32) -> Option<usize> {
+    let attempt = format!("attempt={attempt}");
+    workers.iter().position(|worker| worker.as_ref().is_some_and(|worker| worker.said(&["job started", id, &attempt])))
+}
+
+#[test]
+fn any_front_end_answers_for_any_worker() {
+    let Some(stage) = Stage::set() else { return };
+    let (first, second) = (stage.start("front", "first"), stage.start("front", "second"));
+    let workers = [stage.start("worker", "one"), stage.start("worker", "two")];
+
+    // What is accepted here is seen there, and its files are read in parts from either.
+    let id = submit(&first, &order(0));
+    assert_eq!(view(&second, &id)["id"], id.as_str());
+    let job = second.ended(&id);
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let file = &job["outputs"][0];
+    let place = format!("/v1/results/{}", file["digest"].as_str().unwrap());
+    let whole = first.get(&place);
+    assert_eq!((whole.status, whole.body.len() as u64), (200, file["bytes"].as_u64().unwrap()));
+    let part = second.get_with(&place, &[("range", "bytes=80-83")]);
+    assert_eq!((part.status, part.body.as_slice()), (206, &whole.body[80..84]));
+    assert_eq!(part.header("content-range"), format!("bytes 80-83/{}", whole.body.len()));
+    assert_eq!(first.get("/v1/jobs").json()["items"], second.get("/v1/jobs").json()["items"]);
+
+    // The same bytes as one process makes.
+    let alone = Service::start(&stage.scratch.join("alone"));
+    let same = alone.done(&order(0));
+    assert_eq!(same["outputs"], job["outputs"]);
+
+    // Models, too, and keys of idempotency.
+    let stored = first.post("/v1/models", &model("meshes/segment")).json();
+    let by_reference = json!({ "lacuna": 1, "kind": "measure", "model_ref": stored["id"], "params": { "tolerance_mm": 0.1 } });
+    assert_eq!(second.done(&by_reference)["state"], "succeeded");
+    let keyed = |front: &Service, order: &Value| front.post_with("/v1/jobs", &[("idempotency-key", "k")], order.to_string().as_bytes());
+    let (one, other) = (keyed(&first, &order(1)), keyed(&second, &order(1)));
+    assert_eq!((one.json()["id"].clone(), other.header("idempotency-replayed")), (other.json()["id"].clone(), "true"));
+    assert_eq!(keyed(&second, &order(2)).status, 422);
+
+    // A worker tells how it is, and nothing else; nobody tells secrets.
+    assert_eq!((workers[0].get("/readyz").status, workers[0].get("/v1/jobs").status), (200, 404));
+    for process in [&first, &workers[0]] {
+        assert!(!process.said(&["hidden-from-everybody"]) && !process.said(&["not-asked-for"]));
+    }
+    assert_eq!(first.delete(&format!("/v1/jobs/{id}")).status, 204);
+    assert_eq!(second.get(&format!("/v1/jobs/{id}")).status, 404);
+}
+
+#[test]
+fn equal_orders_at_once_at_two_front_ends_are_one_work() {
+    let Some(stage) = Stage::set() else { return };
+    let fronts = [stage.start("front", "first"), stage.start("front", "second")];
+    // Orders first, workers then: all wait at the same time.
+    let ids: Vec<String> = std::thread::scope(|scope| {
+        let send = |k: usize| submit(&fronts[k % 2], &order(0));
+        let threads: Vec<_> = (0..8).map(|k| scope.spawn(move || send(k))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    let _workers = [stage.start("worker", "one"), stage.start("worker", "two")];
+    let jobs: Vec<Value> = ids.iter().map(|id| fronts[0].ended(id)).collect();
+    assert!(jobs.iter().all(|job| job["state"] == "succeeded" && job["outputs"] == jobs[0]["outputs"]), "{jobs:?}");
+    let worked = jobs.iter().filter(|job| job["attempt"] == 1).count();
+    let reused = jobs.iter().filter(|job| job["attempt"] == 0 && job["reused"] == true).count();
+    assert_eq!((worked, reused), (1, 7));
+}
+
+#[test]
+fn a_job_is_stopped_from_another_process_and_its_events_are_told_there() {
+    let Some(stage) = Stage::set() else { return };
+    let (first, second) = (stage.start("front", "first"), stage.start("front", "second"));
+    let _worker = stage.start("worker", "one");
+    let mut longest = Duration::ZERO;
+    for number in 0..3 {
+        let id = submit(&first, &long_order(number));
+        let mut events = TcpStream::connect(second.address).unwrap();
+        events.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: lacuna\r\n\r\n").unwrap();
+        until("progress", || view(&second, &id)["progress"]["phase"].is_string());
+        let stopped = Instant::now();
+        let answer = second.post(&format!("/v1/jobs/{id}/cancel"), &json!({}));
+        assert!(matches!(answer.status, 200 | 202), "{}", answer.status);
+        until("cancelled", || view(&first, &id)["state"] == "cancelled");
+        longest = longest.max(stopped.elapsed());
+        let told: Vec<String> = BufReader::new(events).lines().map_while(Result::ok).take_while(|line| line != "event: done").collect();
+        for event in ["event: state", "event: progress"] {
+            assert!(told.iter().any(|line| line == event), "{event} in {told:?}");
+        }
+    }
+    eprintln!("from the wish at one front end to `cancelled` at the other, with the worker in a third process: {longest:?}");
+    assert!(longest < Duration::from_secs(2), "{longest:?}");
+}
+
+#[test]
+fn a_dead_worker_s_job_is_another_s_and_a_job_that_kills_is_given_up() {
+    let Some(stage) = Stage::set() else { return };
+    let front = stage.start("front", "front");
+    let mut workers = [Some(stage.start("worker", "one")), Some(stage.start("worker", "two"))];
+
+    // Killed in the middle of a job, which another worker then does.
+    let id = submit(&front, &long_order(0));
+    until("a start", || taker(&workers, &id, 1).is_some());
+    let dead = taker(&workers, &id, 1).unwrap();
+    workers[dead].take().unwrap().kill();
+    let taken_up = until("a second start", || taker(&workers, &id, 2) == Some(1 - dead));
+    eprintln!("with a lease of {LEASE} s a dead worker's job was taken up after {taken_up:?}");
+    assert_eq!(view(&front, &id)["attempt"], 2);
+
+    // Whoever takes it is killed: after its attempts it is given up, and the service does other work.
+    workers[1 - dead].take().unwrap().kill();
+    let job = front.ended(&id);
+    assert_eq!((&job["state"], &job["problem"]["code"], &job["attempt"]), (&json!("failed"), &json!("interrupted"), &json!(2)), "{job}");
+    let _worker = stage.start("worker", "three");
+    assert_eq!(front.done(&order(0))["state"], "succeeded");
+
+    // A worker that goes down in order gives its job back at once, not after its lease.
+    let leaving = stage.start("worker", "four");
+    let ids: Vec<String> = (1..3).map(|number| submit(&front, &long_order(number))).collect();
+    until("a start", || ids.iter().any(|id| leaving.said(&["job started", id])));
+    for id in &ids {
+        assert_eq!(front.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
+        assert_eq!(front.ended(id)["state"], "cancelled");
+    }
+}
+
+#[test]
+fn a_worker_that_was_given_up_does_not_overwrite() {
+    let Some(stage) = Stage::set() else { return };
+    let front = stage.start("front", "front");
+    let mut workers = [Some(stage.start("worker", "one")), None];
+    let id = submit(&front, &long_order(0));
+    until("a start", || taker(&workers, &id, 1).is_some());
+    // As long as it stands still it cannot renew its lease.
+    workers[0].as_ref().unwrap().signal("STOP");
+    workers[1] = Some(stage.start("worker", "two"));
+    until("a second start", || taker(&workers, &id, 2) == Some(1));
+    workers[0].as_ref().unwrap().signal("CONT");
+    until("the first worker sees it", || workers[0].as_ref().unwrap().said(&["no longer this worker's", &id]));
+    let job = view(&front, &id);
+    assert_eq!((&job["state"], &job["attempt"]), (&json!("running"), &json!(2)), "{job}");
+    // The first worker is free again.
+    assert_eq!(front.done(&order(0))["state"], "succeeded");
+    assert_eq!(front.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
+    assert_eq!(front.ended(&id)["state"], "cancelled");
+}
+
+#[test]
+fn nothing_is_lost_while_the_database_is_away() {
+    let Some(stage) = Stage::set() else { return };
+    let front = stage.start("front", "front");
+    let worker = stage.start("worker", "one");
+    let running = submit(&front, &long_order(0));
+    until("a start", || worker.said(&["job started", &running]));
+    let waiting: Vec<String> = (0..5).map(|number| submit(&front, &order(number))).collect();
+
+    stage.database.stop();
+    let away = Instant::now();
+    let start = Instant::now();
+    for answer in [front.get(&format!("/v1/jobs/{running}")), front.post("/v1/jobs", &order(9)), front.get("/readyz")] {
+        assert_eq!((answer.status, answer.header("content-type")), (503, "application/problem+json"), "{}", answer.json());
+        assert!(answer.header("retry-after").parse::<u32>().unwrap() > 0);
+    }
+    assert!(start.elapsed() < Duration::from_secs(30), "refused after {:?}", start.elapsed());
+    assert_eq!(front.get("/livez").status, 200);
+    // Five times the lease: nobody may be given up for it.
+    std::thread::sleep(Duration::from_secs(10).saturating_sub(away.elapsed()));
+    stage.database.resume();
+
+    let back = until("ready", || front.get("/readyz").status == 200);
+    eprintln!("ready {back:?} after the database was back");
+    assert_eq!(view(&front, &running)["attempt"], 1, "the worker kept its job");
+    assert!(!worker.said(&["the lease is lost"]));
+    assert_eq!(front.post(&format!("/v1/jobs/{running}/cancel"), &json!({})).status / 100, 2);
+    assert_eq!(front.ended(&running)["state"], "cancelled");
+    for id in &waiting {
+        let job = front.ended(id);
+        assert_eq!((&job["state"], &job["attempt"]), (&json!("succeeded"), &json!(1)), "{job}");
+    }
+    assert_eq!(front.done(&order(9))["state"], "succeeded");
+}
+
+#[test]
+fn a_job_that_ends_while_database_and_store_are_away_is_recorded_when_they_are_back() {
+    let Some(stage) = Stage::set() else { return };
+    let front = stage.start("front", "front");
+    let worker = stage.start("worker", "one");
+    // Longer than the outage begins after, shorter than it lasts.
+    let mut medium = order(0);
+    medium["params"]["tolerance_mm"] = json!(0.0004);
+    let id = submit(&front, &medium);
+    until("a start", || worker.said(&["job started", &id]));
+    stage.database.stop();
+    stage.objects.signal("STOP");
+    std::thread::sleep(Duration::from_secs(6));
+    stage.objects.signal("CONT");
+    stage.database.resume();
+    let job = {
+        until("ready", || front.get("/readyz").status == 200);
+        front.ended(&id)
+    };
+    assert_eq!((&job["state"], &job["attempt"]), (&json!("succeeded"), &json!(1)), "{job}");
+    let digest = job["outputs"][0]["digest"].as_str().unwrap();
+    assert_eq!(front.get(&format!("/v1/results/{digest}")).status, 200);
+}
+
+#[test]
+fn parts_of_a_service_ask_for_what_they_share() {
+    let doctor = |pairs: &[(&str, &str)]| std::process::Command::new(lacuna()).arg("doctor").envs(pairs.iter().copied()).output().unwrap();
+    let output = doctor(&[("LACUNA_ROLE", "worker")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("LACUNA_DATABASE_URL"));
+    let output = doctor(&[("LACUNA_DATABASE_URL", "postgres://ada:s3cret@db/lacuna"), ("LACUNA_OBJECTS_URL", "s3://parts")]);
+    let words = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && words.contains("postgres://ada:***@db/lacuna") && !words.contains("s3cret"), "{words}");
+}
