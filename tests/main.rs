@@ -16,6 +16,7 @@
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `service` | does the running service keep them? |
+//! | `session` | does the page's session by curl run as it stands there? |
 //! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
 //! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
@@ -38,6 +39,7 @@ mod measures;
 mod properties;
 mod remote;
 mod service;
+mod session;
 mod slices;
 mod surface;
 mod uploads;
