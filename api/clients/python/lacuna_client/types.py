@@ -452,6 +452,7 @@ LimitCapability = TypedDict('LimitCapability', {
     'queued_jobs': 'int',
     'retention_hours': 'int',
     'seconds': 'float',
+    'stored_bytes': 'int',
     'submissions_per_minute': 'int',
     'triangles': 'int',
     'upload_bytes': 'int',
