@@ -21,6 +21,7 @@
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
 //! | `distributed` | and several, with their database and object store? |
 //! | `service` | does the running service keep them? |
+//! | `session` | does the page's session by curl run as it stands there? |
 //! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
 //! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
@@ -46,6 +47,7 @@ mod measures;
 mod properties;
 mod remote;
 mod service;
+mod session;
 mod slices;
 mod splits;
 mod surface;

@@ -266,6 +266,21 @@ fn files_that_lie_are_refused_and_leave_nothing() {
 }
 
 #[test]
+fn a_key_keeps_no_more_than_its_share() {
+    let scratch = Scratch::new();
+    let (first, second) = (cube(0.0, 1.0), cube(0.0, 2.0));
+    let share = (first.len() + second.len() - 1).to_string();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_STORED_BYTES_PER_KEY", &share)]);
+    let id = uploaded(&service, "a.obj", first.as_bytes())["id"].as_str().unwrap().to_owned();
+    let headers = [("content-type", "model/obj")];
+    refused(&upload(&service, &headers, second.as_bytes()), 422, "limit.stored-bytes");
+    // The same again is no more; and what is forgotten makes room.
+    assert_eq!(upload(&service, &headers, first.as_bytes()).status, 200);
+    assert_eq!(service.delete(&format!("/v1/models/{id}")).status, 204);
+    assert_eq!(upload(&service, &headers, second.as_bytes()).status, 201);
+}
+
+#[test]
 fn a_job_cannot_name_a_mesh_until_memory_ends() {
     let scratch = Scratch::new();
     let service = Service::start_with(scratch.path(), &[("LACUNA_LIMIT_TRIANGLES", "100")]);

@@ -153,7 +153,10 @@ def python_types(schemas):
     for name, schema in schemas.items():
         found = members(schema)
         if found is None:
-            yield f"{name}: TypeAlias = {said.say(schema)!r}\n"
+            kind = said.say(schema)
+            # A name that comes later can only be quoted.
+            later = any(re.search(rf"\b{other}\b", kind) for other in schemas)
+            yield f"{name}: TypeAlias = {repr(kind) if later else kind}\n"
             continue
         fields = []
         for member, value in found[0].items():
@@ -201,22 +204,30 @@ def python_method(operation):
 
 
 def python(contract, operations):
-    """The module of Python."""
-    head = f'''"""The contract of lacuna {contract["info"]["version"]}: its types, and one method for each operation.
+    """The modules of Python: types, and what uses them."""
+    schemas = contract["components"]["schemas"]
+    types = f'''"""The types of lacuna\'s contract {contract["info"]["version"]}.
+
+{NOTE}
+"""
+from typing import Any, Literal, NotRequired, TypeAlias, TypedDict
+
+''' + "\n".join(python_types(schemas))
+    methods = "".join(python_method(operation) for operation in operations)
+    used = sorted(name for name in schemas if re.search(rf"\b{name}\b", re.sub(r'""".*?"""', "", methods, flags=re.DOTALL)))
+    return types, f'''"""The operations of lacuna\'s contract {contract["info"]["version"]}: one method for each.
 
 {NOTE}
 """
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, BinaryIO, Literal, NotRequired, TypeAlias, TypedDict
+from typing import Any, BinaryIO, Literal
 from urllib.parse import quote
 
 from .transport import Answer, Event, Transport
+from .types import {", ".join(used)}
 
-'''
-    methods = "".join(python_method(operation) for operation in operations)
-    return head + "\n".join(python_types(contract["components"]["schemas"])) + f'''
 
 class Api(Transport):
     """One method for each operation. What the service refuses is raised as a `Problem`."""
@@ -232,7 +243,7 @@ def options_type(operation, said):
 
 
 def typescript(contract, operations):
-    """The declarations, and what runs."""
+    """Types, the declarations that use them, and what runs."""
     said = TypeScript()
     types, methods, code = [], [], []
     for name, schema in contract["components"]["schemas"].items():
@@ -244,7 +255,9 @@ def typescript(contract, operations):
         fields = []
         for member, value in found[0].items():
             key = member if member.isidentifier() else json.dumps(member)
-            fields.append(f"{comment(value.get('description'), '  ')}  {key}{'' if member in found[1] else '?'}: {said.say(value)};\n")
+            note = words(value.get("description")).replace("*/", "* /")
+            note = f"/** {note} */ " if note else ""
+            fields.append(f"  {note}{key}{'' if member in found[1] else '?'}: {said.say(value)};\n")
         types.append(f"{about}export interface {name} {{\n{''.join(fields)}}}\n")
     for operation in operations:
         names = [camel(name) for name in operation.path_names]
@@ -272,10 +285,14 @@ def typescript(contract, operations):
         given = [*names, *(["body"] if operation.body is not None else []), "options = {}"]
         call.append("{ " + ", ".join(extra) + " }")
         code.append(f"\n  {camel(operation.name)}({', '.join(given)}) {{\n    return this._{kind}({', '.join(call)});\n  }}\n")
+    declared = f"// {NOTE}\n\n" + "\n".join(types)
+    used = sorted(name for name in contract["components"]["schemas"] if re.search(rf"\b{name}\b", re.sub(r"/\*\*.*?\*/", "", "".join(methods), flags=re.DOTALL)))
     declarations = f'''// {NOTE}
 import {{ ServerEvent, Transport }} from "./transport.js";
+import {{ {", ".join(used)} }} from "./types.js";
 
-{chr(10).join(types)}
+export * from "./types.js";
+
 /** One method for each operation. What the service refuses is thrown as a `ProblemError`. */
 export class Api extends Transport {{
 {"".join(methods)}}}
@@ -286,7 +303,7 @@ import {{ Transport }} from "./transport.js";
 /** One method for each operation. What the service refuses is thrown as a `ProblemError`. */
 export class Api extends Transport {{{"".join(code)}}}
 '''
-    return declarations, runs
+    return declared, declarations, runs
 
 
 def main():
@@ -299,9 +316,12 @@ def main():
         sys.exit(f"operations share names: {sorted(name for name in set(names) if names.count(name) > 1)}")
     if taken := TAKEN.intersection(snake(name) for name in names):
         sys.exit(f"operations are called as members of the clients: {sorted(taken)}; give them another operation_id")
-    declarations, runs = typescript(contract, operations)
+    types, methods = python(contract, operations)
+    declared, declarations, runs = typescript(contract, operations)
     files = {
-        HERE / "python/lacuna_client/api.py": python(contract, operations),
+        HERE / "python/lacuna_client/types.py": types,
+        HERE / "python/lacuna_client/api.py": methods,
+        HERE / "typescript/types.d.ts": declared,
         HERE / "typescript/api.d.ts": declarations,
         HERE / "typescript/api.js": runs,
     }

@@ -135,6 +135,8 @@ pub struct Config {
     pub body_seconds: u64,
     /// Longest mesh file that is taken, in bytes.
     pub upload_bytes: u64,
+    /// Mesh files that one key may keep, in bytes.
+    pub stored_bytes: u64,
     /// Time for a whole upload, in seconds; between two pieces of it `body_seconds` may pass.
     pub upload_seconds: u64,
     /// Time for an answer, in seconds; longer than the longest `Prefer: wait`.
@@ -273,6 +275,7 @@ impl Config {
             header_seconds: reader.take("LACUNA_HEADER_SECONDS", None, 10, COUNT)?,
             body_seconds: reader.take("LACUNA_BODY_SECONDS", None, 30, COUNT)?,
             upload_bytes: reader.take("LACUNA_UPLOAD_BYTES", None, 256 << 20, COUNT)?,
+            stored_bytes: reader.take("LACUNA_STORED_BYTES_PER_KEY", None, 8 << 30, COUNT)?,
             upload_seconds: reader.take("LACUNA_UPLOAD_SECONDS", None, 600, COUNT)?,
             answer_seconds: reader.take("LACUNA_ANSWER_SECONDS", None, 60, COUNT)?,
             queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,

@@ -43,7 +43,7 @@ pub fn document() -> Value {
         "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" }
     });
     document["tags"] = json!([
-        { "name": "models", "description": "Stored models." },
+        { "name": "models", "description": "Stored models and uploaded mesh files." },
         { "name": "studies", "description": "What can be said without computing the shape." },
         { "name": "jobs", "description": "Computations: submitted, followed, stopped." },
         { "name": "results", "description": "Files, by job and by digest." },

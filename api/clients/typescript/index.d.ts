@@ -1,5 +1,6 @@
-import { Api, JobView, Output } from "./api.js";
+import { Api } from "./api.js";
 import { ServerEvent } from "./transport.js";
+import { JobView, Output } from "./types.js";
 
 export * from "./api.js";
 export { ProblemError, ServerEvent, Transport, checkDigest } from "./transport.js";

@@ -49,6 +49,8 @@ pub struct LimitCapability {
     body_bytes: usize,
     /// Bytes of an uploaded mesh file.
     upload_bytes: u64,
+    /// Bytes of all mesh files that one key may keep.
+    stored_bytes: u64,
     /// Seconds that `Prefer: wait` may ask.
     wait_seconds: u64,
     /// Most wall time of a job, in seconds.
@@ -91,6 +93,7 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
         limits: LimitCapability {
             body_bytes: config.body_bytes,
             upload_bytes: config.upload_bytes,
+            stored_bytes: config.stored_bytes,
             wait_seconds: crate::http::headers::LONGEST_WAIT.as_secs(),
             seconds: config.job_limits.seconds,
             memory_bytes: config.job_limits.memory_bytes,

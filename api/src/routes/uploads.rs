@@ -5,6 +5,7 @@ use std::time::Duration;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use lacuna_exchange::format::{FORMATS, Format, ReadLimits};
+use lacuna_kernel::error::LimitFacts;
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
 
@@ -140,10 +141,26 @@ fn keep(state: &AppState, owner: &Owner, told: Told, mut pending: crate::files::
         return Err(Problem::new(ProblemKind::InvalidFile, detail).code("upload.empty"));
     }
     let digest = Digest::of(&bytes);
+    check_share(state, owner, digest, bytes.len() as u64)?;
     let report = inspection::report(&file, bytes.len() as u64)?;
     // The mesh may be large, and the next one waits for its memory.
     drop((file, bytes));
     state.store.keep_upload(&owner.0, told.name, &mut pending, digest, report).map_err(failed)
+}
+
+/// A key that never forgets anything must not fill the disk for all.
+fn check_share(state: &AppState, owner: &Owner, digest: Digest, bytes: u64) -> Result<(), Problem> {
+    let kept = state.store.list_models(&owner.0).map_err(|error| Problem::io("the models could not be counted", &error))?;
+    let others: u64 = kept.iter().filter(|view| view.mesh.is_some() && view.digest != digest).map(|view| view.bytes).sum();
+    let (asked, allowed) = (others.saturating_add(bytes), state.config.stored_bytes);
+    if asked <= allowed {
+        return Ok(());
+    }
+    #[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
+    let facts = LimitFacts { limit: "stored_bytes", asked: asked as f64, allowed: allowed as f64, remedy: None };
+    let detail =
+        format!("the mesh files of this key would have {asked} bytes, and {allowed} may be kept; DELETE /v1/models/ID forgets one");
+    Err(Problem::new(ProblemKind::Limit, detail).code("limit.stored-bytes").limit(&facts))
 }
 
 #[cfg(test)]

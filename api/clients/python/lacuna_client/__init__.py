@@ -7,15 +7,16 @@
     job = client.wait(job["id"])
     client.fetch(job, "3mf", "part.3mf")
 
-`api` has one method for each operation of the contract and is generated; the rest is written by hand.
+`api` has one method for each operation of the contract, `types` its types: both are generated, the rest is written by hand.
 """
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 
-from .api import Api, JobView, ModelView, Output
+from .api import Api
 from .transport import Answer, Event, Problem, check_digest
+from .types import JobView, ModelView, Output
 
 __all__ = ["Answer", "Client", "Event", "Problem", "check_digest"]
 
