@@ -58,14 +58,9 @@ impl PendingFile {
     /// # Errors
     /// As [`PendingFile::commit`].
     pub fn settle(&mut self, target: &Path) -> io::Result<()> {
-        self.rename(target)?;
-        sync_folder(folder_of(target))
-    }
-
-    /// After a power failure there is either the whole file or what stood in its place before.
-    fn rename(&mut self, target: &Path) -> io::Result<()> {
         self.file.sync_all()?;
-        fs::rename(&self.path, target)
+        fs::rename(&self.path, target)?;
+        sync_folder(folder_of(target))
     }
 }
 
@@ -142,15 +137,14 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
     pending.commit(target)
 }
 
-/// Writes a whole file at once, which outlives the process; a power failure soon after may bring back what stood in its
-/// place before.
+/// Writes a whole file at once, which outlives the process, but perhaps not a power failure: for what is found out again.
 ///
 /// # Errors
 /// When the device fails.
 pub fn write_soon(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut pending = PendingFile::create_beside(target)?;
     pending.write_all(bytes)?;
-    pending.rename(target)
+    fs::rename(&pending.path, target)
 }
 
 /// What a model's name leaves for a file name: letters, digits, `-` and `_` of ASCII, 64 at most.

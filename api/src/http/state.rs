@@ -76,8 +76,8 @@ impl AppState {
         let (store, metrics) = (Arc::clone(&desk.store), Arc::clone(&desk.metrics));
         let submissions = RateLimiter::new("submissions", config.submissions_per_minute);
         let calls = RateLimiter::new("calls", config.calls_per_minute);
-        // Twice the workers: reading documents is short, but must not take the memory of many at once.
-        let blocking = Arc::new(Semaphore::new(config.workers * 2));
+        // Reading documents is short, but must not take the memory of many at once; several wait for the device at a time.
+        let blocking = Arc::new(Semaphore::new((config.workers * 2).max(8)));
         Arc::new(Self {
             config,
             desk: Arc::new(desk),

@@ -67,7 +67,7 @@ impl Book {
         }
     }
 
-    /// Takes note of a job that has just ended.
+    /// Takes note of a job that is just ending.
     fn ended(&mut self, record: &JobRecord) {
         self.leave(&record.owner);
         // A job that was forgotten while it ran has nothing to show.
@@ -94,6 +94,7 @@ impl Embedded {
                 record.view.take_up();
                 journal.keep(&record)?;
             }
+            journal.forget_start(&record.view.id)?;
             if let Some(used) = &record.idempotency {
                 book.keys.insert((record.owner.clone(), used.key), Some(record.view.id.clone()));
             }
@@ -240,13 +241,9 @@ impl Embedded {
             // The flag falls before the device is asked: stopping must not wait for it.
             job.stop();
         };
-        let stopped = job.change(stop, |record| self.journal.keep(record));
-        if waited {
-            let mut book = self.book();
-            match &stopped {
-                Ok(()) => job.with(|record| book.ended(record)),
-                Err(_) => book.waiting.push_front((id, job.with(|record| record.work))),
-            }
+        let stopped = job.change(stop, |record| self.settle(record));
+        if waited && stopped.is_err() {
+            self.book().waiting.push_front((id, job.with(|record| record.work)));
         }
         stopped.map(|()| job.view())
     }
@@ -293,10 +290,10 @@ impl Embedded {
         }
     }
 
-    /// Noted before the work: a job that brings the process down is known by its attempt.
+    /// Noted before the work begins.
     fn start(&self, job: &LiveJob) {
         let note = |record: &JobRecord| {
-            if let Err(error) = self.journal.note(record) {
+            if let Err(error) = self.journal.note_start(&record.view.id, record.view.attempt) {
                 tracing::error!(job = %record.view.id, %error, "the start of a job was not noted");
             }
             Ok::<_, std::convert::Infallible>(())
@@ -319,14 +316,15 @@ impl Embedded {
         {
             tracing::warn!(%error, "finished work cannot be found again");
         }
-        job.change(|record| record.view.conclude(ending.clone()), |record| self.keep_unless_forgotten(record))?;
+        job.change(|record| record.view.conclude(ending.clone()), |record| self.settle(record))?;
         let (state, id) = job.with(|record| (record.view.state, record.view.id.clone()));
+        if let Err(error) = self.journal.forget_start(&id) {
+            tracing::warn!(job = %id, %error, "the note of a start is left");
+        }
         let mut book = self.book();
         book.at_work.remove(&work);
         if state == JobState::Queued {
             book.waiting.push_front((id, work));
-        } else {
-            job.with(|record| book.ended(record));
         }
         let followers = match ending {
             Ending::Done(_) => self.followers(&mut book, work),
@@ -350,21 +348,25 @@ impl Embedded {
     }
 
     fn answer_follower(&self, job: &Arc<LiveJob>, answer: &super::record::Answer) {
-        let kept = job.change(|record| record.view.finish(answer.clone(), true), |record| self.keep_unless_forgotten(record));
-        let mut book = self.book();
-        match kept {
-            Ok(()) => job.with(|record| book.ended(record)),
-            Err(error) => {
-                tracing::error!(%error, "a job that has its answer could not be recorded; it waits on");
-                let place = job.with(|record| (record.view.id.clone(), record.work));
-                book.waiting.push_back(place);
-                self.arrived.notify_one();
-            }
+        if let Err(error) = job.change(|record| record.view.finish(answer.clone(), true), |record| self.settle(record)) {
+            tracing::error!(%error, "a job that has its answer could not be recorded; it waits on");
+            let place = job.with(|record| (record.view.id.clone(), record.work));
+            self.book().waiting.push_back(place);
+            self.arrived.notify_one();
         }
     }
 
-    fn keep_unless_forgotten(&self, record: &JobRecord) -> io::Result<()> {
-        if self.book().jobs.contains_key(&record.view.id) { self.journal.keep(record) } else { Ok(()) }
+    /// Puts a changed record on the device, and what follows from it into the book, before anybody hears of the change:
+    /// who is told of an end may ask for the results at once, and submit the next job.
+    fn settle(&self, record: &JobRecord) -> io::Result<()> {
+        let known = self.book().jobs.contains_key(&record.view.id);
+        if known {
+            self.journal.keep(record)?;
+        }
+        if record.view.state.is_final() {
+            self.book().ended(record);
+        }
+        Ok(())
     }
 
     /// Forgets jobs that ended longer ago than `age`, then removes answers and files that no job has.

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::record::{Answer, JobRecord};
+use super::record::{Answer, JobRecord, JobState};
 use crate::digest::Digest;
 use crate::files;
 use crate::store::folder::Folder;
 
-const ROOMS: [&str; 2] = ["jobs", "answers"];
+const ROOMS: [&str; 3] = ["jobs", "starts", "answers"];
 
 /// The rooms of a data folder in which records are kept.
 #[derive(Debug)]
@@ -31,17 +31,20 @@ impl Journal {
         files::write_whole(&self.job(&record.view.id), &serde_json::to_vec(record)?)
     }
 
-    /// Keeps a job's record so that it outlives the process, but perhaps not the power: for what would be found out again.
-    pub(super) fn note(&self, record: &JobRecord) -> io::Result<()> {
-        files::write_soon(&self.job(&record.view.id), &serde_json::to_vec(record)?)
+    /// Notes that a job is started: a job that brings the process down is known by its attempt. A power failure may undo
+    /// the note, and is nothing that a job can bring about; so nobody waits for the device here.
+    pub(super) fn note_start(&self, id: &str, attempt: u32) -> io::Result<()> {
+        files::write_soon(&self.start(id), attempt.to_string().as_bytes())
+    }
+
+    /// Forgets the note of a job whose record says how often it was started.
+    pub(super) fn forget_start(&self, id: &str) -> io::Result<()> {
+        absent_is_fine(fs::remove_file(self.start(id)))
     }
 
     /// Forgets a job's record.
     pub(super) fn forget(&self, id: &str) -> io::Result<()> {
-        match fs::remove_file(self.job(id)) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            other => other,
-        }
+        absent_is_fine(fs::remove_file(self.job(id)))
     }
 
     /// All records that can be read, the oldest first; one that cannot is told to the log and left alone.
@@ -50,13 +53,23 @@ impl Journal {
         for entry in fs::read_dir(self.root.join("jobs"))? {
             let path = entry?.path();
             match read_json(&path) {
-                Ok(Some(record)) => records.push(record),
+                Ok(Some(record)) => records.push(self.with_start(record)),
                 Ok(None) => {}
                 Err(error) => tracing::error!(file = %path.display(), %error, "unreadable job record"),
             }
         }
         records.sort_by(|a, b| a.view.id.cmp(&b.view.id));
         Ok(records)
+    }
+
+    /// The record as it was when the process ended.
+    fn with_start(&self, mut record: JobRecord) -> JobRecord {
+        let noted = fs::read_to_string(self.start(&record.view.id)).ok().and_then(|text| text.parse().ok());
+        if let (JobState::Queued, Some(attempt)) = (record.view.state, noted) {
+            record.view.state = JobState::Running;
+            record.view.attempt = attempt;
+        }
+        record
     }
 
     /// What the same work left earlier.
@@ -85,8 +98,19 @@ impl Journal {
         self.root.join("jobs").join(format!("{id}.json"))
     }
 
+    fn start(&self, id: &str) -> PathBuf {
+        self.root.join("starts").join(id)
+    }
+
     fn answer_path(&self, work: Digest) -> PathBuf {
         self.root.join("answers").join(format!("{}.json", work.hex()))
+    }
+}
+
+fn absent_is_fine(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        other => other,
     }
 }
 
