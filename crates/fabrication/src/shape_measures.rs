@@ -9,6 +9,7 @@ use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::Interval;
+use crate::operand::{is_solid, surfaces};
 use crate::run::JobError;
 
 /// The smallest box around the exact shape, whatever way it is turned.
@@ -68,6 +69,8 @@ pub(crate) fn smallest_box(
     budget: &Budget,
 ) -> Result<Option<OrientedBoxStatement>, JobError> {
     let (points, slack) = match mesh_of(attractor) {
+        // Corners once, and not once for every triangle.
+        _ if is_solid(attractor) => (surfaces(attractor).into_iter().flat_map(|surface| surface.vertices).collect(), 0.0),
         Some((mesh, _)) => (mesh.vertices, 0.0),
         None => sampled(attractor, tolerance, budget)?,
     };
