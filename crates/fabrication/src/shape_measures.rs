@@ -59,7 +59,7 @@ pub struct ThicknessStatement {
 /// Bounds of the smallest box differ by this share of it.
 const RELATIVE: f64 = 1e-3;
 /// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
-const MOST_CELLS: u64 = 300_000;
+const MOST_CELLS: u64 = 30_000;
 
 /// The smallest box of a shape dilated by a radius, 0 for the shape itself.
 pub(crate) fn smallest_box(
