@@ -154,3 +154,27 @@ fn mass_of_a_ball_and_of_a_capsule() {
     assert_within(found.centroid_mm.unwrap()[0], at.x + h / 2.0, 0.5);
     assert_eq!(found.dimension.unwrap().bounds, [3.0, 3.0]);
 }
+
+#[test]
+fn walls_gaps_and_the_smallest_box_of_two_balls() {
+    let vertices = vec![DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 3.0) + 10.0 * DVec3::new(0.6, 0.64, 0.48)];
+    let shape = || Shape::Mesh(PolygonMesh { vertices: vertices.clone(), faces: vec![vec![0], vec![1]], interior: Interior::Surface });
+    let model = || Model { name: None, shape: shape() };
+    let found = measured(model(), Params { radius_mm: Some(2.0), oriented_box: true, thickness: true, ..Params::new(0.02) });
+    let thickness = found.thickness.unwrap();
+    // The mesh lies between balls of 2 - 0.02 and 2 + 0.02, 10 apart: through the middle of one it is 4, between them 6.
+    let [low, high] = thickness.wall.unwrap().least_mm;
+    assert!(3.9 <= low && high <= 4.04, "[{low}, {high}]");
+    let [low, high] = thickness.gap.unwrap().least_mm;
+    assert!(5.96 <= low && high <= 6.2, "[{low}, {high}]");
+    // The smallest box is that of the capsule around both.
+    let smallest = found.oriented_box.unwrap();
+    let [low, high] = smallest.volume_mm3;
+    assert!(low <= 224.0 && 224.0 <= high * (1.0 + 1e-9) && high - low <= 0.3, "[{low}, {high}]");
+    assert!(smallest.complete);
+    // Points themselves have no walls.
+    let inputs = vec![Input { name: "points".into(), model: model(), radius_mm: None }];
+    let params = Params { thickness: true, ..Params::new(0.02) };
+    let job = Job { kind: JobKind::Measure, inputs, params, outputs: Vec::new(), limits: Limits::default() };
+    assert_eq!(run(&job, &Budget::default()).unwrap_err().code, "job.not-a-solid");
+}

@@ -260,13 +260,13 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
         }
-        if job.params.oriented_box {
-            certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
-        }
         if job.params.thickness {
             let surfaces = if is_solid(attractor) { surfaces(attractor) } else { Vec::new() };
             let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
             certificate.thickness = Some(least_thickness(mesh, budget)?);
+        }
+        if job.params.oriented_box {
+            certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
         }
         return Ok(Outcome { geometry: Geometry::None, certificate });
     };

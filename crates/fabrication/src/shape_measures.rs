@@ -9,6 +9,7 @@ use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::Interval;
+use crate::operand::{is_solid, surfaces};
 use crate::run::JobError;
 
 /// The smallest box around the exact shape, whatever way it is turned.
@@ -58,7 +59,7 @@ pub struct ThicknessStatement {
 /// Bounds of the smallest box differ by this share of it.
 const RELATIVE: f64 = 1e-3;
 /// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
-const MOST_CELLS: u64 = 300_000;
+const MOST_CELLS: u64 = 30_000;
 
 /// The smallest box of a shape dilated by a radius, 0 for the shape itself.
 pub(crate) fn smallest_box(
@@ -68,6 +69,8 @@ pub(crate) fn smallest_box(
     budget: &Budget,
 ) -> Result<Option<OrientedBoxStatement>, JobError> {
     let (points, slack) = match mesh_of(attractor) {
+        // Corners once, and not once for every triangle.
+        _ if is_solid(attractor) => (surfaces(attractor).into_iter().flat_map(|surface| surface.vertices).collect(), 0.0),
         Some((mesh, _)) => (mesh.vertices, 0.0),
         None => sampled(attractor, tolerance, budget)?,
     };

@@ -34,6 +34,8 @@ pub struct OrientedBox {
 const REACH: f64 = 1.0965;
 /// Cubes that are looked at, at most.
 const MOST_CUBES: usize = 400_000;
+/// Cubes after which a bound of zero is taken for good: rotations of a cube then differ by less than 0.1.
+const MOST_CUBES_OF_FLAT_SETS: usize = 16_384;
 /// Point products that are made at most, beyond the first cubes.
 const MOST_PRODUCTS: f64 = 4e9;
 /// Relative error of a width: a few products and sums of coordinates seen from the middle of the set.
@@ -178,7 +180,9 @@ pub fn oriented_box(points: &[DVec3], grown: f64, slack: f64, relative: f64, bud
             proven = Some(cube.bound);
             break;
         }
-        if made >= MOST_CUBES || (search.products > MOST_PRODUCTS && made > 4096) {
+        // Where the set is flatter than it is known, no bound is ever above zero.
+        let is_flat = cube.bound == 0.0 && made >= MOST_CUBES_OF_FLAT_SETS;
+        if is_flat || made >= MOST_CUBES || (search.products > MOST_PRODUCTS && made > 4096) {
             cubes.push(cube);
             break;
         }
