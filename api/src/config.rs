@@ -220,9 +220,9 @@ impl Reader<'_> {
 
     /// A text that may be absent; `shown` makes of it what may be told.
     fn perhaps(&mut self, name: &'static str, flag: Option<String>, shown: fn(&str) -> String) -> Option<String> {
-        let (value, origin) = match (flag, (self.environment)(name)) {
+        let (value, origin) = match (flag, self.stated(name)) {
             (Some(value), _) => (Some(value), Origin::Flag),
-            (None, Some(text)) => (Some(text), Origin::Environment),
+            (None, Some((text, origin))) => (Some(text), origin),
             (None, None) => (None, Origin::Default),
         };
         let value = value.map(|text| text.trim().to_owned()).filter(|text| !text.is_empty());

@@ -140,7 +140,7 @@ impl ProblemKind {
     }
 
     /// All kinds.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
         Self::MalformedJson,
         Self::BadRequest,
         Self::Unauthenticated,
@@ -164,6 +164,7 @@ impl ProblemKind {
         Self::Interrupted,
         Self::Internal,
         Self::InputOutput,
+        Self::Unavailable,
         Self::ShuttingDown,
         Self::Timeout,
         Self::Usage,

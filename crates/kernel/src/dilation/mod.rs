@@ -10,7 +10,9 @@
 //!
 //! Where points stand for cells, as in most fractals, there are too many of them to be told apart. There the least squared distance at the lattice's vertices alone decides
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
-//! Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
+//! Its cubes are larger than that asks where one site serves all that is filled. Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
+//!
+//! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`. Triangles are then saved within the same bounds (`simplify`).
 
