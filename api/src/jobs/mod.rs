@@ -1,7 +1,7 @@
 //! The machine room: jobs are accepted by the desk, kept in a ledger, and done by worker threads.
 //!
-//! The ledger is the one seam between one process and many: [`embedded`] keeps everything in memory and in the data
-//! folder, [`shared`] in a database that several processes use. What a change does to a job stands in [`record`], once.
+//! The ledger is the one seam between one process and many: `embedded.rs` keeps everything in memory and in the data
+//! folder, `shared/` in a database that several processes use. What a change does to a job stands in [`record`], once.
 
 pub mod desk;
 mod embedded;
