@@ -96,7 +96,7 @@ fn a_wall_of_a_smooth_surface() {
     };
     let shape = Shape::Subdivision(surface);
     let (mesh, certificate) = solid(shape, walled(0.05, 1.0, WallSide::Inward));
-    let exact = 2620.419_033;
+    let exact = 2_620.419_033;
     // Area 919.76: a change by the tolerance everywhere.
     assert!((certificate.wall.unwrap().solid_volume_mm3 - exact).abs() < 0.05 * 920.0);
     // The centre is hollow, and half a wall below the top there is material.

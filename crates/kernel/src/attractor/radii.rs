@@ -164,7 +164,7 @@ impl Grading<'_> {
 
     fn check(&self, depth: u32, reached_mm: f64) -> Result<(), RefineError> {
         let (limits, tolerance_mm) = (self.budget.limits, self.tolerance);
-        if self.roots.len() % 1024 == 0 {
+        if self.roots.len().is_multiple_of(1024) {
             self.budget.cancel.check()?;
         }
         if self.roots.len() as u64 >= limits.cells {
