@@ -14,7 +14,10 @@ export class Api extends Transport {
   metrics(options?: { signal?: AbortSignal }): Promise<Response>;
   /** Tells a kind of problem. */
   showProblem(code: string, options?: { signal?: AbortSignal }): Promise<ProblemPage>;
-  /** Whether the service takes work: not while it goes down, nor when its data folder cannot be written. */
+  /**
+   * Whether the service takes work: not while it goes down, nor while its data folder, or the database and the
+   * object store that it shares with others, cannot be used.
+   */
   readyz(options?: { signal?: AbortSignal }): Promise<Health>;
   /** Tells where an address leads, or which addresses lead near a point. */
   locate(body: AddressQuestion, options?: { signal?: AbortSignal }): Promise<AddressAnswer>;

@@ -173,6 +173,7 @@ export interface Certificate {
   /** Closed curves that the edges with one triangle form. */ boundary_loops?: number | null;
   /** Sealed voids. */ cavities?: number | null;
   centroid_mm?: Array<Array<number>>;
+  closing?: ClosingStatement | null;
   /** Connected pieces. */ components?: number | null;
   contact?: ContactStatement | null;
   /** Triangles without area. */ degenerate_triangles?: number | null;
@@ -188,24 +189,29 @@ export interface Certificate {
   /** Version of the kernel that made it. */ kernel_version: string;
   /** Edge of the lattice's cubes. */ lattice_pitch_mm?: number | null;
   /** Leaf cells evaluated. A dilation evaluates only cells near its boundary, and one again in every block of the lattice that needs it. */ leaf_cells: number;
+  level?: LevelStatement | null;
   mass_g?: Array<number>;
   /** Area of the written mesh. */ mesh_area_mm2?: number | null;
   /** Volume that the written mesh encloses. */ mesh_volume_mm3?: number | null;
   /** Edges with three triangles or more. */ nonmanifold_edges?: number | null;
   /** Vertices whose triangles form several fans. */ nonmanifold_vertices?: number | null;
   operation?: OperationStatement | null;
+  oriented_box?: OrientedBoxStatement | null;
   /** The solid is inside D(r + outer). */ outer_bound_mm?: number | null;
   /** Digests of the files, by format; filled in after writing. */ output_digests: Record<string, string>;
   /** The Hausdorff bound that was asked. */ requested_tolerance_mm: number;
   sections?: SectionsStatement | null;
   self_intersections: "none" | "not_checked" | number;
   /** Connected boundary surfaces: components and cavities. */ shells?: number | null;
+  split?: SplitStatement | null;
   stability?: StabilityStatement | null;
+  thickness?: ThicknessStatement | null;
   /** Every point of D(r - inner) lies in a ball of this diameter inside the solid. */ thickness_min_mm?: number | null;
   topology_stable: "not_checked" | boolean;
   /** Triangles of the result. */ triangles: number;
   /** Vertices of the result. */ vertices: number;
   volume_mm3?: Array<number>;
+  wall?: WallStatement | null;
   /** What the user should know, in words. */ warnings: Array<string>;
 }
 
@@ -214,6 +220,12 @@ export interface ClassicView {
   /** Its name, for addresses and the command line. */ name: string;
   /** Where it comes from. */ source: string;
   /** What people call it. */ title: string;
+}
+
+/** How gaps were filled. */
+export interface ClosingStatement {
+  /** Half of that. C(X) is X and all points that no ball of this radius outside of X can reach. The result holds C(D(r - inner)) and lies in C(D(r + outer)). */ ball_radius_mm: number;
+  /** Gaps narrower than this are filled. */ width_mm: number;
 }
 
 /**
@@ -227,11 +239,13 @@ export interface Coefficients {
 
 /**
  * How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for
- * a solid is its surface here.
+ * a solid has its inside: what lies there is at the distance 0. Places and the nearest pair are those of
+ * surfaces.
  */
 export interface ContactStatement {
   /** Whether there are no other places, and the distance is as narrow as the tolerance allows. */ complete: boolean;
   distance_mm: Array<number>;
+  inside?: InsideStatement | null;
   /** The nearest pair of cells that was looked at. */ nearest: CellPairStatement;
   /** The places, a thousand at most. */ places: Array<PlaceStatement>;
   /** What is proven. */ verdict: ContactVerdict;
@@ -251,6 +265,9 @@ export interface ControlMesh {
  * point, not multiplied by w.
  */
 export type ControlPoint = Array<number>;
+
+/** What was copied. */
+export type CopiedPrimitive = "stated" | "box";
 
 /** A vertex that is sharp for some steps of the scheme or for ever. */
 export interface Corner {
@@ -402,6 +419,9 @@ export interface Health {
   /** `ok`. */ status: string;
 }
 
+/** Which of two shapes holds the other, or a part of it. */
+export type Holder = "first" | "second";
+
 /**
  * The curve of affine maps whose images follow each other, drawn in the affine frame of four control points: o,
  * o + x, o + y, o + z.
@@ -426,6 +446,13 @@ export interface Incidence {
   /** Name of the state. */ state: string;
 }
 
+/** A solid that holds another shape, or a part of it, without touching it with its surface. */
+export interface InsideStatement {
+  /** Which of the two is the solid that holds. */ holder: Holder;
+  /** A point inside of it that is on the other, or nearer to it than their surfaces are to each other. */ point_mm: Array<number>;
+  surface_distance_mm: Array<number>;
+}
+
 /** A fractal interpolation function at equal distances. */
 export interface InterpolationScheme {
   /** The family of the shape. */ family: "interpolation";
@@ -446,7 +473,7 @@ export interface InterpolationShape {
  */
 export interface Job {
   /** Named models, for kinds of jobs with several. */ inputs?: Array<JobInput>;
-  /** What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), slice (plane sections of a solid), or convert (a mesh as it is, in other formats; any other model is evaluated). */ kind: "evaluate" | "solidify" | "measure" | "intersect" | "slice" | "convert";
+  /** What to do: evaluate (points, wires or surface to the tolerance), solidify (a printable solid: the shape dilated by a ball, a wall, or a level of an ifs), measure (box, area and volume as intervals), intersect (a printable solid: what an operation leaves of several), slice (plane sections of a solid), or convert (a mesh as it is, in other formats; any other model is evaluated). */ kind: "evaluate" | "solidify" | "measure" | "intersect" | "slice" | "convert";
   /** The version of the grammar: 1. */ lacuna: 1;
   /** What the job may use; the service's defaults when absent. */ limits?: JobLimits;
   /** The model, in full. */ model?: EmbeddedModel;
@@ -484,16 +511,27 @@ export interface JobPage {
 
 /** Settings of a job. What a kind does not use must be absent. */
 export interface JobParams {
+  /** For split, with key_mm and only with it: the distance between the faces of a peg and of its socket, in mm. */ clearance_mm?: number;
+  /** Gaps of the dilated shape that are narrower than this are filled, in mm, above zero: by closing it with a ball of half the size. For solidify with radius_mm alone. */ closing_mm?: number;
+  /** For split: where to cut across x, y and z, in mm: three arrays, empty where the volume tells or nothing is cut. */ cuts_mm?: Array<Array<number>>;
   /** The density of the material, in g/cm3, above zero, for the mass: for measure alone. */ density_g_cm3?: number;
+  /** For split: the width and length of pegs that stand in sockets of the neighbouring parts, in mm; walls are half of that. No keys when absent. */ key_mm?: number;
+  /** For solidify of a model of the family ifs, instead of radius_mm: the union of all copies of the primitive along addresses of this length, as an exact solid; the primitive is the model's solid, or else the box of its attractor. */ level?: number;
   /** What the planes of slice are perpendicular to, of any length; [0, 0, 1] when absent. */ normal?: Array<number>;
   /** Whether an evaluation carries the normals of the limit surface into PLY, OBJ, GLB and VRML: for evaluate alone; false when absent. */ normals?: boolean;
   /** Where the planes of slice are along the normal, in mm. Exactly one of offsets_mm and step_mm is given. */ offsets_mm?: Array<number>;
-  /** What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), in the first and in none of the others (difference), or their convex hull (hull). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file. */ operation?: "union" | "intersection" | "difference" | "hull";
-  /** The radius of the dilating ball, in mm, above zero: required by solidify, optional for measure, intersect and slice, absent for evaluate and convert. */ radius_mm?: number;
+  /** What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), in the first and in none of the others (difference), or their convex hull (hull); of one input, what lies behind a plane (trim), or its parts between planes (split). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file. */ operation?: "union" | "intersection" | "difference" | "hull" | "trim" | "split";
+  /** Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent. */ oriented_box?: boolean;
+  /** For trim: the normal of a plane, of any length, and its distance from the origin along that, in mm. What the normal points to is taken away. */ plane?: Array<number>;
+  /** The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate and convert. */ radius_mm?: number;
+  /** On which side of that surface the wall is: inward (the solid becomes hollow) or outward (what the surface bounds becomes the hollow); inward when absent. */ side?: "inward" | "outward";
   /** Whether triangles are saved within the bound: for solidify alone; true when absent. */ simplify?: boolean;
   /** Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent. */ stability?: boolean;
   /** The height of layers, in mm, above zero: planes of slice are in their middles, from the bottom of the solid to its top. */ step_mm?: number;
-  /** The Hausdorff bound on the result, in mm, above zero. */ tolerance_mm: number;
+  /** Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent. */ thickness?: boolean;
+  /** The Hausdorff bound on the result, in mm, above zero. Required but with level, which is exact but for the single precision of the files. */ tolerance_mm?: number;
+  /** For split: the build volume along x, y and z, in mm, which every part fits; along axes without cuts of their own the job cuts as rarely as it can. */ volume_mm?: Array<number>;
+  /** The thickness of a wall along the surface of the solid, in mm, above zero, which is made instead of the solid: of the dilation where there is a radius_mm, else of what the model's closed surface bounds. For solidify alone. */ wall_mm?: number;
   /** What the one input of intersect is held against, where there is neither a second one nor an operation. */ with?: With;
 }
 
@@ -526,6 +564,25 @@ export interface Join {
 
 /** Where a number comes from. */
 export type Kind = "sourced" | "chosen";
+
+/** A least thickness, and where it is. */
+export interface LeastThicknessStatement {
+  /** A point of a face, and the one across. */ between_mm: Array<Array<number>>;
+  least_mm: Array<number>;
+}
+
+/**
+ * A level of a system as a solid. Its copies have no inner point in common, proven in integers; faces of theirs
+ * that coincide are gone, by integers as well. The box, the volume and the area beside it are those of the exact
+ * level, not of the attractor.
+ */
+export interface LevelStatement {
+  /** Faces that cancelled in the last step from level to level. */ cancelled_faces: number;
+  /** Copies that were joined. */ copies: number;
+  /** Corners that were doubled, because parts of the solid meet there, or along edges there, without being joined. */ doubled_vertices: number;
+  /** The level: the length of the addresses of the copies. */ level: number;
+  /** What was copied. */ primitive: CopiedPrimitive;
+}
 
 /** The library. */
 export interface LibraryPage {
@@ -734,7 +791,7 @@ export interface OperandStatement {
  * How solids are combined. All operations are regularised: a face, an edge or a point that two solids merely
  * share leaves nothing behind.
  */
-export type Operation = "union" | "intersection" | "difference" | "hull";
+export type Operation = "union" | "intersection" | "difference" | "hull" | "trim" | "split";
 
 /**
  * A solid that was combined from several. `inner_bound_mm` and `outer_bound_mm` say how far inputs are eroded or
@@ -748,6 +805,15 @@ export interface OperationStatement {
   /** What was done. */ operation: Operation;
 }
 
+/** The smallest box around the exact shape, whatever way it is turned. */
+export interface OrientedBoxStatement {
+  /** Unit vectors along the edges of a box that holds the shape. */ axes: Array<Array<number>>;
+  /** Its middle. */ centre_mm: Array<number>;
+  /** Whether the bounds are within a thousandth of each other, and what the tolerance takes. */ complete: boolean;
+  /** Its edges. */ sizes_mm: Array<number>;
+  volume_mm3: Array<number>;
+}
+
 /** A file that a job made. */
 export interface Output {
   /** Its length. */ bytes: number;
@@ -759,6 +825,18 @@ export interface Output {
 
 /** A shape with an optional name and place: beside the shape's own members, or with the shape as a member. */
 export type Part = unknown;
+
+/** A part of a solid that was split. */
+export interface PartStatement {
+  /** Lower and upper corner of its box where it lies in the files, pegs included. */ bbox_mm: Array<Array<number>>;
+  /** Its pieces. */ components: number;
+  /** Volume that its mesh encloses. */ mesh_volume_mm3: number;
+  /** How far it was moved from where it belongs. */ moved_mm: Array<number>;
+  /** Its name in the files: its place along x, y and z, from 1. */ name: string;
+  /** Its pegs. */ pegs: number;
+  /** Its sockets. */ sockets: number;
+  /** Its triangles. */ triangles: number;
+}
 
 /** A place where shapes come within the tolerance. */
 export interface PlaceStatement {
@@ -816,7 +894,7 @@ export interface Problem {
 }
 
 /** The kinds of problem, one per `/problems/` address. */
-export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/forbidden" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
+export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/forbidden" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/unavailable" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
 
 /** A kind of problem. */
 export interface ProblemPage {
@@ -854,6 +932,16 @@ export interface Quantity {
   /** Where it comes from. */ source: string;
   /** The unit; empty for numbers without one. */ unit: string;
   /** The default. */ value: number;
+}
+
+/**
+ * r = max(least_mm, first_mm ratio^k) for cells that leave the recursion of the part's root cells at level k,
+ * the number of transitions taken within it; least_mm for the limit of the recursion itself.
+ */
+export interface RadiusByLevel {
+  /** The radius at level 0, above zero. */ first_mm: number;
+  /** No radius is less: above zero. */ least_mm: number;
+  /** From one level to the next: between 0 and 1. */ ratio: number;
 }
 
 /** Two products of a state's operators and embeddings that are equal. */
@@ -954,6 +1042,20 @@ export interface SolvedEntry {
   /** Its value in the filled model. */ value: number;
 }
 
+/**
+ * A solid in parts. Counts beside it are those of all parts together; its bounds are those of the solid before
+ * it was split, and hold for the parts but for pegs and sockets.
+ */
+export interface SplitStatement {
+  /** Where planes across x, y and z cut. */ cuts_mm: Array<Array<number>>;
+  /** Keys that were placed, each a peg and a socket. */ keys: number;
+  /** The parts. */ parts: Array<PartStatement>;
+  /** Volume of one peg beyond its part. */ peg_volume_mm3: number;
+  /** Volume of one socket. */ socket_volume_mm3: number;
+  /** The build volume, if the parts had to fit one. */ volume_mm?: Array<number> | null;
+  /** Volume that the mesh of the whole solid enclosed. */ whole_volume_mm3: number;
+}
+
 /** How the topology depends on the radius. Between the radii listed it is proven to stay the same. */
 export interface StabilityStatement {
   above?: CriticalRadiusStatement | null;
@@ -1018,6 +1120,16 @@ export interface TerrainShape {
   /** Which of the terrains; 0 when absent. The same seed gives the same terrain. */ random_seed?: number;
   /** r: a midpoint that is new at level k moves by at most half the longest given edge times r^k. 0 is flat; 1/2 halves with the edges; below 1. */ roughness: number;
   /** The three corners to start from; or a grid. */ triangle?: Array<Array<number>>;
+}
+
+/**
+ * Least thickness along the normals of the mesh that is measured, between faces without a common corner: at
+ * edges sharper than a right angle every wall ends in nothing. For a dilation the mesh is the one that would be
+ * written, without simplification.
+ */
+export interface ThicknessStatement {
+  gap?: LeastThicknessStatement | null;
+  wall?: LeastThicknessStatement | null;
 }
 
 /** What happens to the topology when the radius grows. */
@@ -1087,6 +1199,18 @@ export interface Version {
   /** The version of the contract, the `v` of the addresses. */ api: string;
   /** `lacuna`. */ name: string;
   /** The version of the service and of the kernel in it. */ version: string;
+}
+
+/** On which side of a closed surface its wall is. */
+export type WallSide = "inward" | "outward";
+
+/** A wall along the surface of a solid M that is written as a part of it. */
+export interface WallStatement {
+  /** Volume of the hollow in the mesh as written: what an inward wall saves. */ hollow_volume_mm3?: number | null;
+  reached_mm: Array<number>;
+  /** On which side of M's surface. */ side: WallSide;
+  /** Volume that M's mesh encloses. */ solid_volume_mm3: number;
+  /** The thickness that was asked. */ thickness_mm: number;
 }
 
 /** Exactly one of these, in mm whatever the unit of the model. */

@@ -40,9 +40,15 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> io
     let mut threads = Vec::new();
     for number in 0..count {
         let (desk, made) = (Arc::clone(desk), made.clone());
+        // Each has threads of its own: in a common pool the pieces of a small job would wait behind those of a large one.
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(rayon::current_num_threads())
+            .thread_name(move |thread| format!("worker-{number}-{thread}"))
+            .build()
+            .map_err(io::Error::other)?;
         threads.push(std::thread::Builder::new().name(format!("worker-{number}")).spawn(move || {
             while let Some(job) = desk.take() {
-                if made.send(work(&desk, job, &most, engine)).is_err() {
+                if made.send(pool.install(|| work(&desk, job, &most, engine))).is_err() {
                     return;
                 }
             }
@@ -172,8 +178,11 @@ fn write_files(desk: &Desk, order: &Job, mut outcome: Outcome, budget: &Budget) 
         let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending, &budget.cancel)?;
         let file_name = format!("{stem}.{}", facts.ending);
         let output = Output { name: facts.ending.to_owned(), file_name, media_type: facts.media_type.to_owned(), bytes, digest };
-        outcome.certificate.output_digests.insert(output.name.clone(), digest.to_string());
         files.push((pending, output));
+    }
+    // Only now: a file holds what was known before any was written, whatever is written beside it.
+    for (_, output) in &files {
+        outcome.certificate.output_digests.insert(output.name.clone(), output.digest.to_string());
     }
     let bytes = production::certificate_file(&outcome.certificate)?;
     let mut pending = desk.store.new_result().map_err(failed)?;

@@ -71,9 +71,12 @@ fn not_a_solid(name: &str, fault: &str) -> JobError {
     JobError::new(Kind::Invalid, "job.not-a-solid", message)
 }
 
-/// Whether a shape may bound something: it is all surface.
+/// Whether a shape may bound something: it is all surface, and not only triangles, of which it is known already whether they close.
 fn may_be_solid(attractor: &Attractor) -> bool {
-    attractor.roots().iter().all(|root| attractor.automaton().state(root.state).kind == Some(CellKind::Face))
+    let states = || attractor.roots().iter().map(|root| attractor.automaton().state(root.state));
+    let closed_meshes = is_solid(attractor);
+    let surface = states().all(|state| state.kind == Some(CellKind::Face));
+    closed_meshes || (surface && states().any(|state| !state.transitions.is_empty()))
 }
 
 /// Whether closed surfaces are all that there is.

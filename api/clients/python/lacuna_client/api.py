@@ -32,7 +32,7 @@ class Api(Transport):
         return self._json('GET', f"/problems/{quote(code, safe='')}", accept='application/json, application/problem+json')
 
     def readyz(self) -> Health:
-        """Whether the service takes work: not while it goes down, nor when its data folder cannot be written."""
+        """Whether the service takes work: not while it goes down, nor while its data folder, or the database and the object store that it shares with others, cannot be used."""
         return self._json('GET', '/readyz', accept='application/json, application/problem+json')
 
     def locate(self, body: AddressQuestion) -> AddressAnswer:

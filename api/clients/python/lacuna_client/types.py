@@ -145,6 +145,7 @@ Certificate = TypedDict('Certificate', {
     'boundary_loops': 'NotRequired[int | None]',
     'cavities': 'NotRequired[int | None]',
     'centroid_mm': 'NotRequired[list[list[float]]]',
+    'closing': 'NotRequired[ClosingStatement | None]',
     'components': 'NotRequired[int | None]',
     'contact': 'NotRequired[ContactStatement | None]',
     'degenerate_triangles': 'NotRequired[int | None]',
@@ -160,24 +161,29 @@ Certificate = TypedDict('Certificate', {
     'kernel_version': 'str',
     'lattice_pitch_mm': 'NotRequired[float | None]',
     'leaf_cells': 'int',
+    'level': 'NotRequired[LevelStatement | None]',
     'mass_g': 'NotRequired[list[float]]',
     'mesh_area_mm2': 'NotRequired[float | None]',
     'mesh_volume_mm3': 'NotRequired[float | None]',
     'nonmanifold_edges': 'NotRequired[int | None]',
     'nonmanifold_vertices': 'NotRequired[int | None]',
     'operation': 'NotRequired[OperationStatement | None]',
+    'oriented_box': 'NotRequired[OrientedBoxStatement | None]',
     'outer_bound_mm': 'NotRequired[float | None]',
     'output_digests': 'dict[str, str]',
     'requested_tolerance_mm': 'float',
     'sections': 'NotRequired[SectionsStatement | None]',
     'self_intersections': "Literal['none', 'not_checked'] | int",
     'shells': 'NotRequired[int | None]',
+    'split': 'NotRequired[SplitStatement | None]',
     'stability': 'NotRequired[StabilityStatement | None]',
+    'thickness': 'NotRequired[ThicknessStatement | None]',
     'thickness_min_mm': 'NotRequired[float | None]',
     'topology_stable': "Literal['not_checked'] | bool",
     'triangles': 'int',
     'vertices': 'int',
     'volume_mm3': 'NotRequired[list[float]]',
+    'wall': 'NotRequired[WallStatement | None]',
     'warnings': 'list[str]',
 })
 
@@ -185,6 +191,11 @@ ClassicView = TypedDict('ClassicView', {
     'name': 'str',
     'source': 'str',
     'title': 'str',
+})
+
+ClosingStatement = TypedDict('ClosingStatement', {
+    'ball_radius_mm': 'float',
+    'width_mm': 'float',
 })
 
 Coefficients = TypedDict('Coefficients', {
@@ -195,6 +206,7 @@ Coefficients = TypedDict('Coefficients', {
 ContactStatement = TypedDict('ContactStatement', {
     'complete': 'bool',
     'distance_mm': 'list[float]',
+    'inside': 'NotRequired[InsideStatement | None]',
     'nearest': 'CellPairStatement',
     'places': 'list[PlaceStatement]',
     'verdict': 'ContactVerdict',
@@ -208,6 +220,8 @@ ControlMesh = TypedDict('ControlMesh', {
 })
 
 ControlPoint: TypeAlias = list[float]
+
+CopiedPrimitive: TypeAlias = Literal['stated', 'box']
 
 Corner = TypedDict('Corner', {
     'sharpness': "float | Literal['infinite']",
@@ -334,6 +348,8 @@ Health = TypedDict('Health', {
     'status': 'str',
 })
 
+Holder: TypeAlias = Literal['first', 'second']
+
 IfsScheme = TypedDict('IfsScheme', {
     'family': "Literal['ifs']",
     'maps': 'list[AffineMap]',
@@ -350,6 +366,12 @@ Incidence = TypedDict('Incidence', {
     'boundary': 'int',
     'children': 'list[list[int]]',
     'state': 'str',
+})
+
+InsideStatement = TypedDict('InsideStatement', {
+    'holder': 'Holder',
+    'point_mm': 'list[float]',
+    'surface_distance_mm': 'list[float]',
 })
 
 InterpolationScheme = TypedDict('InterpolationScheme', {
@@ -399,16 +421,27 @@ JobPage = TypedDict('JobPage', {
 })
 
 JobParams = TypedDict('JobParams', {
+    'clearance_mm': 'NotRequired[float]',
+    'closing_mm': 'NotRequired[float]',
+    'cuts_mm': 'NotRequired[list[list[float]]]',
     'density_g_cm3': 'NotRequired[float]',
+    'key_mm': 'NotRequired[float]',
+    'level': 'NotRequired[int]',
     'normal': 'NotRequired[list[float]]',
     'normals': 'NotRequired[bool]',
     'offsets_mm': 'NotRequired[list[float]]',
-    'operation': "NotRequired[Literal['union', 'intersection', 'difference', 'hull']]",
+    'operation': "NotRequired[Literal['union', 'intersection', 'difference', 'hull', 'trim', 'split']]",
+    'oriented_box': 'NotRequired[bool]',
+    'plane': 'NotRequired[list[float]]',
     'radius_mm': 'NotRequired[float]',
+    'side': "NotRequired[Literal['inward', 'outward']]",
     'simplify': 'NotRequired[bool]',
     'stability': 'NotRequired[bool]',
     'step_mm': 'NotRequired[float]',
-    'tolerance_mm': 'float',
+    'thickness': 'NotRequired[bool]',
+    'tolerance_mm': 'NotRequired[float]',
+    'volume_mm': 'NotRequired[list[float]]',
+    'wall_mm': 'NotRequired[float]',
     'with': 'NotRequired[With]',
 })
 
@@ -437,6 +470,19 @@ Join = TypedDict('Join', {
 })
 
 Kind: TypeAlias = Literal['sourced', 'chosen']
+
+LeastThicknessStatement = TypedDict('LeastThicknessStatement', {
+    'between_mm': 'list[list[float]]',
+    'least_mm': 'list[float]',
+})
+
+LevelStatement = TypedDict('LevelStatement', {
+    'cancelled_faces': 'int',
+    'copies': 'float',
+    'doubled_vertices': 'int',
+    'level': 'int',
+    'primitive': 'CopiedPrimitive',
+})
 
 LibraryPage = TypedDict('LibraryPage', {
     'items': 'list[ClassicView]',
@@ -610,12 +656,20 @@ OperandStatement = TypedDict('OperandStatement', {
     'triangles': 'int',
 })
 
-Operation: TypeAlias = Literal['union', 'intersection', 'difference', 'hull']
+Operation: TypeAlias = Literal['union', 'intersection', 'difference', 'hull', 'trim', 'split']
 
 OperationStatement = TypedDict('OperationStatement', {
     'engine': 'str',
     'operands': 'list[OperandStatement]',
     'operation': 'Operation',
+})
+
+OrientedBoxStatement = TypedDict('OrientedBoxStatement', {
+    'axes': 'list[list[float]]',
+    'centre_mm': 'list[float]',
+    'complete': 'bool',
+    'sizes_mm': 'list[float]',
+    'volume_mm3': 'list[float]',
 })
 
 Output = TypedDict('Output', {
@@ -627,6 +681,17 @@ Output = TypedDict('Output', {
 })
 
 Part: TypeAlias = Any
+
+PartStatement = TypedDict('PartStatement', {
+    'bbox_mm': 'list[list[float]]',
+    'components': 'int',
+    'mesh_volume_mm3': 'float',
+    'moved_mm': 'list[float]',
+    'name': 'str',
+    'pegs': 'int',
+    'sockets': 'int',
+    'triangles': 'int',
+})
 
 PlaceStatement = TypedDict('PlaceStatement', {
     'bbox_mm': 'list[list[float]]',
@@ -675,7 +740,7 @@ Problem = TypedDict('Problem', {
     'type': 'ProblemKind',
 })
 
-ProblemKind: TypeAlias = Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/forbidden', '/problems/not-found', '/problems/method-not-allowed', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']
+ProblemKind: TypeAlias = Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/forbidden', '/problems/not-found', '/problems/method-not-allowed', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/unavailable', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']
 
 ProblemPage = TypedDict('ProblemPage', {
     'exit_code': 'int',
@@ -708,6 +773,12 @@ Quantity = TypedDict('Quantity', {
     'source': 'str',
     'unit': 'str',
     'value': 'float',
+})
+
+RadiusByLevel = TypedDict('RadiusByLevel', {
+    'first_mm': 'float',
+    'least_mm': 'float',
+    'ratio': 'float',
 })
 
 Relation = TypedDict('Relation', {
@@ -786,6 +857,16 @@ SolvedEntry = TypedDict('SolvedEntry', {
     'value': 'float',
 })
 
+SplitStatement = TypedDict('SplitStatement', {
+    'cuts_mm': 'list[list[float]]',
+    'keys': 'int',
+    'parts': 'list[PartStatement]',
+    'peg_volume_mm3': 'float',
+    'socket_volume_mm3': 'float',
+    'volume_mm': 'NotRequired[list[float] | None]',
+    'whole_volume_mm3': 'float',
+})
+
 StabilityStatement = TypedDict('StabilityStatement', {
     'above': 'NotRequired[CriticalRadiusStatement | None]',
     'below': 'NotRequired[CriticalRadiusStatement | None]',
@@ -842,6 +923,11 @@ TerrainShape = TypedDict('TerrainShape', {
     'triangle': 'NotRequired[list[list[float]]]',
 })
 
+ThicknessStatement = TypedDict('ThicknessStatement', {
+    'gap': 'NotRequired[LeastThicknessStatement | None]',
+    'wall': 'NotRequired[LeastThicknessStatement | None]',
+})
+
 TopologyChange: TypeAlias = Literal['joins', 'closes', 'fills', 'unclear']
 
 Transition = TypedDict('Transition', {
@@ -890,6 +976,16 @@ Version = TypedDict('Version', {
     'api': 'str',
     'name': 'str',
     'version': 'str',
+})
+
+WallSide: TypeAlias = Literal['inward', 'outward']
+
+WallStatement = TypedDict('WallStatement', {
+    'hollow_volume_mm3': 'NotRequired[float | None]',
+    'reached_mm': 'list[float]',
+    'side': 'WallSide',
+    'solid_volume_mm3': 'float',
+    'thickness_mm': 'float',
 })
 
 With = TypedDict('With', {

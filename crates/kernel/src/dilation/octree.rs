@@ -13,7 +13,7 @@ use crate::budget::Budget;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What all tasks of one pass share.
 pub(super) struct Pass<'a> {
@@ -25,6 +25,8 @@ pub(super) struct Pass<'a> {
     pub(super) only: Option<&'a BTreeSet<[i64; 3]>>,
     pub(super) budget: &'a Budget,
     pub(super) triangles: AtomicU64,
+    /// Whether a limit was hit: what is left need not be done.
+    pub(super) failed: AtomicBool,
     /// Cubes of the lattice that are done, of those of the whole space.
     pub(super) done: AtomicU64,
     pub(super) space: f64,
@@ -63,15 +65,17 @@ impl<'a> Pass<'a> {
 
     fn node(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Vec<BlockSurface>, DilationError> {
         self.budget.cancel.check()?;
-        if !self.is_wanted(node) {
+        // Where one part has failed there is no result, and its error is the answer.
+        if !self.is_wanted(node) || self.failed.load(Ordering::Relaxed) {
             return Ok(Vec::new());
         }
-        let Some((kept, open)) = self.reduce(node, candidates, open)? else {
+        let reduced = self.reduce(node, candidates, open).inspect_err(|_| self.failed.store(true, Ordering::Relaxed))?;
+        let Some((kept, open)) = reduced else {
             self.finish(node);
             return Ok(Vec::new());
         };
         if node.blocks == 1 {
-            let surface = self.block(node, &kept, &open)?;
+            let surface = self.block(node, &kept, &open).inspect_err(|_| self.failed.store(true, Ordering::Relaxed))?;
             self.finish(node);
             return Ok(surface.into_iter().collect());
         }

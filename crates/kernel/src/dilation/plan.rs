@@ -20,7 +20,7 @@ use crate::tolerance::Tolerance;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Mutex;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Numbers that all blocks share, in mm or mm^2.
 #[derive(Clone, Debug)]
@@ -397,6 +397,7 @@ impl<'a> Plan<'a> {
             only,
             budget,
             triangles: AtomicU64::new(0),
+            failed: AtomicBool::new(false),
             done: AtomicU64::new(0),
             space: (blocks as f64).powi(3),
             workshops: Mutex::new(Vec::new()),

@@ -27,7 +27,12 @@ pub fn winding(mesh: &TriMesh, point: DVec3) -> f64 {
     let angle = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize] - point);
         let (p, q, r) = (a.length(), b.length(), c.length());
-        a.dot(b.cross(c)).atan2(p * q * r + a.dot(b) * r + b.dot(c) * p + c.dot(a) * q)
+        let volume = a.dot(b.cross(c));
+        if volume == 0.0 {
+            // In the triangle's plane: seen from neither side, so that points of the triangle count half.
+            return 0.0;
+        }
+        volume.atan2(p * q * r + a.dot(b) * r + b.dot(c) * p + c.dot(a) * q)
     };
     // Half angles.
     mesh.triangles.iter().map(angle).sum::<f64>() / (2.0 * PI)
