@@ -282,7 +282,10 @@ mod tests {
         ] {
             assert_eq!(fraction(value), expected, "{value}");
         }
-        assert_eq!(fraction(2.0_f64.sqrt()), None);
+        // Every number is near some fraction: what the reading moves is part of the bound, and what has no small common denominator is refused later.
+        let root = 2.0_f64.sqrt();
+        let (p, q) = fraction(root).expect("a fraction is near");
+        assert!((p as f64 / q as f64 - root).abs() <= READING * root && q <= MOST_DENOMINATOR);
         assert_eq!(fraction(f64::NAN), None);
     }
 }
