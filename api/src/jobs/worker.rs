@@ -29,6 +29,10 @@ const CERTIFICATE: &str = "certificate.json";
 /// several of them.
 const RECORDERS: usize = 8;
 
+/// How much less of a core the workers' threads get than those that answer: a tenth.
+#[cfg(unix)]
+const NICENESS: i32 = 10;
+
 /// Starts the workers, and the recorders behind them; all end when the desk is stopped.
 ///
 /// # Errors
@@ -44,6 +48,7 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> io
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(rayon::current_num_threads())
             .thread_name(move |thread| format!("worker-{number}-{thread}"))
+            .start_handler(|_| give_way())
             .build()
             .map_err(io::Error::other)?;
         threads.push(std::thread::Builder::new().name(format!("worker-{number}")).spawn(move || {
@@ -63,6 +68,14 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> io
         })?);
     }
     Ok(threads)
+}
+
+/// Geometry takes all cores for minutes, and an answer takes one for a moment: the answer goes first. Where that is not allowed, they share.
+fn give_way() {
+    #[cfg(unix)]
+    if let Err(error) = rustix::process::nice(NICENESS) {
+        tracing::debug!(%error, "a worker's thread keeps its priority");
+    }
 }
 
 /// What comes next; none once all workers have ended. One recorder at a time waits here, the others behind it.
