@@ -134,7 +134,7 @@ impl Frame {
     /// tetrahedron: d(x) <= s + R, the distance growing by no more than the way. s is r, or r + gap where the value of a vertex in a gap was lowered. All that holds for
     /// the distance whose square is less by the least deficit of the nearest sites, too, among sites with no smaller deficit, and r in space.
     fn is_close(&self, setting: &Setting, tree: &Tree<'_>) -> bool {
-        if setting.close_in_space > setting.close && self.is_around_a_site(setting, tree) {
+        if self.is_around_a_site(setting, tree) {
             return true;
         }
         let deficit = self.values.iter().filter(|value| value.square.is_finite()).map(|value| tree.site(value.site).deficit);

@@ -476,8 +476,8 @@ impl<'a> Plan<'a> {
             solid,
             crossings,
             inner_mm: self.balls.inner(inner),
-            // What is close in space reaches as far as is aimed at.
-            outer_mm: self.balls.outer(outer).max(if setting.close_in_space > setting.close { self.aimed } else { 0.0 }),
+            // What is close to a site in space reaches as far as is aimed at.
+            outer_mm: self.balls.outer(outer).max(if setting.dense { self.aimed } else { 0.0 }),
             least_radius_mm: self.balls.least,
             pitch_mm: setting.lattice.pitch,
             leaf_cells,
