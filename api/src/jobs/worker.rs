@@ -29,9 +29,9 @@ const CERTIFICATE: &str = "certificate.json";
 /// several of them.
 const RECORDERS: usize = 8;
 
-/// How much less of a core the workers' threads get than those that answer: a tenth.
+/// The workers' threads get of a core what those that answer leave: the least priority of the usual kind.
 #[cfg(unix)]
-const NICENESS: i32 = 10;
+const NICENESS: i32 = 19;
 
 /// Starts the workers, and the recorders behind them; all end when the desk is stopped.
 ///
