@@ -544,10 +544,9 @@ fn start(warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
     }
 }
 
-/// What is counted on a solid, after the warnings of what it was made from.
-fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
-    let topology = solid.topology();
-    let mut certificate = Certificate {
+/// What is counted on a closed mesh.
+fn counted(topology: &Topology, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
+    Certificate {
         vertices: topology.vertices,
         edges: topology.edges,
         triangles: topology.triangles,
@@ -561,6 +560,14 @@ fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tol
         nonmanifold_vertices: Some(topology.nonmanifold_vertices),
         flipped_pairs: Some(topology.flipped_pairs),
         degenerate_triangles: Some(topology.degenerate_triangles),
+        ..start(warnings, tolerance)
+    }
+}
+
+/// What is counted on a solid, after the warnings of what it was made from.
+fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tolerance) -> Certificate {
+    let topology = solid.topology();
+    let mut certificate = Certificate {
         // Counted exactly on the mesh as it is written.
         self_intersections: Checked::Found(match crossings {
             0 => SelfIntersections::None,
@@ -568,7 +575,7 @@ fn of_solid(solid: &Solid, crossings: u64, warnings: Vec<String>, tolerance: Tol
         }),
         mesh_volume_mm3: Some(volume(solid.mesh())),
         mesh_area_mm2: Some(area(solid.mesh())),
-        ..start(warnings, tolerance)
+        ..counted(topology, warnings, tolerance)
     };
     if topology.cavities > 0 {
         certificate.warnings.push(format!("{} sealed voids: resin or wax inside cannot drain", topology.cavities));
@@ -629,9 +636,7 @@ pub(crate) fn of_split(
 ) -> Result<Certificate, JobError> {
     let mut all = TriMesh::default();
     for Part { solid, .. } in parts {
-        let first = all.vertices.len() as u32;
-        all.vertices.extend(&solid.mesh().vertices);
-        all.triangles.extend(solid.mesh().triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
+        all.append(solid.mesh());
     }
     let all = Solid::new(all, budget).map_err(|error| match error {
         SolidError::Stopped(stopped) => JobError::from(stopped),
@@ -829,23 +834,12 @@ pub(crate) fn of_polygons(mesh: &TriMesh, topology: &Topology, given: &[DVec3], 
     Certificate {
         achieved_bound_mm: moved_mm,
         leaf_cells: topology.triangles,
-        vertices: topology.vertices,
-        edges: topology.edges,
-        triangles: topology.triangles,
-        components: Some(topology.components),
-        shells: Some(topology.shells),
         cavities: closed.then_some(topology.cavities),
         genus: closed.then_some(topology.genus),
-        euler: Some(topology.euler),
-        boundary_edges: Some(topology.boundary_edges),
-        nonmanifold_edges: Some(topology.nonmanifold_edges),
-        nonmanifold_vertices: Some(topology.nonmanifold_vertices),
-        flipped_pairs: Some(topology.flipped_pairs),
-        degenerate_triangles: Some(topology.degenerate_triangles),
         mesh_volume_mm3: enclosed,
         mesh_area_mm2: Some(area(mesh)).filter(|area| area.is_finite()),
         bbox_mm: [corner(DVec3::min), corner(DVec3::max)].map(|corner| corner.map(|end| [end, end])),
-        ..start(warnings, tolerance)
+        ..counted(topology, warnings, tolerance)
     }
 }
 

@@ -105,7 +105,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
             warnings.push(format!("{} pairs of triangles of input '{}' cross", dilation.crossings, input.name));
         }
         bounds = dilation.bounds;
-        (vec![dilation.solid.mesh().clone()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
+        (vec![dilation.solid.into_mesh()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
     } else if is_solid(attractor) {
         (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
     } else {
@@ -134,16 +134,16 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
 /// The mesh bounds what the surface does but for points within the deviation d of the mesh: a cell and its triangle lie in a convex set within d of the triangle, so that the
 /// straight way from the surface to the mesh, on which no winding number changes where it does not pass, stays within d of the mesh.
 fn closed_surface(name: &str, attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(TriMesh, f64, u64), JobError> {
-    let Tessellation { vertices, points, segments, mut triangles, deviation_mm, leaf_cells, .. } = refine(attractor, tolerance, budget)?;
-    let mesh = |triangles| TriMesh { vertices: vertices.clone(), triangles };
+    let Tessellation { vertices, points, segments, triangles, deviation_mm, leaf_cells, .. } = refine(attractor, tolerance, budget)?;
     if !(points.is_empty() && segments.is_empty()) {
         return Err(not_a_solid(name, "some of it is no surface"));
     }
-    if volume(&mesh(triangles.clone())) < 0.0 {
-        triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    let mut mesh = TriMesh { vertices, triangles };
+    if volume(&mesh) < 0.0 {
+        mesh.reverse();
     }
-    match Solid::new(mesh(triangles), budget) {
-        Ok(solid) => Ok((solid.mesh().clone(), deviation_mm, leaf_cells)),
+    match Solid::new(mesh, budget) {
+        Ok(solid) => Ok((solid.into_mesh(), deviation_mm, leaf_cells)),
         Err(SolidError::Stopped(stopped)) => Err(stopped.into()),
         Err(other) => Err(not_a_solid(name, &format!("its surface does not close ({other})"))),
     }

@@ -111,14 +111,14 @@ fn dilated(job: &Job, radius: Radius, tolerance: Tolerance, budget: &Budget) -> 
         certificate.state_closing(width);
         return Ok((closed.solid, certificate));
     }
-    let make = if job.params.simplify { dilate } else { dilate_unsimplified };
-    let dilation = make(attractor, radius, tolerance, budget)?;
-    let mut certificate = certificate::of_dilation(attractor, &dilation, tolerance);
     if job.params.stability && attractor.has_own_radii() {
         let message =
             "stability tells at which radii the topology changes, and parts of the model have radii of their own; leave either out";
         return Err(JobError::new(Kind::Invalid, "stability.several-radii", message.into()));
     }
+    let make = if job.params.simplify { dilate } else { dilate_unsimplified };
+    let dilation = make(attractor, radius, tolerance, budget)?;
+    let mut certificate = certificate::of_dilation(attractor, &dilation, tolerance);
     if job.params.stability {
         // Critical radii from half to twice the radius, and whether there are any within the bound that was reached.
         let reached = Tolerance::new(certificate.achieved_bound_mm)?;

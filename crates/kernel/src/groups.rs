@@ -9,6 +9,16 @@ impl Groups {
         Self((0..count as u32).collect())
     }
 
+    /// The connected surfaces of triangles over so many vertices.
+    pub(crate) fn of_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let mut groups = Self::new(vertices);
+        for &[a, b, c] in triangles {
+            groups.join(a as usize, b as usize);
+            groups.join(b as usize, c as usize);
+        }
+        groups
+    }
+
     /// The group of a number.
     pub(crate) fn of(&mut self, mut item: usize) -> u32 {
         while self.0[item] as usize != item {

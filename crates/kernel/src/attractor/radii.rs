@@ -6,6 +6,7 @@ use super::sites::reachable;
 use super::{Attractor, Root, StateBound};
 use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::Budget;
+use std::borrow::Cow;
 
 /// The radius of the ball that dilates a root's cell, where it is not the one asked for. In mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,14 +70,17 @@ impl Attractor {
 
     /// The attractor with all own radii larger by a length.
     #[must_use]
-    pub(crate) fn with_grown_radii(&self, by: f64) -> Self {
+    pub(crate) fn with_grown_radii(&self, by: f64) -> Cow<'_, Self> {
+        if !self.has_own_radii() {
+            return Cow::Borrowed(self);
+        }
         let grown = |own: &OwnRadius| match own {
             OwnRadius::Constant(radius) => OwnRadius::Constant(radius + by),
             OwnRadius::AtPoints(radii, least) => OwnRadius::AtPoints(radii.iter().map(|radius| radius + by).collect(), least + by),
             &OwnRadius::ByLevel { first, ratio, least, grown } => OwnRadius::ByLevel { first, ratio, least, grown: grown + by },
         };
         let radii = self.radii.iter().map(|own| own.as_ref().map(grown)).collect();
-        Self { radii, ..self.clone() }
+        Cow::Owned(Self { radii, ..self.clone() })
     }
 
     /// Splits roots until each has one radius, `asked` where it has none of its own, within `tolerance`.

@@ -9,6 +9,7 @@ use super::plan::Setting;
 use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, cross, distance_squared, dot};
 use crate::attractor::sites::SiteRule;
+use crate::groups::Groups;
 
 /// A shell of the surface.
 #[derive(Clone, Copy)]
@@ -76,19 +77,12 @@ fn is_dust<'a>(
 
 /// The number of every triangle's shell, and room for the shells.
 fn shells(surface: &BlockSurface) -> (Vec<u32>, Vec<Shell>) {
-    let mut parents: Vec<u32> = (0..surface.vertices.len() as u32).collect();
-    for triangle in &surface.triangles {
-        let roots = triangle.map(|corner| root(&mut parents, corner));
-        let least = roots.into_iter().min().unwrap_or(roots[0]);
-        for root in roots {
-            parents[root as usize] = least;
-        }
-    }
+    let mut groups = Groups::of_triangles(surface.vertices.len(), &surface.triangles);
     let mut names = vec![u32::MAX; surface.vertices.len()];
     let mut count = 0;
     let mut numbers = Vec::with_capacity(surface.triangles.len());
     for triangle in &surface.triangles {
-        let name = &mut names[root(&mut parents, triangle[0]) as usize];
+        let name = &mut names[groups.of(triangle[0] as usize) as usize];
         if *name == u32::MAX {
             *name = count;
             count += 1;
@@ -96,15 +90,6 @@ fn shells(surface: &BlockSurface) -> (Vec<u32>, Vec<Shell>) {
         numbers.push(*name);
     }
     (numbers, vec![EMPTY; count as usize])
-}
-
-fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
-    while parents[vertex as usize] != vertex {
-        let above = parents[parents[vertex as usize] as usize];
-        parents[vertex as usize] = above;
-        vertex = above;
-    }
-    vertex
 }
 
 fn drop_unused(surface: &mut BlockSurface) {

@@ -41,6 +41,7 @@ use crate::tolerance::{Radius, Tolerance};
 pub use error::DilationError;
 use plan::{Balls, Plan};
 pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
+use std::borrow::Cow;
 pub use wall::{Side, Wall, close, wall};
 
 /// A dilated shape with what is proven of it. Lengths in mm.
@@ -133,10 +134,12 @@ fn resolve(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: 
     let [least, most] = attractor.radii(radius.mm());
     let balls = Balls { least, most };
     let aimed = tolerance.mm().min(0.5 * balls.least);
-    let (mut changed, mut deviation_mm) = (attractor.clone(), 0.0);
-    if is_trimmed {
-        (changed, deviation_mm) = attractor.resolved(length(TRIM_SHARE * aimed), budget).map_err(|error| drawn(error, TRIM_SHARE))?;
-    }
+    let (changed, mut deviation_mm) = if is_trimmed {
+        let (resolved, deviation_mm) = attractor.resolved(length(TRIM_SHARE * aimed), budget).map_err(|error| drawn(error, TRIM_SHARE))?;
+        (Cow::Owned(resolved), deviation_mm)
+    } else {
+        (Cow::Borrowed(attractor), 0.0)
+    };
     if attractor.has_own_radii() {
         let graded = changed.graded(radius.mm(), GRADE_SHARE * aimed, budget).map_err(|error| drawn(error, GRADE_SHARE))?;
         deviation_mm += graded.deviation_mm;
@@ -146,7 +149,7 @@ fn resolve(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: 
         return Ok(Some(Resolved { attractor: graded.attractor, balls: Balls { least, most }, deviation_mm, rest }));
     }
     let rest = length(aimed - deviation_mm);
-    Ok(Some(Resolved { attractor: changed, balls, deviation_mm, rest }))
+    Ok(Some(Resolved { attractor: changed.into_owned(), balls, deviation_mm, rest }))
 }
 
 /// The error of a stage that draws within a share of the tolerance.

@@ -67,11 +67,9 @@ pub fn wall(
     }
     let mut mesh = solid.mesh().clone();
     if side == Side::Outward {
-        mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        mesh.reverse();
     }
-    let first = mesh.vertices.len() as u32;
-    mesh.vertices.extend(other.vertices);
-    mesh.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+    mesh.append(&other);
     Ok(Wall {
         solid: Solid::new(mesh, budget)?,
         inner_mm: around.inner_mm,
@@ -109,7 +107,7 @@ pub fn close(
     let around = make(&surface, ball, half(aimed - swollen.inner_mm.max(swollen.outer_mm)), budget)?;
     let inside = Inside::new(swollen.solid.mesh());
     let mut left = shells(around.solid.mesh(), |vertex| inside.winding(vertex) > 0);
-    left.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    left.reverse();
     Ok(Dilation {
         solid: Solid::new(left, budget)?,
         inner_mm: swollen.inner_mm + around.outer_mm,
@@ -133,12 +131,7 @@ fn surface_of(mesh: &TriMesh) -> Attractor {
 
 /// The connected surfaces of a mesh of which a vertex is wanted.
 fn shells(mesh: &TriMesh, wanted: impl Fn(DVec3) -> bool) -> TriMesh {
-    let mut groups = Groups::new(mesh.vertices.len());
-    for &[a, b, c] in &mesh.triangles {
-        groups.join(a as usize, b as usize);
-        groups.join(b as usize, c as usize);
-    }
-    let groups = groups.all();
+    let groups = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles).all();
     let mut chosen = vec![None; mesh.vertices.len()];
     let mut numbers = vec![u32::MAX; mesh.vertices.len()];
     let mut result = TriMesh::default();

@@ -24,6 +24,20 @@ pub struct TriMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl TriMesh {
+    /// Adds another mesh, with vertices of its own.
+    pub fn append(&mut self, other: &Self) {
+        let first = self.vertices.len() as u32;
+        self.vertices.extend(&other.vertices);
+        self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+    }
+
+    /// Turns every triangle around: what was outside is inside.
+    pub fn reverse(&mut self) {
+        self.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    }
+}
+
 /// A closed, oriented 2-manifold triangle mesh with outward normals, in mm.
 ///
 /// Invariant, proven by [`Solid::new`]: every directed edge has exactly one opposite, the triangles around
@@ -121,6 +135,12 @@ impl Solid {
     #[must_use]
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
+    }
+
+    /// The mesh alone.
+    #[must_use]
+    pub fn into_mesh(self) -> TriMesh {
+        self.mesh
     }
 
     /// Its counts.

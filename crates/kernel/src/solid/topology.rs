@@ -129,11 +129,7 @@ impl Topology {
 
     /// Shells by union-find over vertices; the sign of each shell's volume tells cavities.
     fn count_shells(&mut self, mesh: &TriMesh) {
-        let mut groups = Groups::new(mesh.vertices.len());
-        for &[a, b, c] in &mesh.triangles {
-            groups.join(a as usize, b as usize);
-            groups.join(b as usize, c as usize);
-        }
+        let mut groups = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles);
         let mut volumes: Vec<f64> = Vec::new();
         // The root's entry in `number` names its shell.
         let mut number = vec![u32::MAX; mesh.vertices.len()];
