@@ -486,7 +486,7 @@ fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
 
 /// The largest value of a site's points along a direction.
 #[inline]
-fn highest(site: &Site, direction: &Point) -> f64 {
+pub(super) fn highest(site: &Site, direction: &Point) -> f64 {
     match site {
         Site::Point(a) => dot(a, direction),
         Site::Segment(ends) => ends.iter().map(|end| dot(end, direction)).fold(f64::NEG_INFINITY, f64::max),

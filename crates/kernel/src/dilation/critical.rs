@@ -6,6 +6,7 @@
 //! every one of a value in (r, outer] is outside. Both kinds lie in what the sites leave of a tetrahedron.
 
 use super::block::{BlockSurface, Frame, Nearby, place};
+use super::certificate::highest;
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
 use super::plan::Setting;
@@ -18,14 +19,14 @@ use crate::measure::triangle::{Feature, closest_feature};
 const MOST_WORK: usize = 4000;
 /// Steps of the searches for a plane.
 const STEPS: usize = 32;
+/// Boxes are halved along axes across which distances hardly vary, too, when they are so many times as long.
+const LEAST_SLOPE: f64 = 0.15;
 
 /// An affine function.
 #[derive(Clone, Copy)]
 struct Affine {
     at_base: f64,
     slope: Point,
-    /// Its length.
-    steepness: f64,
 }
 
 impl Affine {
@@ -36,12 +37,29 @@ impl Affine {
         let determinant = dot(&columns[0], &dual[0]);
         let slope: Point =
             std::array::from_fn(|axis| (0..3).map(|k| (values[k + 1] - values[0]) * dual[k][axis]).sum::<f64>() / determinant);
-        Self { at_base: values[0], slope, steepness: dot(&slope, &slope).sqrt() }
+        Self { at_base: values[0], slope }
     }
 
-    fn at(&self, offset: &Point) -> f64 {
-        self.at_base + dot(&self.slope, offset)
+    /// Its least and its largest value in a box.
+    fn over(&self, offset: &Point, half: &Point) -> [f64; 2] {
+        let (middle, range) = (self.at_base + dot(&self.slope, offset), range(&self.slope, half));
+        [middle - range, middle + range]
     }
+}
+
+/// By how much a linear function with a slope varies in a box with these half sides, to either side.
+fn range(slope: &Point, half: &Point) -> f64 {
+    (0..3).map(|axis| slope[axis].abs() * half[axis]).sum()
+}
+
+/// A site seen from the middle of a box.
+#[derive(Clone, Copy)]
+struct View {
+    site: u32,
+    distance: f64,
+    /// The gradient of the distance.
+    slope: Point,
+    closest: Point,
 }
 
 /// Working memory of the search.
@@ -49,15 +67,28 @@ impl Affine {
 pub(super) struct Critical {
     /// Points whose hull holds the closest points of active sites.
     closest: Vec<Point>,
-    /// Closest points of all sites, with their squared distances.
-    weighted: Vec<(f64, Point)>,
+    /// The sites of a box.
+    views: Vec<View>,
     /// Corners of what the sites leave.
     rest: Vec<Point>,
     /// What sites cover, what V's cover, and the tetrahedron itself.
     sites: Vec<Affine>,
     functions: Vec<Affine>,
     weights: Vec<Affine>,
-    open: Vec<(Point, f64)>,
+    open: Vec<Open>,
+    /// Sites that may be nearest in the boxes that are open, as indices of those near the tetrahedron: one list behind the other.
+    active: Vec<u32>,
+}
+
+/// A box to be looked at.
+#[derive(Clone, Copy)]
+struct Open {
+    middle: Point,
+    /// Half its sides.
+    half: Point,
+    /// Its sites are those of `active` up to here, from `first` on.
+    end: usize,
+    first: usize,
 }
 
 impl Critical {
@@ -115,25 +146,37 @@ impl Critical {
         self.weights.extend((0..4).map(|m| Affine::new(&frame.positions, std::array::from_fn(|k| f64::from(u8::from(k == m))))));
     }
 
-    /// Branch and bound over boxes.
+    /// Branch and bound over boxes, until one is found that is not settled.
     fn refine(&mut self, setting: &Setting, tree: &Tree<'_>, frame: &Frame, nearby: &[Nearby], surface: &mut BlockSurface) {
         let low: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
         let high: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
-        let half = (0..3).map(|axis| 0.5 * (high[axis] - low[axis])).fold(0.0, f64::max);
         let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + 5));
         let mut open = std::mem::take(&mut self.open);
         open.clear();
-        open.push((std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis])), half));
+        self.active.clear();
+        self.active.extend(0..nearby.len() as u32);
+        open.push(Open {
+            middle: std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis])),
+            half: std::array::from_fn(|axis| 0.5 * (high[axis] - low[axis])),
+            first: 0,
+            end: nearby.len(),
+        });
         let mut work = 0;
-        while let Some((middle, half)) = open.pop() {
-            let around = half * 3.0_f64.sqrt();
+        while let Some(Open { middle, half, first, end }) = open.pop() {
             work += 1;
-            if self.is_settled(setting, tree, frame, nearby, &middle, around) {
+            self.active.truncate(end);
+            if self.is_settled(setting, tree, frame, nearby, &middle, &half, first) {
                 continue;
             }
-            if half > smallest && work < MOST_WORK {
-                let offset = |octant: u32, axis: usize| if octant >> axis & 1 == 1 { 0.5 * half } else { -0.5 * half };
-                open.extend((0..8).map(|octant| (std::array::from_fn(|axis| middle[axis] + offset(octant, axis)), 0.5 * half)));
+            let axis = self.widest(&half);
+            if half[axis] > smallest && work < MOST_WORK {
+                let (first, end) = (end, self.active.len());
+                for side in [-0.5, 0.5] {
+                    let (mut middle, mut half) = (middle, half);
+                    middle[axis] += side * half[axis];
+                    half[axis] *= 0.5;
+                    open.push(Open { middle, half, first, end });
+                }
                 continue;
             }
             let within = std::array::from_fn(|axis| (middle[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
@@ -142,38 +185,83 @@ impl Critical {
             } else {
                 surface.uncertain.push(Cube::containing(0, within));
             }
+            // The tetrahedron will not be there again, or no level tells it.
+            break;
         }
         self.open = open;
     }
 
-    /// Whether the ball of radius `around` a point holds no critical point on the wrong side, as far as the tetrahedron reaches.
-    fn is_settled(&mut self, setting: &Setting, tree: &Tree<'_>, frame: &Frame, nearby: &[Nearby], x: &Point, around: f64) -> bool {
+    /// The axis along which a box is to be halved: where distances vary most.
+    fn widest(&self, half: &Point) -> usize {
+        let slope = |axis: usize| self.views.iter().map(|view| view.slope[axis].abs()).fold(LEAST_SLOPE, f64::max);
+        let widths = [0, 1, 2].map(|axis| half[axis] * slope(axis));
+        (0..3).max_by(|&a, &b| widths[a].total_cmp(&widths[b])).unwrap_or(0)
+    }
+
+    /// Whether a box holds no critical point on the wrong side, as far as the tetrahedron reaches. The sites that may be nearest in the box are those
+    /// of `active` from `first` on; where it is not settled, those of them that indeed may be are appended.
+    ///
+    /// Distances are convex: d(y) is at least d(x) + slope . (y - x), and at most what it is at the worst corner. A site is nearest at a point only if its lower end there is no more than
+    /// another's upper end.
+    #[allow(clippy::too_many_arguments)]
+    fn is_settled(
+        &mut self,
+        setting: &Setting,
+        tree: &Tree<'_>,
+        frame: &Frame,
+        nearby: &[Nearby],
+        x: &Point,
+        half: &Point,
+        first: usize,
+    ) -> bool {
         let offset = subtract(x, &frame.positions[0]);
-        let below = |function: &Affine| function.at(&offset) + around * function.steepness < 0.0;
-        let above = |function: &Affine| function.at(&offset) - around * function.steepness > 0.0;
+        let below = |function: &Affine| function.over(&offset, half)[1] < 0.0;
+        let above = |function: &Affine| function.over(&offset, half)[0] > 0.0;
         // What one site covers is inside, and its critical points have values below r.
-        if self.weights.iter().any(below) || self.sites.iter().any(below) {
+        if self.weights.iter().any(below) || self.active[first..].iter().any(|&site| below(&self.sites[site as usize])) {
             return true;
         }
-        self.weighted.clear();
-        self.weighted.extend(nearby.iter().map(|nearby| {
-            let site = tree.site(nearby.site);
+        let (active, views) = (&self.active, &mut self.views);
+        views.clear();
+        views.extend(active[first..].iter().map(|&index| {
+            let site = tree.site(nearby[index as usize].site);
             let closest = site.closest(x);
-            (distance_squared(x, &closest) + site.deficit, closest)
+            let away = subtract(x, &closest);
+            let distance = (dot(&away, &away) + site.deficit).sqrt();
+            View { site: index, distance, slope: away.map(|part| part / distance.max(f64::MIN_POSITIVE)), closest }
         }));
-        let distance = self.weighted.iter().map(|(square, _)| *square).fold(f64::INFINITY, f64::min).sqrt();
-        if distance - around > setting.outer
-            || (distance + around <= setting.reach && self.functions.iter().any(below))
-            || (distance - around > setting.reach && self.functions.iter().all(above) && self.sites.iter().all(above))
+        let Some(nearest) = views.iter().min_by(|a, b| a.distance.total_cmp(&b.distance)) else { return true };
+        let site = tree.site(nearby[nearest.site as usize].site);
+        let corner = |code: usize| std::array::from_fn(|axis| x[axis] + if code >> axis & 1 == 1 { half[axis] } else { -half[axis] });
+        let high = (0..8).map(|code| site.distance_squared(&corner(code))).fold(0.0, f64::max).sqrt();
+        views.retain(|view| view.distance - range(&view.slope, half) <= high);
+        let low = views.iter().map(|view| view.distance - range(&view.slope, half)).fold(f64::INFINITY, f64::min);
+        let own = |view: &View| &self.sites[view.site as usize];
+        // A site that is nowhere nearest has L >= d^2 - theta > 0 where the others have d > r.
+        if low > setting.outer
+            || (high <= setting.reach && self.functions.iter().any(below))
+            || (low > setting.reach && self.functions.iter().all(above) && views.iter().all(|view| above(own(view))))
         {
             return true;
         }
-        // Closest points of other points of the ball are within `around` of these.
-        let most = (distance + 2.0 * around).powi(2);
         self.closest.clear();
-        self.closest.extend(self.weighted.iter().filter(|(square, _)| *square <= most).map(|(_, closest)| *closest));
-        is_farther(x, &self.closest, 2.0 * around)
+        self.closest.extend(views.iter().map(|view| view.closest));
+        // Closest points of other points of the box are as near to these as the points are to the middle.
+        let around = dot(half, half).sqrt();
+        if is_farther(x, &self.closest, 2.0 * around) || is_beyond(views, tree, nearby, x, half) {
+            return true;
+        }
+        self.active.extend(self.views.iter().map(|view| view.site));
+        false
     }
+}
+
+/// Whether all of a box lies beyond all sites along one direction: no point of it is then in a hull of points of theirs.
+fn is_beyond(views: &[View], tree: &Tree<'_>, nearby: &[Nearby], x: &Point, half: &Point) -> bool {
+    let direction = views.iter().fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.slope[axis]));
+    let least = dot(&direction, x) - range(&direction, half);
+    let slack = 1e-12 * (dot(&direction, &direction) * dot(x, x)).sqrt();
+    views.iter().all(|view| highest(&tree.site(nearby[view.site as usize].site).site, &direction) + slack < least)
 }
 
 /// Adds points whose hull holds the closest points of a site to all points of a tetrahedron.
