@@ -19,6 +19,7 @@
 //! | `splits` | do the parts of a solid add up to it? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
+//! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
 //! | `service` | does the running service keep them? |
 //! | `session` | does the page's session by curl run as it stands there? |
@@ -44,6 +45,7 @@ mod hostile;
 mod independent;
 mod levels;
 mod measures;
+mod processes;
 mod properties;
 mod remote;
 mod service;

@@ -121,6 +121,13 @@ pub(super) enum Command {
         #[arg(long)]
         url: Option<String>,
     },
+    /// Do jobs for the service that started this process: told on stdin, answered on stdout.
+    #[command(name = crate::jobs::process::COMMAND, hide = true)]
+    DoJobs {
+        /// Threads that a job may use.
+        #[arg(long, value_name = "COUNT")]
+        threads: usize,
+    },
     /// Print the OpenAPI description of the service.
     Openapi,
     /// Print the settings of `serve` and where each comes from.

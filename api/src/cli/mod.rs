@@ -67,6 +67,10 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
             None => remote::jobs::jobs(&Server::at(&operate::local_url()?)?, &command, manner),
         },
         Command::Serve(args) => operate::serve(args),
+        Command::DoJobs { threads } => {
+            work::use_threads(Some(threads))?;
+            crate::jobs::apart::serve()
+        }
         Command::Healthcheck { url } => operate::healthcheck(url.as_deref()),
         Command::Openapi => print(crate::openapi::text().as_bytes()),
         Command::Doctor(args) => operate::doctor(&args),

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use lacuna_kernel::budget::{CancelToken, Progress, StopReason};
+use lacuna_kernel::budget::{CancelToken, StopReason};
 
 use super::events::EventLog;
 use super::record::{JobRecord, JobState, JobView, Step};
@@ -117,15 +117,14 @@ impl LiveJob {
     }
 
     /// Takes what the kernel tells of its progress.
-    pub fn progress(&self, progress: &Progress) {
+    pub fn progress(&self, step: Step) {
         let now = Instant::now();
         let mut last = crate::locked(&self.last_progress);
         let mut record = crate::locked(&self.record);
-        let same_phase = record.view.progress.as_ref().is_some_and(|step| step.phase == progress.phase);
+        let same_phase = record.view.progress.as_ref().is_some_and(|known| known.phase == step.phase);
         if same_phase && last.is_some_and(|last| now.duration_since(last) < PROGRESS_EVERY) {
             return;
         }
-        let step = Step { phase: progress.phase.to_owned(), fraction: progress.fraction, count: progress.count };
         *last = Some(now);
         record.view.progress = Some(step.clone());
         drop(record);

@@ -1,6 +1,7 @@
 //! What is kept of a job, and what its owner sees of it.
 
 use lacuna_fabrication::{Certificate, JobKind};
+use lacuna_kernel::budget::Progress;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -83,6 +84,12 @@ pub struct Step {
     pub fraction: f64,
     /// Triangles or cells made so far, by phase.
     pub count: u64,
+}
+
+impl From<&Progress> for Step {
+    fn from(progress: &Progress) -> Self {
+        Self { phase: progress.phase.to_owned(), fraction: progress.fraction, count: progress.count }
+    }
 }
 
 /// A job as its owner sees it.
