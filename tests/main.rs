@@ -12,6 +12,7 @@
 //! | `levels` | are levels of systems the solids that closed forms say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
+//! | `regression` | do other repositories learn when their parts change? |
 //! | `remote` | does the command line at a service leave what it leaves here? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
@@ -47,6 +48,7 @@ mod levels;
 mod measures;
 mod processes;
 mod properties;
+mod regression;
 mod remote;
 mod service;
 mod session;
