@@ -164,7 +164,7 @@ fn refusals_have_the_exit_codes_of_this_machine() {
         (3, "the-key", &["run", job, "-o", made.to_str().unwrap()], "radius_mm"),
         (3, "the-key", &["validate", bad], "not a valid model"),
         (2, "the-key", &["evaluate", model, "--tolerance", "0.1", "--threads", "2", "-o", out], "--threads"),
-        (2, "the-key", &["--server", "https://127.0.0.1:1", "evaluate", model, "--tolerance", "0.1", "-o", out], "TLS"),
+        (2, "the-key", &["--server", "ftp://127.0.0.1:1", "evaluate", model, "--tolerance", "0.1", "-o", out], "no address of a service"),
         (5, "the-key", &["--server", "http://127.0.0.1:9", "evaluate", model, "--tolerance", "0.1", "-o", out], "127.0.0.1:9"),
         (6, "the-key", &["jobs", "show", "job_none"], "job_none"),
         (3, "the-key", &["jobs", "submit", bad], "kind"),

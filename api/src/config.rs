@@ -111,6 +111,8 @@ pub struct Flags {
 pub struct Config {
     /// Address and port to listen on; port 0 takes a free one.
     pub bind: SocketAddr,
+    /// Address and port on which probes and metrics are answered without a key, if there is one.
+    pub metrics_bind: Option<SocketAddr>,
     /// The data folder; where things are shared it only holds what is being written.
     pub data: PathBuf,
     /// What this process does.
@@ -258,6 +260,11 @@ impl Config {
             value: bind.clone(),
             expected: "an address and a port are expected, for example 127.0.0.1:7878 or [::1]:7878",
         })?;
+        let metrics_bind = reader.perhaps("LACUNA_METRICS_BIND", None, str::to_owned);
+        let metrics_bind = metrics_bind.map(|text| {
+            let expected = "an address and a port are expected, for example 127.0.0.1:9090; leave it out for none";
+            text.parse().map_err(|_| BadSetting { name: "LACUNA_METRICS_BIND", value: text.clone(), expected })
+        });
         let data = reader.take("LACUNA_DATA", flags.data.as_ref().map(|d| d.display().to_string()), "lacuna-data".to_owned(), "")?;
         let shared = read_shared(&mut reader, flags)?;
         let defaults = Limits::default();
@@ -266,6 +273,7 @@ impl Config {
             shared,
             lease_seconds: reader.take("LACUNA_LEASE_SECONDS", None, 15, COUNT)?.clamp(1, 3600),
             bind: address,
+            metrics_bind: metrics_bind.transpose()?,
             data: PathBuf::from(data),
             workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
             threads: reader.take("LACUNA_THREADS", flags.threads, 0, COUNT)?,
@@ -431,6 +439,15 @@ mod tests {
         assert!(config.role.works() && !config.role.answers());
         assert_eq!(told.iter().find(|t| t.name == DATABASE.0).unwrap().value, "postgres://ada:***@db.example:5432/lacuna");
         assert!(!format!("{config:?}{told:?}").contains("s3cret"));
+    }
+
+    #[test]
+    fn metrics_have_an_address_of_their_own_or_none() {
+        let with =
+            |value: &'static str| Config::read(&Flags::default(), &move |name| (name == "LACUNA_METRICS_BIND").then(|| value.into()));
+        assert_eq!(with("0.0.0.0:9090").unwrap().0.metrics_bind.unwrap().port(), 9090);
+        assert_eq!(with(" ").unwrap().0.metrics_bind, None);
+        assert_eq!(with("9090").unwrap_err().name, "LACUNA_METRICS_BIND");
     }
 
     #[test]

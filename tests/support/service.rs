@@ -85,7 +85,7 @@ impl Service {
     fn start_by(mut command: Command, data: &Path, environment: &[(&str, &str)]) -> Self {
         command.args(["serve", "--bind", "127.0.0.1:0", "--data"]).arg(data).envs(environment.iter().copied());
         let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
+        // Both pipes are read to the end, so that the service never waits for us.
         let (sender, addresses) = channel();
         let pipes: [Box<dyn Read + Send>; 2] = [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
         let said = Arc::<Mutex<Vec<String>>>::default();
@@ -93,7 +93,7 @@ impl Service {
             let (sender, said) = (sender.clone(), Arc::clone(&said));
             std::thread::spawn(move || {
                 for line in BufReader::new(pipe).lines().map_while(Result::ok) {
-                    if let Some(address) = address_in(&line) {
+                    if let Some(address) = line.strip_prefix("listening on ").and_then(address_in) {
                         let _ = sender.send(address);
                     }
                     said.lock().unwrap().push(line);
