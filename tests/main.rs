@@ -22,7 +22,7 @@
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
 //! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
-//! | `secure` | does the command line speak TLS, and have metrics an address of their own? |
+//! | `secure` | does the command line speak TLS, have metrics an address of their own, do traces arrive? |
 //! | `service` | does the running service keep them? |
 //! | `session` | does the page's session by curl run as it stands there? |
 //! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |

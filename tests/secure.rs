@@ -1,6 +1,6 @@
-//! What is seen from beyond the machine: the command line over TLS, and the second address for whoever looks after the service.
+//! What is seen from beyond the service: the command line over TLS, the second address for whoever looks after it, and traces at a collector.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 
@@ -9,6 +9,7 @@ use lacuna_tests::support::cases;
 use lacuna_tests::support::python::system_python;
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::Service;
+use serde_json::{Value, json};
 
 /// Adds TLS to a service, as a proxy in front of it does.
 const PROXY: &str = "import socket, ssl, sys, threading
@@ -92,6 +93,76 @@ fn the_command_line_speaks_tls_to_whom_the_machine_trusts() {
     assert_eq!(service.get("/v1/jobs").json()["items"].as_array().unwrap().len(), 1);
 }
 
+/// A collector: takes what is posted to it and gives the spans.
+fn collector() -> (String, std::sync::mpsc::Receiver<Value>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("http://{}", listener.local_addr().unwrap());
+    let (sender, spans) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = BufReader::new(stream.unwrap());
+            // One connection may bring several documents.
+            loop {
+                let (mut head, mut length) = (String::new(), 0);
+                while stream.read_line(&mut head).unwrap_or(0) > 2 {
+                    let line = head.lines().last().unwrap().to_ascii_lowercase();
+                    length = line.strip_prefix("content-length:").map_or(length, |value| value.trim().parse().unwrap());
+                }
+                if length == 0 {
+                    break;
+                }
+                assert!(head.starts_with("POST /v1/traces "), "{head}");
+                let mut body = vec![0; length];
+                stream.read_exact(&mut body).unwrap();
+                stream.get_mut().write_all(b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: 2\r\n\r\n{}").unwrap();
+                let document: Value = serde_json::from_slice(&body).unwrap();
+                let resource = &document["resourceSpans"][0];
+                assert!(resource["resource"]["attributes"].to_string().contains("\"lacuna\""), "{resource}");
+                for span in resource["scopeSpans"][0]["spans"].as_array().unwrap() {
+                    sender.send(span.clone()).unwrap();
+                }
+            }
+        }
+    });
+    (address, spans)
+}
+
+#[test]
+fn a_trace_leads_from_the_caller_to_the_phases_of_a_job() {
+    let (url, spans) = collector();
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_TRACES_URL", &url)]);
+    let model: Value = serde_json::from_slice(&std::fs::read(cases::named("meshes/segment").model()).unwrap()).unwrap();
+    let order = json!({ "lacuna": 1, "kind": "solidify", "model": model, "params": { "tolerance_mm": 0.05, "radius_mm": 1.0 } });
+    let parent = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
+    let answer = service.post_with("/v1/jobs", &[("traceparent", parent), ("prefer", "wait=30")], order.to_string().as_bytes());
+    assert_eq!(answer.json()["state"], "succeeded", "{}", answer.json());
+    let mut found: Vec<Value> = Vec::new();
+    let all = |found: &[Value]| {
+        ["POST /v1/jobs", "job solidify", "dilate", "write"].iter().all(|name| found.iter().any(|span| span["name"] == *name))
+    };
+    while !all(&found) {
+        found.push(spans.recv_timeout(std::time::Duration::from_secs(30)).unwrap_or_else(|_| panic!("not all spans came: {found:?}")));
+    }
+    let named = |name: &str| found.iter().find(|span| span["name"] == name).unwrap();
+    let (request, job, phase) = (named("POST /v1/jobs"), named("job solidify"), named("dilate"));
+    for span in [request, job, phase] {
+        assert_eq!(span["traceId"], "4bf92f3577b34da6a3ce929d0e0e4736", "{span}");
+        let time = |member: &str| span[member].as_str().unwrap().parse::<u128>().unwrap();
+        assert!(time("startTimeUnixNano") <= time("endTimeUnixNano"), "{span}");
+    }
+    assert_eq!(request["parentSpanId"], "00f067aa0ba902b7");
+    assert_eq!((&job["parentSpanId"], &phase["parentSpanId"]), (&request["spanId"], &job["spanId"]));
+    assert!(job["attributes"].to_string().contains(answer.json()["id"].as_str().unwrap()));
+    assert!(
+        request["attributes"].as_array().unwrap().contains(&json!({ "key": "http.response.status_code", "value": { "intValue": "200" } }))
+    );
+    // A collector that is away costs a line in the log and nothing else.
+    let away = Scratch::new();
+    let service = Service::start_with(away.path(), &[("LACUNA_TRACES_URL", "http://127.0.0.1:9")]);
+    assert_eq!(service.done(&order)["state"], "succeeded");
+}
+
 #[test]
 fn metrics_have_an_address_of_their_own() {
     let scratch = Scratch::new();
@@ -115,7 +186,7 @@ fn metrics_have_an_address_of_their_own() {
         assert_eq!(get(path).0, 404, "{path}");
     }
     let doctor = Command::new(lacuna()).arg("doctor").env("LACUNA_METRICS_BIND", &place).output().unwrap();
-    let told: serde_json::Value = serde_json::from_slice(&doctor.stdout).unwrap();
+    let told: Value = serde_json::from_slice(&doctor.stdout).unwrap();
     let setting = told["settings"].as_array().unwrap().iter().find(|setting| setting["name"] == "LACUNA_METRICS_BIND").unwrap();
     assert_eq!((setting["value"].as_str(), setting["origin"].as_str()), (Some(place.as_str()), Some("environment")));
 }

@@ -1,7 +1,7 @@
 //! A job in memory: its record, its events and the flag that stops it.
 
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use lacuna_kernel::budget::{CancelToken, StopReason};
 
@@ -16,6 +16,8 @@ const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 pub struct LiveJob {
     record: Mutex<JobRecord>,
     last_progress: Mutex<Option<Instant>>,
+    /// When each phase of the attempt that is done here began.
+    phases: Mutex<Vec<(String, SystemTime)>>,
     /// Held by whoever makes a lasting change, from reading the record to telling of the change.
     changing: Mutex<()>,
     stopped: Mutex<Option<Instant>>,
@@ -39,6 +41,7 @@ impl LiveJob {
         let job = Self {
             record: Mutex::new(record),
             last_progress: Mutex::default(),
+            phases: Mutex::default(),
             changing: Mutex::default(),
             stopped: Mutex::default(),
             cancel: CancelToken::new(),
@@ -126,9 +129,17 @@ impl LiveJob {
             return;
         }
         *last = Some(now);
+        if !same_phase {
+            crate::locked(&self.phases).push((step.phase.clone(), SystemTime::now()));
+        }
         record.view.progress = Some(step.clone());
         drop(record);
         self.events.push("progress", &step);
+    }
+
+    /// When each phase began since this was last asked.
+    pub fn take_phases(&self) -> Vec<(String, SystemTime)> {
+        std::mem::take(&mut *crate::locked(&self.phases))
     }
 
     fn announce_progress(&self, view: &JobView) {

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
+use crate::traces::Context;
 
 /// How often a job is started before it counts as the one that brings its worker down.
 pub const ATTEMPTS: u32 = 2;
@@ -226,6 +227,9 @@ pub struct JobRecord {
     /// Idempotency key, if one was given.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub idempotency: Option<Idempotency>,
+    /// The span of the request that ordered it, if anybody wants traces.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub trace: Option<Context>,
 }
 
 /// What finished work left, so that the same work need not be done again.

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::io;
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use lacuna_kernel::budget::{Budget, CancelToken, Limits, Progress, StopReason};
 
@@ -19,6 +19,7 @@ use crate::files::PendingFile;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Engine};
 use crate::store::Store;
+use crate::traces::{self, Context, Span, SpanKind};
 
 /// Between two tries to reach an object store that is away.
 const AWAY_PAUSE: Duration = Duration::from_millis(500);
@@ -105,7 +106,34 @@ fn record(desk: &Desk, made: Made) {
     }
     let (kind, time) = (documents::kind_word(job.with(|record| record.view.kind)), since.elapsed());
     desk.metrics.ended(kind, state, time);
+    trace(&job, kind, state, time);
     tracing::info!(job = %job.id(), kind, state = state.word(), milliseconds = time.as_millis(), "job ended");
+}
+
+/// Tells of an attempt and of its phases, each of which lasts until the next one begins.
+fn trace(job: &LiveJob, kind: &str, state: JobState, time: Duration) {
+    let phases = job.take_phases();
+    if !traces::wanted() {
+        return;
+    }
+    let end = SystemTime::now();
+    let parent = job.with(|record| record.trace);
+    let context = parent.map_or_else(Context::new, Context::child);
+    let span = |name: String, kind, context, parent, start, end, attributes| {
+        traces::tell(Span { name, kind, context, parent, start, end, attributes, failed: state == JobState::Failed });
+    };
+    let ends: Vec<SystemTime> = phases.iter().skip(1).map(|(_, begun)| *begun).chain([end]).collect();
+    for ((phase, begun), ended) in phases.into_iter().zip(ends) {
+        span(phase, SpanKind::Internal, context.child(), Some(context), begun, ended, Vec::new());
+    }
+    let (id, attempt) = job.with(|record| (record.view.id.clone(), record.view.attempt));
+    let attributes = vec![
+        ("lacuna.job.id", id.into()),
+        ("lacuna.job.kind", kind.into()),
+        ("lacuna.job.state", state.word().into()),
+        ("lacuna.job.attempt", attempt.into()),
+    ];
+    span(format!("job {kind}"), SpanKind::Consumer, context, parent, end.checked_sub(time).unwrap_or(end), end, attributes);
 }
 
 fn perform(desk: &Desk, job: &Arc<LiveJob>, most: &Limits, engine: Engine, place: &mut Place) -> Result<Files, Problem> {

@@ -377,8 +377,8 @@ pub(crate) fn stl_bytes(triangles: f64) -> f64 {
 
 /// What a process holds for each byte that a lattice is accounted for, and besides, in bytes: found on the fixtures, on two cores.
 /// `fixtures/ESTIMATES.md` shows how well they do.
-const HELD_PER_BYTE: f64 = 2.5;
-const HELD_BESIDES: f64 = 8e6;
+const HELD_PER_BYTE: f64 = 2.0;
+const HELD_BESIDES: f64 = 2e6;
 
 /// Peak memory of making a lattice that is accounted for so many bytes.
 pub(crate) fn held_bytes(accounted: f64) -> f64 {

@@ -1,12 +1,10 @@
 //! A service at an address: requests, and its refusals as problems.
 
 use std::io::Read;
-use std::sync::Arc;
 use std::time::Duration;
 
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response};
-use ureq::tls::{RootCerts, TlsConfig};
 use ureq::{Agent, Body};
 
 use crate::problem::{Problem, ProblemKind};
@@ -42,13 +40,8 @@ impl Server {
             return Err(usage(format!("{base:?} is no address of a service; http://HOST:PORT or https://HOST:PORT is expected")));
         }
         let key = std::env::var(KEY).ok().map(|key| key.trim().to_owned()).filter(|key| !key.is_empty());
-        // Whom the machine trusts, the command trusts: SSL_CERT_FILE names authorities of one's own.
-        let trusted = TlsConfig::builder()
-            .root_certs(RootCerts::PlatformVerifier)
-            .unversioned_rustls_crypto_provider(Arc::new(rustls::crypto::ring::default_provider()))
-            .build();
         let config = Agent::config_builder()
-            .tls_config(trusted)
+            .tls_config(crate::trust::tls())
             .http_status_as_error(false)
             .max_redirects(0)
             .max_redirects_will_error(false)
