@@ -189,7 +189,7 @@ fn a_worker_that_is_asked_to_end_hands_its_job_back_and_another_ends_it() {
     let mut workers = [Some(stage.start("worker", "one")), Some(stage.start("worker", "two"))];
     // Some seconds of work: more than the worker has to end it, and it can be waited for.
     let mut order = long_order(0);
-    order["params"]["tolerance_mm"] = json!(2e-6);
+    order["params"]["tolerance_mm"] = json!(1e-5);
     let id = submit(&front, &order);
     until("a start", || taker(&workers, &id, 1).is_some());
     let first = taker(&workers, &id, 1).unwrap();
