@@ -126,6 +126,20 @@ fn a_crash_ends_one_job_and_nothing_else() {
 }
 
 #[test]
+fn a_process_that_dies_between_two_jobs_is_replaced() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_WORKERS", "1")]);
+    for number in 0..3 {
+        let job = service.done(&small(number));
+        assert_eq!((&job["state"], &job["attempt"]), (&json!("succeeded"), &json!(1)), "{job}");
+        let kept = service.children();
+        assert_eq!(kept.len(), 1, "a small process is kept");
+        assert!(send_signal(kept[0], "KILL"));
+        until("dead", || !is_alive(kept[0]));
+    }
+}
+
+#[test]
 fn stopping_a_job_frees_its_process_at_once() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());

@@ -37,6 +37,8 @@ pub(super) fn limit(bytes: u64) -> Result<(), Problem> {
         let current = Some(maximum.map_or(wanted, |maximum| wanted.min(maximum)));
         setrlimit(Resource::Data, Rlimit { current, maximum }).map_err(|error| Problem::io("memory cannot be limited", &error.into()))?;
     }
+    #[cfg(not(unix))]
+    let _ = bytes;
     Ok(())
 }
 

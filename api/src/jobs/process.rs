@@ -161,6 +161,11 @@ impl Process {
         }
     }
 
+    /// Itself if it still runs: one that waits for its next job may have been killed like any other.
+    fn still_there(mut self) -> Option<Self> {
+        matches!(self.child.try_wait(), Ok(None)).then_some(self)
+    }
+
     /// Whether it can be kept for another job.
     fn is_small(&self) -> bool {
         memory::of_process(&self.child.id().to_string(), "VmRSS:").is_some_and(|bytes| bytes <= KEPT_BYTES)
@@ -182,10 +187,9 @@ pub(super) struct Place(Option<Process>);
 impl Place {
     /// Does a job, with so many threads.
     pub(super) fn perform(&mut self, task: &Task, job: &Arc<LiveJob>, store: &Store, threads: usize) -> Result<Files, Problem> {
-        let mut process = match self.0.take() {
-            Some(process) => process,
-            None => Process::start(store, threads).map_err(|error| Problem::io("no process to do the job", &error))?,
-        };
+        let kept = self.0.take().and_then(Process::still_there);
+        let started = kept.map_or_else(|| Process::start(store, threads), Ok);
+        let mut process = started.map_err(|error| Problem::io("no process to do the job", &error))?;
         let made = process.perform(task, job, store);
         if !matches!(made, Err(Failure::Over(_))) && process.is_small() {
             self.0 = Some(process);
