@@ -12,6 +12,7 @@
 //! | `levels` | are levels of systems the solids that closed forms say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
+//! | `regression` | do other repositories learn when their parts change? |
 //! | `remote` | does the command line at a service leave what it leaves here? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
@@ -19,7 +20,9 @@
 //! | `splits` | do the parts of a solid add up to it? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
+//! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
+//! | `secure` | does the command line speak TLS, have metrics an address of their own, do traces arrive? |
 //! | `service` | does the running service keep them? |
 //! | `session` | does the page's session by curl run as it stands there? |
 //! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
@@ -44,8 +47,11 @@ mod hostile;
 mod independent;
 mod levels;
 mod measures;
+mod processes;
 mod properties;
+mod regression;
 mod remote;
+mod secure;
 mod service;
 mod session;
 mod slices;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use lacuna_tests::support::binary::lacuna;
+use lacuna_tests::support::binary::{lacuna, succeed};
 use lacuna_tests::support::cases;
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::Service;
@@ -52,6 +52,18 @@ fn same(service: &Service, inputs: &[(&str, &[u8])], arguments: &[&str]) {
     }
 }
 
+/// A command that is refused, here as at a service, in the same words.
+#[track_caller]
+fn same_refusal(inputs: &[(&str, &[u8])], service: &Service, arguments: &[&str]) {
+    let folder = Scratch::new();
+    for (name, bytes) in inputs {
+        std::fs::write(folder.join(name), bytes).unwrap();
+    }
+    let [here, there] = [None, Some(service)].map(|server| command(server, arguments).current_dir(folder.path()).output().unwrap());
+    assert!(!here.status.success(), "{arguments:?}");
+    assert_eq!((here.status.code(), words(&here.stderr)), (there.status.code(), words(&there.stderr)), "{arguments:?}");
+}
+
 fn listing(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
     let mut files = std::collections::BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -79,6 +91,17 @@ fn every_kind_of_work_is_the_same_at_a_service() {
     same(&service, segment, &["evaluate", "segment.json", "--tolerance", "0.05", "-o", "a.obj", "--certificate", "c.json"]);
     same(&service, segment, &["measure", "segment.json", "--tolerance", "0.05", "--radius", "1", "--density", "8.9"]);
     same(&service, segment, &["validate", "segment.json"]);
+    let classic = succeed(["library", "koch_curve"]);
+    let koch: &[(&str, &[u8])] = &[("koch.json", &classic)];
+    same(&service, koch, &["address", "koch.json", "--at", "0: 1 (0 1)"]);
+    same(&service, koch, &["address", "koch.json", "--near", "10,5,0", "--within", "2", "--tolerance", "0.1", "--most", "7"]);
+    let open = std::fs::read(cases::named("bcifs/free_corner_cutting").model()).unwrap();
+    let open: &[(&str, &[u8])] = &[("open.json", &open)];
+    same(&service, open, &["solve", "open.json", "--set", "a=0.375", "-o", "filled.json"]);
+    same(&service, open, &["solve", "open.json", "--json"]);
+    for (model, arguments) in [(open, &["solve", "open.json", "--set", "nobody=1"][..]), (koch, &["address", "koch.json", "--at", "7:"])] {
+        same_refusal(model, &service, arguments);
+    }
 
     let meshes: &[(&str, &[u8])] = &[("cube.off", CUBE.as_bytes()), segment[0]];
     let bore =
@@ -141,7 +164,7 @@ fn refusals_have_the_exit_codes_of_this_machine() {
         (3, "the-key", &["run", job, "-o", made.to_str().unwrap()], "radius_mm"),
         (3, "the-key", &["validate", bad], "not a valid model"),
         (2, "the-key", &["evaluate", model, "--tolerance", "0.1", "--threads", "2", "-o", out], "--threads"),
-        (2, "the-key", &["--server", "https://127.0.0.1:1", "evaluate", model, "--tolerance", "0.1", "-o", out], "TLS"),
+        (2, "the-key", &["--server", "ftp://127.0.0.1:1", "evaluate", model, "--tolerance", "0.1", "-o", out], "no address of a service"),
         (5, "the-key", &["--server", "http://127.0.0.1:9", "evaluate", model, "--tolerance", "0.1", "-o", out], "127.0.0.1:9"),
         (6, "the-key", &["jobs", "show", "job_none"], "job_none"),
         (3, "the-key", &["jobs", "submit", bad], "kind"),

@@ -9,7 +9,7 @@ use lacuna_kernel::automaton::StateId;
 use lacuna_kernel::budget::{Budget, CancelToken};
 use lacuna_kernel::model::Model;
 use lacuna_kernel::tolerance::{LENGTHS_MM, Tolerance};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::jobs::watchdog::Watchdog;
@@ -17,18 +17,18 @@ use crate::problem::{Finding, Problem};
 use crate::production::{self, guarded};
 
 /// The answer to a question about addresses: the member of what was asked.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AddressAnswer {
     /// Where the address leads.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", default)]
     pub at: Option<LocatedPoint>,
     /// What is near the point.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", default)]
     pub near: Option<NearbyCells>,
 }
 
 /// The point at an address.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct LocatedPoint {
     /// The address of the point: the one that was asked; that of a cell is continued by the first transition of every
     /// state.
@@ -42,7 +42,7 @@ pub struct LocatedPoint {
 }
 
 /// A cell and a ball that contains it.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CellPlace {
     /// Its address.
     pub address: String,
@@ -55,12 +55,12 @@ pub struct CellPlace {
 }
 
 /// The shape near a point.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NearbyCells {
     /// The point that was asked.
     pub point_mm: [f64; 3],
     /// The distance that was asked, if one was.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", default)]
     pub within_mm: Option<f64>,
     /// The radius to which cells were refined.
     pub tolerance_mm: f64,
@@ -73,7 +73,7 @@ pub struct NearbyCells {
 }
 
 /// A point of the shape with its distance.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NearestPoint {
     /// Its address.
     pub address: String,
@@ -86,7 +86,7 @@ pub struct NearestPoint {
 }
 
 /// A cell near the point.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NearbyCell {
     /// Its address, state and ball.
     #[serde(flatten)]

@@ -111,6 +111,10 @@ pub struct Flags {
 pub struct Config {
     /// Address and port to listen on; port 0 takes a free one.
     pub bind: SocketAddr,
+    /// Address and port on which probes and metrics are answered without a key, if there is one.
+    pub metrics_bind: Option<SocketAddr>,
+    /// Address of a collector of traces, if there is one.
+    pub traces_url: Option<String>,
     /// The data folder; where things are shared it only holds what is being written.
     pub data: PathBuf,
     /// What this process does.
@@ -258,6 +262,11 @@ impl Config {
             value: bind.clone(),
             expected: "an address and a port are expected, for example 127.0.0.1:7878 or [::1]:7878",
         })?;
+        let metrics_bind = reader.perhaps("LACUNA_METRICS_BIND", None, str::to_owned);
+        let metrics_bind = metrics_bind.map(|text| {
+            let expected = "an address and a port are expected, for example 127.0.0.1:9090; leave it out for none";
+            text.parse().map_err(|_| BadSetting { name: "LACUNA_METRICS_BIND", value: text.clone(), expected })
+        });
         let data = reader.take("LACUNA_DATA", flags.data.as_ref().map(|d| d.display().to_string()), "lacuna-data".to_owned(), "")?;
         let shared = read_shared(&mut reader, flags)?;
         let defaults = Limits::default();
@@ -266,6 +275,8 @@ impl Config {
             shared,
             lease_seconds: reader.take("LACUNA_LEASE_SECONDS", None, 15, COUNT)?.clamp(1, 3600),
             bind: address,
+            metrics_bind: metrics_bind.transpose()?,
+            traces_url: read_traces(&mut reader)?,
             data: PathBuf::from(data),
             workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
             threads: reader.take("LACUNA_THREADS", flags.threads, 0, COUNT)?,
@@ -326,6 +337,22 @@ fn read_keys(reader: &mut Reader<'_>, filed: Vec<Key>) -> Vec<Key> {
     }
     let plain = plain.iter().map(|key| Key { digest: Digest::of(key.as_bytes()), scope: Scope::Admin });
     plain.chain(filed).collect()
+}
+
+/// The collector's address: ours, or else the name that all programs share.
+fn read_traces(reader: &mut Reader<'_>) -> Result<Option<String>, BadSetting> {
+    let (ours, shared) = ("LACUNA_TRACES_URL", "OTEL_EXPORTER_OTLP_ENDPOINT");
+    let (own, common) = (reader.perhaps(ours, None, without_password), reader.perhaps(shared, None, without_password));
+    let (name, url) = match (own, common) {
+        (Some(url), _) => (ours, url),
+        (None, Some(url)) => (shared, url),
+        (None, None) => return Ok(None),
+    };
+    let host = url.strip_prefix("http://").or_else(|| url.strip_prefix("https://"));
+    if host.is_none_or(str::is_empty) {
+        return Err(BadSetting { name, value: url, expected: "the address of a collector is expected, for example http://127.0.0.1:4318" });
+    }
+    Ok(Some(url))
 }
 
 /// Database and object store: both or neither.
@@ -431,6 +458,28 @@ mod tests {
         assert!(config.role.works() && !config.role.answers());
         assert_eq!(told.iter().find(|t| t.name == DATABASE.0).unwrap().value, "postgres://ada:***@db.example:5432/lacuna");
         assert!(!format!("{config:?}{told:?}").contains("s3cret"));
+    }
+
+    #[test]
+    fn metrics_have_an_address_of_their_own_or_none() {
+        let with =
+            |value: &'static str| Config::read(&Flags::default(), &move |name| (name == "LACUNA_METRICS_BIND").then(|| value.into()));
+        assert_eq!(with("0.0.0.0:9090").unwrap().0.metrics_bind.unwrap().port(), 9090);
+        assert_eq!(with(" ").unwrap().0.metrics_bind, None);
+        assert_eq!(with("9090").unwrap_err().name, "LACUNA_METRICS_BIND");
+    }
+
+    #[test]
+    fn traces_have_one_collector() {
+        let with = |pairs: &'static [(&str, &str)]| {
+            let find = |name: &str| pairs.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned());
+            Config::read(&Flags::default(), &find).map(|(config, _)| config.traces_url)
+        };
+        const COMMON: (&str, &str) = ("OTEL_EXPORTER_OTLP_ENDPOINT", "http://collector:4318");
+        assert_eq!(with(&[]).unwrap(), None);
+        assert_eq!(with(&[COMMON]).unwrap().as_deref(), Some("http://collector:4318"));
+        assert_eq!(with(&[COMMON, ("LACUNA_TRACES_URL", "https://own:4318")]).unwrap().as_deref(), Some("https://own:4318"));
+        assert_eq!(with(&[("LACUNA_TRACES_URL", "collector:4318")]).unwrap_err().name, "LACUNA_TRACES_URL");
     }
 
     #[test]

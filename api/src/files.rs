@@ -10,10 +10,11 @@ use uuid::Uuid;
 /// Ending of files that are being written; whoever owns a folder may remove leftovers of it.
 pub const PENDING_ENDING: &str = ".lacuna-part";
 
-/// A file that is being written. Dropping it without [`PendingFile::commit`] removes it.
+/// A file that is being written. Dropping it without [`PendingFile::commit`] removes it, unless it is lent.
 pub struct PendingFile {
     file: File,
     path: PathBuf,
+    lent: bool,
 }
 
 impl PendingFile {
@@ -24,7 +25,22 @@ impl PendingFile {
     pub fn create_in(folder: &Path) -> io::Result<Self> {
         let path = folder.join(format!(".{}{PENDING_ENDING}", Uuid::now_v7().simple()));
         let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path)?;
-        Ok(Self { file, path })
+        Ok(Self { file, path, lent: false })
+    }
+
+    /// A file that another process has started: it is written here, and keeps or removes it there.
+    ///
+    /// # Errors
+    /// When it is not there.
+    pub fn lent(path: &Path) -> io::Result<Self> {
+        let file = OpenOptions::new().read(true).write(true).open(path)?;
+        Ok(Self { file, path: path.to_owned(), lent: true })
+    }
+
+    /// Its name while it is being written.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     /// Starts a file in the folder of the file that it will become.
@@ -123,7 +139,9 @@ impl<S: Seek> Seek for Stoppable<'_, S> {
 impl Drop for PendingFile {
     fn drop(&mut self) {
         // After a commit nothing has this name any more.
-        let _ = fs::remove_file(&self.path);
+        if !self.lent {
+            let _ = fs::remove_file(&self.path);
+        }
     }
 }
 

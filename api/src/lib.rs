@@ -23,7 +23,9 @@ pub mod problem;
 pub mod production;
 pub mod routes;
 pub mod store;
+pub mod traces;
 pub mod trades;
+pub mod trust;
 pub mod verify;
 
 /// Locks a mutex whose data stays whole even if a holder panicked: every change under our locks is one

@@ -363,6 +363,17 @@ impl Problem {
         self
     }
 
+    /// With the place of the member `model` taken from the front of every pointer: the opposite of [`Problem::under_model`].
+    #[must_use]
+    pub fn of_model(mut self) -> Self {
+        for finding in &mut self.errors {
+            if finding.pointer.starts_with("/model/") {
+                finding.pointer.replace_range(.."/model".len(), "");
+            }
+        }
+        self
+    }
+
     /// With the place at which the model stands in the caller's document put before every pointer.
     #[must_use]
     pub fn under(mut self, prefix: &str) -> Self {

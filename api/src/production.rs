@@ -24,18 +24,21 @@ pub struct Label<'a> {
     pub thumbnail_png: Option<&'a [u8]>,
 }
 
+/// Does a job: [`compute`], or what stands for it in a test of the service.
+pub type Compute = fn(&Job, &Budget) -> Result<Outcome, Problem>;
+
 /// Who does jobs: the kernel, or what stands for it in a test of the service.
 #[derive(Clone, Copy, Debug)]
 pub struct Engine {
-    /// Does a job.
-    pub compute: fn(&Job, &Budget) -> Result<Outcome, Problem>,
-    /// Predicts what it costs.
+    /// Who does them in the service's own process; without anybody every worker has a process of its own, with the kernel.
+    pub here: Option<Compute>,
+    /// Predicts what a job costs.
     pub plan: fn(&Job, &Budget) -> Result<Plan, Problem>,
 }
 
 impl Engine {
     /// The kernel of this build.
-    pub const KERNEL: Self = Self { compute, plan };
+    pub const KERNEL: Self = Self { here: None, plan };
 }
 
 /// Does a job. A panic of the kernel ends the job, not the process.
@@ -111,17 +114,22 @@ impl From<Problem> for SolveProblem {
 /// Why the budget's token was fired, if it was.
 #[must_use]
 pub fn why_stopped(budget: &Budget) -> Option<Problem> {
-    budget.cancel.reason().map(|reason| match reason {
+    budget.cancel.reason().map(|reason| stopped(reason, budget.limits.seconds))
+}
+
+/// A stop as a problem; `seconds` is the limit of time.
+#[must_use]
+pub fn stopped(reason: StopReason, seconds: f64) -> Problem {
+    match reason {
         StopReason::Cancelled => Problem::new(ProblemKind::Cancelled, "Stopped by the caller"),
         StopReason::Deadline => {
-            let seconds = budget.limits.seconds;
             // How long it would have taken is not known; only that the limit was not enough.
             let facts = LimitFacts { limit: "seconds", asked: seconds, allowed: seconds, remedy: None };
             let detail =
                 format!("The work was not done within {seconds} s; allow more seconds, a larger tolerance, or ask `plan` for the cost");
             Problem::new(ProblemKind::Limit, detail).code("limit.seconds").limit(&facts)
         }
-    })
+    }
 }
 
 /// Runs what may have a defect and turns a panic into a problem.

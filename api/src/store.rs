@@ -109,7 +109,13 @@ impl Store {
         on_shelf!(self, shelf => shelf.probe())
     }
 
-    /// A file to write a result into.
+    /// The folder of files that are being written.
+    #[must_use]
+    pub fn scratch(&self) -> &Path {
+        &self.scratch
+    }
+
+    /// A file to write a result into, in [`Store::scratch`].
     ///
     /// # Errors
     /// When the device fails.

@@ -85,7 +85,7 @@ impl Service {
     fn start_by(mut command: Command, data: &Path, environment: &[(&str, &str)]) -> Self {
         command.args(["serve", "--bind", "127.0.0.1:0", "--data"]).arg(data).envs(environment.iter().copied());
         let mut process = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        // Wherever it is said; both pipes are read to the end, so that the service never waits for us.
+        // Both pipes are read to the end, so that the service never waits for us.
         let (sender, addresses) = channel();
         let pipes: [Box<dyn Read + Send>; 2] = [Box::new(process.stdout.take().unwrap()), Box::new(process.stderr.take().unwrap())];
         let said = Arc::<Mutex<Vec<String>>>::default();
@@ -93,7 +93,7 @@ impl Service {
             let (sender, said) = (sender.clone(), Arc::clone(&said));
             std::thread::spawn(move || {
                 for line in BufReader::new(pipe).lines().map_while(Result::ok) {
-                    if let Some(address) = address_in(&line) {
+                    if let Some(address) = line.strip_prefix("listening on ").and_then(address_in) {
                         let _ = sender.send(address);
                     }
                     said.lock().unwrap().push(line);
@@ -120,8 +120,7 @@ impl Service {
     /// # Panics
     /// When it cannot be sent.
     pub fn signal(&self, name: &str) {
-        let sent = Command::new("kill").args([format!("-{name}"), self.id().to_string()]).status().unwrap();
-        assert!(sent.success(), "kill -{name} {}", self.id());
+        assert!(send_signal(self.id(), name), "kill -{name} {}", self.id());
     }
 
     /// Waits for the process to end by itself.
@@ -145,6 +144,13 @@ impl Service {
         self.process.id()
     }
 
+    /// The processes that it has started and that still run.
+    #[must_use]
+    pub fn children(&self) -> Vec<u32> {
+        let entries = std::fs::read_dir("/proc").unwrap().filter_map(|entry| entry.ok()?.file_name().to_str()?.parse::<u32>().ok());
+        entries.filter(|&process| parent_of(process) == Some(self.id())).collect()
+    }
+
     /// Ends it at once, as a power failure would.
     pub fn kill(mut self) {
         let _ = self.process.kill();
@@ -154,9 +160,7 @@ impl Service {
     /// Resident memory in bytes.
     #[must_use]
     pub fn resident_bytes(&self) -> u64 {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.id())).unwrap();
-        let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
-        line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() * 1024
+        resident_bytes(self.id())
     }
 
     fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Result<Answer, ureq::Error> {
@@ -272,6 +276,36 @@ impl Drop for Service {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// Sends a process a signal by its name, as `kill` knows it; tells whether it was there.
+#[must_use]
+pub fn send_signal(process: u32, name: &str) -> bool {
+    Command::new("kill").args([format!("-{name}"), process.to_string()]).stderr(Stdio::null()).status().unwrap().success()
+}
+
+/// Whether a process runs: one that has ended and that nobody has asked about yet does not.
+#[must_use]
+pub fn is_alive(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    status.lines().any(|line| line.starts_with("State:") && !line.contains('Z') && !line.contains('X'))
+}
+
+/// Resident memory of a process in bytes; 0 when it has ended.
+#[must_use]
+pub fn resident_bytes(process: u32) -> u64 {
+    status_of(process, "VmRSS:").unwrap_or(0) * 1024
+}
+
+fn parent_of(process: u32) -> Option<u32> {
+    let parent = status_of(process, "PPid:")?;
+    u32::try_from(parent).ok().filter(|_| is_alive(process))
+}
+
+/// A number that Linux tells of a process.
+fn status_of(process: u32, name: &str) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    status.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
 }
 
 /// The first address of this machine in a line.

@@ -17,8 +17,8 @@ use crate::config::Role;
 #[derive(Debug, Parser)]
 #[command(name = "lacuna", version, verbatim_doc_comment)]
 pub(super) struct Cli {
-    /// Let a service do the work: solidify, evaluate, measure, intersect, slice, convert, run, plan, validate and jobs go
-    /// to it; every other command works here. Its key is taken from LACUNA_API_KEY alone.
+    /// Let a service do the work: solidify, evaluate, measure, intersect, slice, convert, run, plan, validate, solve, address,
+    /// verify, bless, diff and jobs go to it; every other command works here. Its key is taken from LACUNA_API_KEY alone.
     #[arg(long, global = true, value_name = "URL", env = "LACUNA_SERVER")]
     pub(super) server: Option<String>,
     /// Work here, whatever LACUNA_SERVER says.
@@ -110,6 +110,12 @@ pub(super) enum Command {
     },
     /// Do the cases below a folder and compare with what they expect; exit code 1 when one fails.
     Verify(VerifyArgs),
+    /// Do the cases below a folder and write their certificates beside them, as results that somebody approves of, with the reason,
+    /// the time and the version. `verify` compares with them from then on. Exit code 1 in any case: a blessing is no verification.
+    Bless(BlessArgs),
+    /// Compare two certificates, or two mesh files: what differs, in which unit, by how much, and whether both can be true of one
+    /// shape; exit code 1 when they cannot.
+    Diff(DiffArgs),
     /// Jobs of a service, one step at a time; of the service that runs on this machine without --server.
     #[command(subcommand)]
     Jobs(JobsCommand),
@@ -120,6 +126,13 @@ pub(super) enum Command {
         /// Its address; the one that `serve` would use when absent.
         #[arg(long)]
         url: Option<String>,
+    },
+    /// Do jobs for the service that started this process: told on stdin, answered on stdout.
+    #[command(name = crate::jobs::process::COMMAND, hide = true)]
+    DoJobs {
+        /// Threads that a job may use.
+        #[arg(long, value_name = "COUNT")]
+        threads: usize,
     },
     /// Print the OpenAPI description of the service.
     Openapi,
@@ -492,6 +505,35 @@ pub(super) struct VerifyArgs {
     /// Only cases whose path contains this text.
     #[arg(long, value_name = "TEXT")]
     pub(super) filter: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct BlessArgs {
+    /// Folder with cases, at any depth.
+    pub(super) folder: PathBuf,
+    /// Why the results are right, or why they may be others than before.
+    #[arg(long, value_name = "TEXT")]
+    pub(super) reason: String,
+    /// Only cases whose path contains this text.
+    #[arg(long, value_name = "TEXT")]
+    pub(super) filter: Option<String>,
+    /// Print what was done as JSON on stdout.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DiffArgs {
+    /// A certificate, what `run` or a service says of a job, a `blessed.json`, or a mesh file.
+    pub(super) first: PathBuf,
+    /// Another one of the same kind.
+    pub(super) second: PathBuf,
+    /// Of mesh files that are not the same bytes: how far apart their surfaces may be, in mm (Hausdorff distance).
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub(super) within: Option<f64>,
+    /// Print all members as JSON on stdout instead of a table.
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -7,6 +7,7 @@ mod library;
 mod operate;
 mod output;
 mod progress;
+mod regression;
 mod remote;
 mod stop;
 mod study;
@@ -50,8 +51,8 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Slice(args) => work::slice(&args, manner),
         Command::Run(args) => work::run(&args, manner),
         Command::Validate { model, draw } => study::validate(&model, draw.as_deref(), manner.server),
-        Command::Solve(args) => study::solve(&args, cli.quiet),
-        Command::Address(args) => study::address(&args),
+        Command::Solve(args) => study::solve(&args, cli.quiet, manner.server),
+        Command::Address(args) => study::address(&args, manner.server),
         Command::Plan { job } => study::plan(&job, manner.server),
         Command::Inspect { file } => inspect::inspect(&file),
         Command::Convert(args) => match manner.server {
@@ -61,12 +62,18 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         Command::Library(args) => library::library(&args),
         Command::Materials => print_json(&crate::trades::materials()),
         Command::Profiles { process } => library::profiles(process.as_deref()),
-        Command::Verify(args) => study::verify(&args, cli.quiet),
+        Command::Verify(args) => regression::verify(&args, manner),
+        Command::Bless(args) => regression::bless(&args, manner),
+        Command::Diff(args) => regression::diff(&args, manner),
         Command::Jobs(command) => match manner.server {
             Some(server) => remote::jobs::jobs(server, &command, manner),
             None => remote::jobs::jobs(&Server::at(&operate::local_url()?)?, &command, manner),
         },
         Command::Serve(args) => operate::serve(args),
+        Command::DoJobs { threads } => {
+            work::use_threads(Some(threads))?;
+            crate::jobs::apart::serve()
+        }
         Command::Healthcheck { url } => operate::healthcheck(url.as_deref()),
         Command::Openapi => print(crate::openapi::text().as_bytes()),
         Command::Doctor(args) => operate::doctor(&args),

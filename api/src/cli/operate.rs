@@ -10,8 +10,8 @@ use tracing_subscriber::filter::LevelFilter;
 use super::args::{Cli, ServeArgs};
 use super::{print, print_json, stop, work};
 use crate::config::{BadSetting, Config, Flags};
-use crate::http;
 use crate::problem::{Problem, ProblemKind};
+use crate::{http, traces};
 
 const HEALTH_TIME: Duration = Duration::from_secs(5);
 
@@ -47,6 +47,7 @@ pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
     log_panics();
     work::use_threads(Some(config.threads))?;
     let failed = |error| Problem::io("the service cannot start", &error);
+    config.traces_url.as_deref().map_or(Ok(()), traces::start).map_err(failed)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("http").build().map_err(failed)?;
     let told = |address| {
         // The one line that scripts wait for; with port 0 it is the only way to learn the port.

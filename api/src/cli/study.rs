@@ -1,4 +1,4 @@
-//! Commands that say something about a document, a job or a set of cases.
+//! Commands that say something about a document or a job.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -8,16 +8,17 @@ use std::time::Duration;
 use lacuna_exchange::document::{CELLS_LISTED, Sought};
 use lacuna_fabrication::SolutionSpace;
 use lacuna_kernel::budget::Limits;
+use lacuna_kernel::model::Model;
 
-use super::args::{AddressArgs, SolveArgs, VerifyArgs};
-use super::remote::{self, Server};
+use super::args::{AddressArgs, SolveArgs};
+use super::remote::{self, Server, questions};
 use super::{DOCUMENT_BYTES, folder_of, print, print_json, read_input, stop};
 use crate::addresses;
 use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
+use crate::files;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Engine, SolveProblem};
 use crate::routes::studies;
-use crate::{files, verify};
 
 /// Longest time for a prediction on the command line, where nobody else waits for it.
 const PLAN_TIME: Duration = Duration::from_secs(300);
@@ -77,7 +78,7 @@ impl<'a> Drawing<'a> {
 }
 
 /// `lacuna address`.
-pub(super) fn address(args: &AddressArgs) -> Result<(), Problem> {
+pub(super) fn address(args: &AddressArgs, server: Option<&Server>) -> Result<(), Problem> {
     let model = documents::read_model_in(&read_input(&args.model, DOCUMENT_BYTES)?, folder_of(&args.model))?;
     let sought = match (&args.at, args.near) {
         (Some(address), _) => Sought::At(address.clone()),
@@ -89,7 +90,10 @@ pub(super) fn address(args: &AddressArgs) -> Result<(), Problem> {
         },
         (None, None) => return Err(Problem::new(ProblemKind::Usage, "say what to tell: --at ADDRESS or --near X,Y,Z")),
     };
-    print_json(&addresses::answer(&model, &sought, PLAN_TIME)?)
+    match server {
+        Some(server) => print_json(&questions::address(server, &model, &sought)?),
+        None => print_json(&addresses::answer(&model, &sought, PLAN_TIME)?),
+    }
 }
 
 fn unreadable(problem: &Problem) -> ValidationReport {
@@ -112,7 +116,7 @@ fn unreadable(problem: &Problem) -> ValidationReport {
 }
 
 /// `lacuna solve`.
-pub(super) fn solve(args: &SolveArgs, quiet: bool) -> Result<(), Problem> {
+pub(super) fn solve(args: &SolveArgs, quiet: bool, server: Option<&Server>) -> Result<(), Problem> {
     let usage = |detail: String| Problem::new(ProblemKind::Usage, detail);
     let to_stdout = args.output.as_deref() == Some(Path::new("-"));
     if to_stdout && args.json {
@@ -125,16 +129,10 @@ pub(super) fn solve(args: &SolveArgs, quiet: bool) -> Result<(), Problem> {
         }
     }
     let model = documents::read_model_in(&read_input(&args.model, DOCUMENT_BYTES)?, folder_of(&args.model))?;
-    let time = Duration::try_from_secs_f64(args.limit_seconds).unwrap_or(Duration::MAX);
-    let solved = studies::watched(time, |budget| {
-        stop::on_signals(&budget.cancel)?;
-        production::solve(&model, &values, budget)
-    });
-    let solved = solved.map_err(|problem| match problem {
-        SolveProblem::Model(problem) => problem,
-        SolveProblem::Value { code, message, .. } => usage(message).code(code),
-    })?;
-    let report = SolveReport::of(solved)?;
+    let report = match server {
+        Some(server) => questions::solve(server, &model, &values)?,
+        None => solve_here(&model, &values, args.limit_seconds)?,
+    };
     let text = documents::model_file(&report.model);
     if to_stdout {
         print(text.as_bytes())?;
@@ -148,6 +146,18 @@ pub(super) fn solve(args: &SolveArgs, quiet: bool) -> Result<(), Problem> {
         sum_up(&report.space);
     }
     Ok(())
+}
+
+fn solve_here(model: &Model, values: &BTreeMap<String, f64>, seconds: f64) -> Result<SolveReport, Problem> {
+    let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+    let solved = studies::watched(time, |budget| {
+        stop::on_signals(&budget.cancel)?;
+        production::solve(model, values, budget)
+    });
+    SolveReport::of(solved.map_err(|problem| match problem {
+        SolveProblem::Model(problem) => problem,
+        SolveProblem::Value { code, message, .. } => Problem::new(ProblemKind::Usage, message).code(code),
+    })?)
 }
 
 /// The solutions in a line on stderr, when the model takes stdout.
@@ -171,23 +181,4 @@ pub(super) fn plan(job: &Path, server: Option<&Server>) -> Result<(), Problem> {
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let job = documents::read_job_in(&bytes, &most, folder_of(job))?;
     print_json(&studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
-}
-
-/// `lacuna verify`.
-pub(super) fn verify(args: &VerifyArgs, quiet: bool) -> Result<(), Problem> {
-    let report = verify::verify(&args.folder, args.filter.as_deref())?;
-    if let Some(path) = &args.junit {
-        files::write_whole(path, report.junit().as_bytes()).map_err(|error| Problem::io(path.display(), &error))?;
-    }
-    if args.json {
-        print_json(&report)?;
-    } else {
-        print(report.table(quiet).as_bytes())?;
-    }
-    let failed = report.cases.iter().filter(|case| !case.passed).count();
-    if failed == 0 {
-        Ok(())
-    } else {
-        Err(Problem::new(ProblemKind::CheckFailed, format!("{failed} of {} cases failed", report.cases.len())))
-    }
 }

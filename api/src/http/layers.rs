@@ -1,7 +1,7 @@
 //! What surrounds every request: id, log line, metrics, problems in one form, time limit, panics, CORS.
 
 use std::panic::AssertUnwindSafe;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use axum::body::Body;
 use axum::extract::{MatchedPath, Request, State};
@@ -14,6 +14,7 @@ use uuid::Uuid;
 use super::auth::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::state::Shared;
 use crate::problem::{Problem, ProblemKind};
+use crate::traces::{self, Context, Span, SpanKind};
 
 /// The header with a request's id.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -21,8 +22,9 @@ pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const EXPOSED: &str = "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link, RateLimit, RateLimit-Policy";
 
 /// Gives a request its id, tells the log and the metrics of it, and every error its form.
-pub async fn observe(State(state): State<Shared>, request: Request, next: Next) -> Response {
+pub async fn observe(State(state): State<Shared>, mut request: Request, next: Next) -> Response {
     let start = Instant::now();
+    let traced = traced(&mut request);
     let id = request_id(request.headers());
     let method = request.method().clone();
     // Only routes we know become labels: an address of a stranger's making would grow the set forever.
@@ -37,7 +39,30 @@ pub async fn observe(State(state): State<Shared>, request: Request, next: Next) 
     let (status, time) = (response.status().as_u16(), start.elapsed());
     state.metrics.request(known_method(&method), &route, status, time);
     tracing::info!(request_id = %id, %method, %route, status, milliseconds = time.as_millis(), "request");
+    if let Some((context, parent)) = traced {
+        let end = SystemTime::now();
+        let attributes = vec![
+            ("http.request.method", known_method(&method).into()),
+            ("http.route", route.as_str().into()),
+            ("http.response.status_code", status.into()),
+            ("lacuna.request.id", id.into()),
+        ];
+        let name = format!("{} {route}", known_method(&method));
+        let start = end.checked_sub(time).unwrap_or(end);
+        traces::tell(Span { name, kind: SpanKind::Server, context, parent, start, end, attributes, failed: status >= 500 });
+    }
     response
+}
+
+/// The span of a request and that of its caller, if anybody wants traces; handlers find the first in the request.
+fn traced(request: &mut Request) -> Option<(Context, Option<Context>)> {
+    if !traces::wanted() {
+        return None;
+    }
+    let parent = request.headers().get("traceparent").and_then(|value| value.to_str().ok()).and_then(Context::of_header);
+    let context = parent.map_or_else(Context::new, Context::child);
+    request.extensions_mut().insert(context);
+    Some((context, parent))
 }
 
 /// Runs the request within its time; a panic becomes our problem.

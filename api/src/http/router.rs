@@ -57,19 +57,29 @@ pub fn description() -> utoipa::openapi::OpenApi {
 /// The service as a router: addresses and layers over a state.
 pub fn router(state: Shared) -> Router {
     let (public, private) = tables();
-    layered(state, public, private)
+    layered(state, public, Some(private))
 }
 
 /// What a worker without a front end answers: how it is.
 pub fn probes(state: Shared) -> Router {
     let public = OpenApiRouter::new().routes(routes!(health::livez)).routes(routes!(health::readyz)).routes(routes!(health::version));
-    layered(state, public, OpenApiRouter::new().routes(routes!(health::metrics)))
+    layered(state, public, Some(OpenApiRouter::new().routes(routes!(health::metrics))))
 }
 
-fn layered(state: Shared, public: OpenApiRouter<Shared>, private: OpenApiRouter<Shared>) -> Router {
-    let private = Router::from(private).route_layer(from_fn_with_state(state.clone(), auth::require_key));
+/// What an address of its own answers to whoever looks after the service, without a key.
+pub fn operation(state: Shared) -> Router {
+    let public = OpenApiRouter::new()
+        .routes(routes!(health::livez))
+        .routes(routes!(health::readyz))
+        .routes(routes!(health::version))
+        .routes(routes!(health::metrics));
+    layered(state, public, None)
+}
+
+fn layered(state: Shared, public: OpenApiRouter<Shared>, private: Option<OpenApiRouter<Shared>>) -> Router {
+    let keyed = |private| Router::from(private).route_layer(from_fn_with_state(state.clone(), auth::require_key));
     Router::from(public)
-        .merge(private)
+        .merge(private.map(keyed).unwrap_or_default())
         .fallback(absent)
         .method_not_allowed_fallback(not_allowed)
         .layer(from_fn_with_state(state.clone(), layers::observe))

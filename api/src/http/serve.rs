@@ -14,7 +14,7 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::net::{TcpListener, TcpStream};
 use tower::ServiceExt;
 
-use super::router::{probes, router};
+use super::router::{operation, probes, router};
 use super::state::{AppState, Shared};
 use crate::config::Config;
 use crate::jobs::worker;
@@ -31,6 +31,13 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
     let failed = |error| Problem::io(format!("cannot listen on {}", config.bind), &error);
     let listener = TcpListener::bind(config.bind).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
+    let watched = match config.metrics_bind {
+        Some(place) => {
+            let failed = |error| Problem::io(format!("cannot listen on {place} (LACUNA_METRICS_BIND)"), &error);
+            Some(TcpListener::bind(place).await.map_err(failed)?)
+        }
+        None => None,
+    };
     let state = AppState::open(config).await?;
     let count = if state.config.role.works() { state.config.workers } else { 0 };
     let workers = worker::start(&state.desk, count, state.config.job_limits, state.engine)
@@ -40,9 +47,17 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
     tracing::info!(%address, role = %state.config.role, workers = workers.len(), "serving");
 
     let connections = GracefulShutdown::new();
-    let accepting = accept(&listener, &state, &connections);
+    let app = if state.config.role.answers() { router(state.clone()) } else { probes(state.clone()) };
+    // Whoever looks after the service sees it go down, too: this address is answered until the end.
+    if let Some(watched) = watched {
+        if let Ok(address) = watched.local_addr() {
+            tracing::info!(%address, "probes and metrics");
+        }
+        let (app, state) = (operation(state.clone()), state.clone());
+        tokio::spawn(async move { accept(&watched, app, &state, None).await });
+    }
     tokio::select! {
-        () = accepting => {}
+        () = accept(&listener, app, &state, Some(&connections)) => {}
         () = stop => {}
     }
     // In this order: no new work, open streams end, answers under way are finished, running jobs too.
@@ -60,8 +75,7 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
     Ok(())
 }
 
-async fn accept(listener: &TcpListener, state: &Shared, connections: &GracefulShutdown) {
-    let app = if state.config.role.answers() { router(state.clone()) } else { probes(state.clone()) };
+async fn accept(listener: &TcpListener, app: Router, state: &Shared, connections: Option<&GracefulShutdown>) {
     loop {
         match listener.accept().await {
             Ok((stream, _)) => attend(stream, app.clone(), state, connections),
@@ -74,7 +88,8 @@ async fn accept(listener: &TcpListener, state: &Shared, connections: &GracefulSh
     }
 }
 
-fn attend(stream: TcpStream, app: Router, state: &Shared, connections: &GracefulShutdown) {
+/// Answers a connection; those that are counted are waited for when the service goes down.
+fn attend(stream: TcpStream, app: Router, state: &Shared, connections: Option<&GracefulShutdown>) {
     let _ = stream.set_nodelay(true);
     let service = service_fn(move |request: hyper::Request<Incoming>| {
         let app = app.clone();
@@ -86,12 +101,21 @@ fn attend(stream: TcpStream, app: Router, state: &Shared, connections: &Graceful
     let mut builder = hyper::server::conn::http1::Builder::new();
     // A client that sends its head byte by byte would hold a connection forever.
     builder.timer(TokioTimer::new()).header_read_timeout(Duration::from_secs(state.config.header_seconds));
-    let connection = connections.watch(builder.serve_connection(TokioIo::new(stream), service));
-    tokio::spawn(async move {
-        if let Err(error) = connection.await {
+    let connection = builder.serve_connection(TokioIo::new(stream), service);
+    let told = |ended: hyper::Result<()>| {
+        if let Err(error) = ended {
             tracing::debug!(%error, "a connection broke off");
         }
-    });
+    };
+    match connections {
+        Some(connections) => {
+            let connection = connections.watch(connection);
+            tokio::spawn(async move { told(connection.await) });
+        }
+        None => {
+            tokio::spawn(async move { told(connection.await) });
+        }
+    }
 }
 
 /// Waits for running jobs, then stops them: they are taken up again at the next start.

@@ -66,7 +66,7 @@ impl Service {
         let flags = Flags { data: Some(folder.clone()), ..Flags::default() };
         let find = |name: &str| environment.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned());
         let (config, _) = Config::read(&flags, &find).unwrap();
-        let state = AppState::with_engine(config, Engine { compute, plan }).unwrap();
+        let state = AppState::with_engine(config, Engine { here: Some(compute), plan }).unwrap();
         worker::start(&state.desk, workers, state.config.job_limits, state.engine).unwrap();
         Self { state, folder }
     }

@@ -20,6 +20,7 @@ use crate::digest::Digest;
 use crate::metrics::Metrics;
 use crate::problem::Problem;
 use crate::store::Store;
+use crate::traces::Context;
 
 /// A job that was read and found legal.
 #[derive(Clone, Debug)]
@@ -34,6 +35,8 @@ pub struct Submission {
     pub input_digest: Digest,
     /// Idempotency key and body, if a key was given.
     pub idempotency: Option<Idempotency>,
+    /// The span of the request, if anybody wants traces.
+    pub trace: Option<Context>,
 }
 
 /// How many jobs there may be.
@@ -310,7 +313,7 @@ fn new_record(submission: Submission, document: Digest) -> JobRecord {
         problem: None,
     };
     let work = work_of(submission.input_digest);
-    JobRecord { view, owner: submission.owner, document, work, idempotency: submission.idempotency }
+    JobRecord { view, owner: submission.owner, document, work, idempotency: submission.idempotency, trace: submission.trace }
 }
 
 #[cfg(test)]
@@ -330,6 +333,7 @@ mod tests {
             kind: JobKind::Measure,
             document: body.as_bytes().to_vec(),
             input_digest: Digest::of(body.as_bytes()),
+            trace: None,
             idempotency: key.map(|key| Idempotency { key: Digest::of(key.as_bytes()), body: Digest::of(body.as_bytes()) }),
         }
     }

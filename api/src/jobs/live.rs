@@ -1,9 +1,9 @@
 //! A job in memory: its record, its events and the flag that stops it.
 
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
-use lacuna_kernel::budget::{CancelToken, Progress, StopReason};
+use lacuna_kernel::budget::{CancelToken, StopReason};
 
 use super::events::EventLog;
 use super::record::{JobRecord, JobState, JobView, Step};
@@ -16,6 +16,8 @@ const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 pub struct LiveJob {
     record: Mutex<JobRecord>,
     last_progress: Mutex<Option<Instant>>,
+    /// When each phase of the attempt that is done here began.
+    phases: Mutex<Vec<(String, SystemTime)>>,
     /// Held by whoever makes a lasting change, from reading the record to telling of the change.
     changing: Mutex<()>,
     stopped: Mutex<Option<Instant>>,
@@ -39,6 +41,7 @@ impl LiveJob {
         let job = Self {
             record: Mutex::new(record),
             last_progress: Mutex::default(),
+            phases: Mutex::default(),
             changing: Mutex::default(),
             stopped: Mutex::default(),
             cancel: CancelToken::new(),
@@ -117,19 +120,26 @@ impl LiveJob {
     }
 
     /// Takes what the kernel tells of its progress.
-    pub fn progress(&self, progress: &Progress) {
+    pub fn progress(&self, step: Step) {
         let now = Instant::now();
         let mut last = crate::locked(&self.last_progress);
         let mut record = crate::locked(&self.record);
-        let same_phase = record.view.progress.as_ref().is_some_and(|step| step.phase == progress.phase);
+        let same_phase = record.view.progress.as_ref().is_some_and(|known| known.phase == step.phase);
         if same_phase && last.is_some_and(|last| now.duration_since(last) < PROGRESS_EVERY) {
             return;
         }
-        let step = Step { phase: progress.phase.to_owned(), fraction: progress.fraction, count: progress.count };
         *last = Some(now);
+        if !same_phase {
+            crate::locked(&self.phases).push((step.phase.clone(), SystemTime::now()));
+        }
         record.view.progress = Some(step.clone());
         drop(record);
         self.events.push("progress", &step);
+    }
+
+    /// When each phase began since this was last asked.
+    pub fn take_phases(&self) -> Vec<(String, SystemTime)> {
+        std::mem::take(&mut *crate::locked(&self.phases))
     }
 
     fn announce_progress(&self, view: &JobView) {

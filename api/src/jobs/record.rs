@@ -1,11 +1,13 @@
 //! What is kept of a job, and what its owner sees of it.
 
 use lacuna_fabrication::{Certificate, JobKind};
+use lacuna_kernel::budget::Progress;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
+use crate::traces::Context;
 
 /// How often a job is started before it counts as the one that brings its worker down.
 pub const ATTEMPTS: u32 = 2;
@@ -83,6 +85,12 @@ pub struct Step {
     pub fraction: f64,
     /// Triangles or cells made so far, by phase.
     pub count: u64,
+}
+
+impl From<&Progress> for Step {
+    fn from(progress: &Progress) -> Self {
+        Self { phase: progress.phase.to_owned(), fraction: progress.fraction, count: progress.count }
+    }
 }
 
 /// A job as its owner sees it.
@@ -219,6 +227,9 @@ pub struct JobRecord {
     /// Idempotency key, if one was given.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub idempotency: Option<Idempotency>,
+    /// The span of the request that ordered it, if anybody wants traces.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub trace: Option<Context>,
 }
 
 /// What finished work left, so that the same work need not be done again.

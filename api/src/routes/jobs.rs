@@ -23,6 +23,7 @@ use crate::jobs::live::LiveJob;
 use crate::jobs::record::{Idempotency, JobState, JobView};
 use crate::openapi::Job;
 use crate::problem::{Problem, ProblemKind};
+use crate::traces::Context;
 
 /// Seconds after which to look at a job again.
 const LOOK_AGAIN: u64 = 1;
@@ -69,21 +70,35 @@ pub struct JobPage {
 pub async fn submit(
     State(state): State<Shared>,
     Extension(owner): Extension<Owner>,
+    trace: Option<Extension<Context>>,
     headers: HeaderMap,
     JsonBody(body): JsonBody,
 ) -> Result<Response, Problem> {
-    take(state, owner, &headers, body.to_vec(), Duration::ZERO).await
+    let orderer = Orderer { owner, trace: trace.map(|Extension(trace)| trace) };
+    take(state, orderer, &headers, body.to_vec(), Duration::ZERO).await
+}
+
+/// Who orders a job, and the span of the request if anybody wants traces.
+pub(super) struct Orderer {
+    pub(super) owner: Owner,
+    pub(super) trace: Option<Context>,
 }
 
 /// Accepts a job and waits for it as long as the caller prefers, or else as long as is usual there.
 ///
 /// # Errors
 /// What is wrong with the job, or why none is accepted.
-pub(super) async fn take(state: Shared, owner: Owner, headers: &HeaderMap, body: Vec<u8>, usual: Duration) -> Result<Response, Problem> {
+pub(super) async fn take(
+    state: Shared,
+    orderer: Orderer,
+    headers: &HeaderMap,
+    body: Vec<u8>,
+    usual: Duration,
+) -> Result<Response, Problem> {
     let key = idempotency_key(headers)?;
     let preference = Preference::of(headers);
     let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
-    let (job, replayed) = state.beside(move |state| accept(state, &owner, &body, used)).await?;
+    let (job, replayed) = state.beside(move |state| accept(state, &orderer, &body, used)).await?;
     // Whoever asks for an answer at once gets it, wherever others wait.
     let usual = if preference.respond_async { Duration::ZERO } else { usual };
     let view = job.wait(preference.wait.unwrap_or(usual)).await;
@@ -99,7 +114,8 @@ pub(super) async fn take(state: Shared, owner: Owner, headers: &HeaderMap, body:
 }
 
 /// Reads, predicts and accepts: what is refused here never becomes a job.
-fn accept(state: &AppState, owner: &Owner, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Arc<LiveJob>, bool), Problem> {
+fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Arc<LiveJob>, bool), Problem> {
+    let Orderer { owner, trace } = orderer;
     let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
     let job = &order.job;
     let replaced = order.supersedes.as_deref().map(|id| {
@@ -119,6 +135,7 @@ fn accept(state: &AppState, owner: &Owner, body: &[u8], idempotency: Option<Idem
         document: order.document().into_bytes(),
         input_digest: documents::job_digest(job),
         idempotency,
+        trace: *trace,
     };
     let accepted = state.desk.submit(submission)?;
     // Only now: a refusal must not cost the caller what there is. The same work twice is not replaced by itself.

@@ -7,7 +7,7 @@ use axum::http::HeaderMap;
 use axum::response::Response;
 use lacuna_fabrication::JobKind;
 
-use super::jobs::take;
+use super::jobs::{Orderer, take};
 use crate::documents::of_kind;
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
@@ -15,6 +15,7 @@ use crate::http::state::Shared;
 use crate::jobs::record::JobView;
 use crate::openapi::ShortOrder;
 use crate::problem::Problem;
+use crate::traces::Context;
 
 /// How long a shortcut waits unless `Prefer` says otherwise: below what proxies allow.
 const WAIT: Duration = Duration::from_secs(10);
@@ -33,10 +34,12 @@ const WAIT: Duration = Duration::from_secs(10);
 pub async fn measure(
     State(state): State<Shared>,
     Extension(owner): Extension<Owner>,
+    trace: Option<Extension<Context>>,
     headers: HeaderMap,
     JsonBody(body): JsonBody,
 ) -> Result<Response, Problem> {
-    take(state, owner, &headers, of_kind(&body, JobKind::Measure), WAIT).await
+    let orderer = Orderer { owner, trace: trace.map(|Extension(trace)| trace) };
+    take(state, orderer, &headers, of_kind(&body, JobKind::Measure), WAIT).await
 }
 
 /// Evaluates: a job of the kind `evaluate`, waited for 10 s.
@@ -53,8 +56,10 @@ pub async fn measure(
 pub async fn evaluate(
     State(state): State<Shared>,
     Extension(owner): Extension<Owner>,
+    trace: Option<Extension<Context>>,
     headers: HeaderMap,
     JsonBody(body): JsonBody,
 ) -> Result<Response, Problem> {
-    take(state, owner, &headers, of_kind(&body, JobKind::Evaluate), WAIT).await
+    let orderer = Orderer { owner, trace: trace.map(|Extension(trace)| trace) };
+    take(state, orderer, &headers, of_kind(&body, JobKind::Evaluate), WAIT).await
 }

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::difference;
 use super::manifest::{BoundingBox, CaseKind, ExpectedPoint, Manifest, Scalar};
 use super::report::Row;
 
@@ -42,7 +43,7 @@ fn exact_row(name: &str, expected: &toml::Value, got: Option<&Value>) -> Row {
 }
 
 fn scalar_row(name: &str, scalar: &Scalar, got: Option<&Value>) -> Row {
-    let range = got.and_then(interval);
+    let range = difference::interval(got);
     let number = got.and_then(Value::as_f64).filter(|number| number.is_finite());
     match (scalar.value, scalar.lower.zip(scalar.upper)) {
         (Some(value), _) => {
@@ -78,7 +79,7 @@ fn box_rows(expected: &BoundingBox, tolerance: f64, got: &Value) -> Vec<Row> {
         for (axis, &exact) in exact.iter().enumerate() {
             let name = format!("bbox_mm.{word}.{}", ["x", "y", "z"][axis]);
             let found = got.pointer(&format!("/bbox_mm/{corner}/{axis}"));
-            let ends = found.and_then(interval);
+            let ends = difference::interval(found);
             let outside = ends.map(|[low, high]| (low - exact).max(exact - high).max(0.0));
             let width = ends.map(|[low, high]| (exact - low).abs().max((high - exact).abs()));
             let contains = Row::measured(&name, &exact.to_string(), &shown(found), outside, expected.absolute);
@@ -103,7 +104,7 @@ fn implied(kind: CaseKind, tolerance: f64, got: &Value) -> Vec<Row> {
     ];
     for name in ["volume_mm3", "area_mm2"] {
         if let Some(found) = got.get(name) {
-            rows.push(Row::verdict(name, "an ordered, finite interval", &shown(Some(found)), interval(found).is_some()));
+            rows.push(Row::verdict(name, "an ordered, finite interval", &shown(Some(found)), difference::interval(Some(found)).is_some()));
         }
     }
     if kind == CaseKind::Solidify {
@@ -133,7 +134,7 @@ fn implied_of_solids(tolerance: f64, got: &Value) -> Vec<Row> {
     rows.push(at_most("outer_bound_mm", tolerance, got));
     rows.push(Row::verdict("triangles", "at least 1", &shown(got.get("triangles")), triangles.is_some_and(|count| count >= 1)));
     let volume = got.get("volume_mm3");
-    let positive = volume.and_then(interval).is_some_and(|[low, _]| low > 0.0);
+    let positive = difference::interval(volume).is_some_and(|[low, _]| low > 0.0);
     rows.push(Row::verdict("volume_mm3", "an interval of positive numbers", &shown(volume), positive));
     let enclosed = got.get("mesh_volume_mm3");
     rows.push(Row::verdict("mesh_volume_mm3", "a number", &shown(enclosed), enclosed.and_then(Value::as_f64).is_some_and(f64::is_finite)));
@@ -144,14 +145,6 @@ fn at_most(name: &str, most: f64, got: &Value) -> Row {
     let found = got.get(name);
     let number = found.and_then(Value::as_f64);
     Row::verdict(name, &format!("in [0, {most}]"), &shown(found), number.is_some_and(|number| (0.0..=most).contains(&number)))
-}
-
-/// A finite, ordered `[lo, hi]`.
-fn interval(value: &Value) -> Option<[f64; 2]> {
-    match value.as_array()?.as_slice() {
-        [low, high] => Some([low.as_f64()?, high.as_f64()?]).filter(|[low, high]| low.is_finite() && high.is_finite() && low <= high),
-        _ => None,
-    }
 }
 
 fn shown(value: Option<&Value>) -> String {
@@ -165,7 +158,7 @@ mod tests {
     use serde_json::json;
 
     fn manifest(rest: &str) -> Manifest {
-        Manifest::read(&format!("about = \"x\"\nkind = \"measure\"\ntolerance_mm = 0.1\n{rest}")).unwrap()
+        Manifest::read(&format!("about = \"x\"\nkind = \"measure\"\ntolerance_mm = 0.1\n{rest}"), false).unwrap()
     }
 
     fn failed(rest: &str, got: Value) -> Vec<String> {

@@ -1,6 +1,8 @@
 //! `expected.toml`: what is done with a case's model and what must come out.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use lacuna_fabrication::JobKind;
 use serde::Deserialize;
@@ -132,13 +134,19 @@ pub(super) struct Refused {
 }
 
 impl Manifest {
-    /// Reads a case and checks what its grammar cannot say.
-    pub(super) fn read(text: &str) -> Result<Self, String> {
-        let manifest: Self = toml::from_str(text).map_err(|error| error.to_string())?;
-        manifest.check().map(|()| manifest)
+    /// The case in a folder. One that is blessed, or about to be, need not state anything itself.
+    pub(super) fn of(folder: &Path, blessed: bool) -> Result<Self, String> {
+        let text = fs::read_to_string(folder.join("expected.toml")).map_err(|error| error.to_string())?;
+        Self::read(&text, blessed)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Reads a case and checks what its grammar cannot say.
+    pub(super) fn read(text: &str, blessed: bool) -> Result<Self, String> {
+        let manifest: Self = toml::from_str(text).map_err(|error| error.to_string())?;
+        manifest.check(blessed).map(|()| manifest)
+    }
+
+    fn check(&self, blessed: bool) -> Result<(), String> {
         if self.about.trim().is_empty() {
             return Err("`about` is empty".into());
         }
@@ -164,8 +172,9 @@ impl Manifest {
             return Err("[values], [entry.*] and refused.pointers belong to `solve`, which has no [box] and no [point.*]".into());
         }
         let measured = self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some();
-        if (measured || !self.entry.is_empty() || !self.point.is_empty()) == self.refused.is_some() {
-            return Err("either [refused], or at least one of [exact], [scalar.*], [entry.*], [point.*] and [box]".into());
+        let states = measured || !self.entry.is_empty() || !self.point.is_empty();
+        if states && self.refused.is_some() || !(states || blessed) && self.refused.is_none() {
+            return Err("either [refused], or at least one of [exact], [scalar.*], [entry.*], [point.*] and [box], or a blessing".into());
         }
         let number = |point: &ExpectedPoint| point.relative >= 0.0 && point.value.iter().all(|x| x.is_finite());
         if let Some((address, _)) = self.point.iter().find(|(_, point)| !number(point)) {
@@ -194,7 +203,7 @@ mod tests {
 
     #[test]
     fn cases_of_solve() {
-        let read = |rest: &str| Manifest::read(&format!("about = \"x\"\nkind = \"solve\"\n{rest}"));
+        let read = |rest: &str| Manifest::read(&format!("about = \"x\"\nkind = \"solve\"\n{rest}"), false);
         let entry = "[entry.\"/shape/x\"]\nvalue = 1\nconstant = \"1\"\ncoefficients = {a = \"-1/2\"}\nsource = \"s\"\n";
         assert!(read(entry).is_ok());
         assert!(read(&format!("[values]\na = 0.25\n{entry}")).is_ok());
@@ -208,13 +217,20 @@ mod tests {
         ] {
             assert!(read(bad).is_err(), "{bad}");
         }
-        assert!(Manifest::read(&format!("{HEAD}{entry}")).is_err());
-        assert!(Manifest::read(&HEAD.replace("tolerance_mm = 1", "[refused]\ncode = \"c\"")).is_err());
+        assert!(Manifest::read(&format!("{HEAD}{entry}"), false).is_err());
+        assert!(Manifest::read(&HEAD.replace("tolerance_mm = 1", "[refused]\ncode = \"c\""), false).is_err());
+    }
+
+    #[test]
+    fn a_blessed_case_need_not_state_anything() {
+        assert!(Manifest::read(HEAD, true).is_ok());
+        assert!(Manifest::read(HEAD, false).is_err());
+        assert!(Manifest::read(&format!("{HEAD}[refused]\ncode = \"c\"\n[exact]\nsource = \"s\""), true).is_err());
     }
 
     #[test]
     fn cases_of_jobs() {
-        let read = |rest: &str| Manifest::read(&format!("about = \"x\"\nkind = \"job\"\n{rest}"));
+        let read = |rest: &str| Manifest::read(&format!("about = \"x\"\nkind = \"job\"\n{rest}"), false);
         assert!(read("[exact]\n\"split.keys\" = 1\nsource = \"s\"").is_ok());
         assert!(read("[refused]\ncode = \"c\"").is_ok());
         for bad in [
@@ -229,7 +245,7 @@ mod tests {
 
     #[test]
     fn legal_and_illegal_cases() {
-        let read = |rest: &str| Manifest::read(&format!("{HEAD}{rest}"));
+        let read = |rest: &str| Manifest::read(&format!("{HEAD}{rest}"), false);
         assert!(read("[exact]\ncomponents = 1\nsource = \"s\"").is_ok());
         assert!(read("[scalar.volume_mm3]\nvalue = 1\nsource = \"s\"\nreason = \"r\"").is_ok());
         assert!(read("[refused]\ncode = \"c\"").is_ok());

@@ -1,37 +1,98 @@
 //! Cases with known answers: finds them below a folder, does them, compares, reports.
 //!
-//! The rules are those of `fixtures/README.md`. Nothing here ever changes a case.
+//! The rules are those of `fixtures/README.md`. Verifying never changes a case; [`bless`] is the one that does.
 
+mod blessing;
 mod compare;
+pub mod difference;
 mod manifest;
+mod performer;
 mod report;
 mod solve;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use lacuna_fabrication::{Input, Job, JobKind, Params};
+use lacuna_fabrication::{Certificate, Input, Job, JobKind, Params};
 use lacuna_kernel::attractor::Address;
-use lacuna_kernel::budget::{Budget, CancelToken, Limits};
+use lacuna_kernel::budget::Limits;
 
-use crate::addresses;
-use crate::jobs::watchdog::Watchdog;
+use crate::documents;
 use crate::problem::{Problem, ProblemKind};
-use crate::{documents, production};
+use blessing::Blessing;
+use difference::Difference;
 use manifest::{CaseKind, Manifest, Refused};
+pub use performer::{Here, Performer, Solution};
 pub use report::{CaseReport, Report, Row};
 
 /// Deepest folder in which cases are looked for.
 const DEEPEST: usize = 16;
-/// Time for the points of a case.
-const POINTS_TIME: Duration = Duration::from_secs(60);
 
 /// Does every case below a folder whose path contains `filter`.
 ///
 /// # Errors
 /// When the folder cannot be read or holds no case. A case that fails is no error of this function.
-pub fn verify(folder: &Path, filter: Option<&str>) -> Result<Report, Problem> {
+pub fn verify(folder: &Path, filter: Option<&str>, performer: &dyn Performer) -> Result<Report, Problem> {
+    let folders = cases(folder, filter)?;
+    let cases = folders.iter().map(|case| verify_case(case, &name_of(case, folder), performer)).collect();
+    Ok(Report { cases })
+}
+
+/// What became of a case that was to be blessed.
+#[derive(Debug, serde::Serialize)]
+pub struct Blessed {
+    /// Its folder.
+    pub case: String,
+    /// Why it was not, if it was not; nothing was written then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+    /// How the certificate differs from the one that was blessed before; absent if there was none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub differences: Option<Vec<Difference>>,
+}
+
+/// Does every case below a folder whose path contains `filter`, and writes the certificates of those that hold what they state
+/// from sources of their own beside them, with the reason, the time and the version.
+///
+/// # Errors
+/// When the reason is empty, the folder cannot be read or holds no case, or a file cannot be written.
+pub fn bless(folder: &Path, filter: Option<&str>, reason: &str, performer: &dyn Performer) -> Result<Vec<Blessed>, Problem> {
+    if reason.trim().is_empty() {
+        return Err(Problem::new(ProblemKind::Usage, "--reason is empty: whoever reads the case later must learn why its result is right"));
+    }
+    cases(folder, filter)?.iter().map(|case| bless_case(case, name_of(case, folder), reason.trim(), performer)).collect()
+}
+
+fn bless_case(folder: &Path, case: String, reason: &str, performer: &dyn Performer) -> Result<Blessed, Problem> {
+    let refused = |why: String| Ok(Blessed { case: case.clone(), refused: Some(why), differences: None });
+    let manifest = match Manifest::of(folder, true) {
+        Ok(manifest) => manifest,
+        Err(error) => return refused(format!("expected.toml: {error}")),
+    };
+    if manifest.refused.is_some() || manifest.kind == CaseKind::Solve {
+        return refused(
+            "only results with a certificate are blessed; a refusal and a solution are stated in full in expected.toml".to_owned(),
+        );
+    }
+    let (rows, certificate) = rows_of(folder, &manifest, performer);
+    if let Some(row) = rows.iter().find(|row| !row.passed) {
+        return refused(format!(
+            "{} is {}, and {} is expected: what a case states itself no blessing changes",
+            row.field, row.got, row.expected
+        ));
+    }
+    let Some(certificate) = certificate else { return refused("there is no certificate".to_owned()) };
+    // One that cannot be read is replaced like one that is wrong.
+    let before = Blessing::of(folder).ok().flatten();
+    let blessing = Blessing::now(reason, certificate);
+    let differences = before.map(|before| Ok::<_, Problem>(difference::differences(&before.value()?, &blessing.value()?))).transpose()?;
+    blessing.keep(folder)?;
+    Ok(Blessed { case, refused: None, differences })
+}
+
+/// The folders with cases below a folder.
+fn cases(folder: &Path, filter: Option<&str>) -> Result<Vec<PathBuf>, Problem> {
     let mut folders = Vec::new();
     find(folder, DEEPEST, &mut folders).map_err(|error| Problem::io(folder.display(), &error))?;
     folders.retain(|case| filter.is_none_or(|text| case.to_string_lossy().contains(text)));
@@ -40,8 +101,7 @@ pub fn verify(folder: &Path, filter: Option<&str>) -> Result<Report, Problem> {
         let detail = format!("{} holds no case (no expected.toml)", folder.display());
         return Err(Problem::new(ProblemKind::Usage, detail).code("verify.no-case"));
     }
-    let cases = folders.iter().map(|case| verify_case(case, case.strip_prefix(folder).unwrap_or(case))).collect();
-    Ok(Report { cases })
+    Ok(folders)
 }
 
 fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> std::io::Result<()> {
@@ -58,57 +118,72 @@ fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> std::io::Resul
     Ok(())
 }
 
-fn verify_case(folder: &Path, name: &Path) -> CaseReport {
+fn name_of(case: &Path, folder: &Path) -> String {
+    let name = case.strip_prefix(folder).unwrap_or(case);
+    if name.as_os_str().is_empty() { folder.display().to_string() } else { name.display().to_string() }
+}
+
+fn verify_case(folder: &Path, name: &str, performer: &dyn Performer) -> CaseReport {
     let start = Instant::now();
-    let name = if name.as_os_str().is_empty() { folder } else { name };
-    let (about, rows) = match read_manifest(folder) {
+    let blessing = Blessing::of(folder);
+    let (about, rows) = match Manifest::of(folder, matches!(blessing, Ok(Some(_)))) {
         Ok(manifest) => {
-            let rows = rows_of(folder, &manifest);
+            let (mut rows, certificate) = rows_of(folder, &manifest, performer);
+            rows.extend(blessing_rows(blessing, certificate));
             (manifest.about, rows)
         }
-        Err(row) => (String::new(), vec![row]),
+        Err(error) => (String::new(), vec![Row::failure("expected.toml", "a legal case", &error)]),
     };
-    CaseReport::new(name.display().to_string(), about, rows, start.elapsed())
+    CaseReport::new(name.to_owned(), about, rows, start.elapsed())
 }
 
-fn read_manifest(folder: &Path) -> Result<Manifest, Row> {
-    let text = fs::read_to_string(folder.join("expected.toml"));
-    let text = text.map_err(|error| Row::failure("expected.toml", "a readable file", &error.to_string()))?;
-    Manifest::read(&text).map_err(|error| Row::failure("expected.toml", "a legal case", &error))
-}
-
-fn rows_of(folder: &Path, manifest: &Manifest) -> Vec<Row> {
-    let name = if manifest.kind == CaseKind::Job { "job.json" } else { "model.json" };
-    let document = match fs::read(folder.join(name)) {
-        Ok(document) => document,
-        Err(error) => return vec![Row::failure(name, "a readable file", &error.to_string())],
+/// The comparisons with what was blessed.
+fn blessing_rows(blessing: Result<Option<Blessing>, String>, certificate: Option<Certificate>) -> Vec<Row> {
+    let blessing = match blessing {
+        Ok(Some(blessing)) => blessing,
+        Ok(None) => return Vec::new(),
+        Err(error) => return vec![Row::failure(blessing::FILE, "what `lacuna bless` has written", &error)],
     };
-    let result = match (manifest.kind, manifest.kind.job()) {
-        (CaseKind::Job, _) => job_of(folder, &document).and_then(|job| done(&job)),
-        (_, Some(kind)) => perform(folder, &document, kind, manifest),
-        (_, None) => return solve::rows(&document, manifest),
-    };
-    match (&manifest.refused, result) {
-        (Some(refused), result) => vec![compare_refusal(refused, result)],
-        (None, Ok(certificate)) => {
-            let mut rows = compare::rows(manifest, &certificate);
-            rows.extend(point_rows(folder, &document, manifest));
-            rows
-        }
-        (None, Err(problem)) => vec![Row::failure("result", "a certificate", &told(&problem))],
+    // Without one the failure is told already.
+    let Some(certificate) = certificate else { return Vec::new() };
+    match (blessing.value(), serde_json::to_value(&certificate)) {
+        (Ok(blessed), Ok(got)) => difference::rows(&blessed, &got),
+        _ => vec![Row::failure(blessing::FILE, "a certificate", "one that is not fit for JSON")],
     }
 }
 
-/// The job of a case that states one in full.
-fn job_of(folder: &Path, document: &[u8]) -> Result<Job, Problem> {
-    documents::read_job_in(document, &Limits::default(), Some(folder))
+/// The comparisons of a case with what it states itself, and its certificate if it has one.
+fn rows_of(folder: &Path, manifest: &Manifest, performer: &dyn Performer) -> (Vec<Row>, Option<Certificate>) {
+    let name = if manifest.kind == CaseKind::Job { "job.json" } else { "model.json" };
+    let document = match fs::read(folder.join(name)) {
+        Ok(document) => document,
+        Err(error) => return (vec![Row::failure(name, "a readable file", &error.to_string())], None),
+    };
+    let job = match (manifest.kind, manifest.kind.job()) {
+        (CaseKind::Job, _) => documents::read_job_in(&document, &Limits::default(), Some(folder)),
+        (_, Some(kind)) => job_of(folder, &document, kind, manifest),
+        (_, None) => return (solve::rows(&document, manifest, performer), None),
+    };
+    let result = job.and_then(|job| done(&job, performer));
+    match (&manifest.refused, result) {
+        (Some(refused), result) => (vec![compare_refusal(refused, result.map(drop))], None),
+        (None, Ok(certificate)) => match serde_json::to_value(&certificate) {
+            Ok(got) => {
+                let mut rows = compare::rows(manifest, &got);
+                rows.extend(point_rows(folder, &document, manifest, performer));
+                (rows, Some(certificate))
+            }
+            Err(error) => (vec![Row::failure("result", "JSON", &error.to_string())], None),
+        },
+        (None, Err(problem)) => (vec![Row::failure("result", "a certificate", &told(&problem))], None),
+    }
 }
 
-/// Does the case as any door would, and gives its certificate as JSON.
-fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -> Result<serde_json::Value, Problem> {
+/// The case as a job, as any door would make it.
+fn job_of(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -> Result<Job, Problem> {
     let model = documents::read_model_in(document, Some(folder))?;
     let name = model.name.clone().unwrap_or_else(|| "shape".to_owned());
-    let job = Job {
+    Ok(Job {
         kind,
         inputs: vec![Input { name, model, radius_mm: None }],
         params: Params {
@@ -118,20 +193,17 @@ fn perform(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) -
         },
         outputs: Vec::new(),
         limits: Limits::default(),
-    };
-    done(&job)
+    })
 }
 
-/// Does a job, and gives its certificate as JSON.
-fn done(job: &Job) -> Result<serde_json::Value, Problem> {
-    let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
-    let _watchdog = Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
-    let outcome = production::compute(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
-    serde_json::to_value(&outcome.certificate).map_err(|error| Problem::internal(error.to_string()))
+/// Does a job. Its certificate is that of the work alone, whatever files a service makes besides.
+fn done(job: &Job, performer: &dyn Performer) -> Result<Certificate, Problem> {
+    let certificate = performer.certificate(job)?;
+    Ok(Certificate { input_digest: documents::job_digest(job).to_string(), output_digests: Default::default(), ..certificate })
 }
 
 /// The comparisons of `[point.*]`.
-fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest) -> Vec<Row> {
+fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest, performer: &dyn Performer) -> Vec<Row> {
     if manifest.point.is_empty() {
         return Vec::new();
     }
@@ -145,7 +217,7 @@ fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest) -> Vec<Row> {
         Ok(addresses) => addresses,
         Err(text) => return vec![Row::failure(&name(&text), "an address", &text)],
     };
-    match addresses::points(&model, &addresses, POINTS_TIME) {
+    match performer.points(&model, &addresses) {
         Ok(found) => {
             manifest.point.iter().zip(&found).map(|((text, expected), got)| compare::point_row(&name(text), expected, got)).collect()
         }
@@ -153,13 +225,13 @@ fn point_rows(folder: &Path, document: &[u8], manifest: &Manifest) -> Vec<Row> {
     }
 }
 
-fn compare_refusal(refused: &Refused, result: Result<serde_json::Value, Problem>) -> Row {
+fn compare_refusal(refused: &Refused, result: Result<(), Problem>) -> Row {
     let expected = match &refused.pointer {
         Some(pointer) => format!("{} at {pointer:?}", refused.code),
         None => refused.code.clone(),
     };
     match result {
-        Ok(_) => Row::failure("refused", &expected, "a result"),
+        Ok(()) => Row::failure("refused", &expected, "a result"),
         Err(problem) => {
             let by_finding = problem
                 .errors

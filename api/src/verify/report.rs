@@ -102,7 +102,7 @@ impl Report {
                 continue;
             }
             let _ = writeln!(text, "FAIL  {}: {}", case.case, case.about);
-            text.push_str(&aligned(case.rows.iter().filter(|row| !row.passed)));
+            text.push_str(&compared(case.rows.iter().filter(|row| !row.passed)));
         }
         let failed = self.cases.iter().filter(|case| !case.passed).count();
         let _ = writeln!(text, "{} cases, {failed} failed", self.cases.len());
@@ -124,7 +124,7 @@ impl Report {
             if case.passed {
                 text.push_str("/>\n");
             } else {
-                let table = escaped(&aligned(case.rows.iter().filter(|row| !row.passed)));
+                let table = escaped(&compared(case.rows.iter().filter(|row| !row.passed)));
                 let _ = writeln!(text, ">\n    <failure message=\"{}\">\n{table}</failure>\n  </testcase>", escaped(&case.about));
             }
         }
@@ -133,18 +133,23 @@ impl Report {
     }
 }
 
-fn aligned<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
+/// Comparisons as a table.
+fn compared<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
     let line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.6e}"));
     let heading = ["field", "expected", "got", "diff", "allowed"].map(str::to_owned);
-    let lines: Vec<[String; 5]> = std::iter::once(heading)
-        .chain(rows.map(|row| [line(&row.field), line(&row.expected), line(&row.got), number(row.difference), number(row.allowed)]))
-        .collect();
-    let widths: Vec<usize> = (0..5).map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)).collect();
+    let rows = rows.map(|row| [line(&row.field), line(&row.expected), line(&row.got), number(row.difference), number(row.allowed)]);
+    aligned(std::iter::once(heading).chain(rows), 6)
+}
+
+/// Lines of cells in columns, behind so many spaces.
+pub(super) fn aligned<const COLUMNS: usize>(lines: impl Iterator<Item = [String; COLUMNS]>, indent: usize) -> String {
+    let lines: Vec<[String; COLUMNS]> = lines.collect();
+    let widths: Vec<usize> = (0..COLUMNS).map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)).collect();
     let mut text = String::new();
     for line in &lines {
         let cells: Vec<String> = line.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}")).collect();
-        let _ = writeln!(text, "      {}", cells.join("  ").trim_end());
+        let _ = writeln!(text, "{:indent$}{}", "", cells.join("  ").trim_end());
     }
     text
 }

@@ -1,15 +1,14 @@
 //! Cases with unknown entries: solves them and compares the solutions.
 
-use lacuna_fabrication::Solved;
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
 use super::manifest::{ExpectedEntry, Manifest, Refused};
 use super::report::Row;
-use super::{compare, compare_refusal, told};
-use crate::documents::{self, SolveReport};
+use super::{Performer, Solution, compare, compare_refusal, told};
+use crate::documents;
 use crate::problem::Problem;
-use crate::production::{self, SolveProblem};
-use crate::routes::studies::{PLAN_TIME, watched};
 
 /// Largest violation of a constraint in a filled model: rounding alone.
 const RESIDUAL: f64 = 1e-9;
@@ -18,18 +17,13 @@ const RESIDUAL: f64 = 1e-9;
 const ENTRY: f64 = 1e-12;
 
 /// Solves the case's model for the chosen values and compares.
-pub(super) fn rows(document: &[u8], manifest: &Manifest) -> Vec<Row> {
-    let solved = documents::read_model(document).and_then(|model| {
-        watched(PLAN_TIME, |budget| production::solve(&model, &manifest.values, budget)).map_err(|problem| match problem {
-            SolveProblem::Model(problem) => problem,
-            SolveProblem::Value { code, message, .. } => Problem::new(crate::problem::ProblemKind::InvalidModel, message).code(code),
-        })
-    });
+pub(super) fn rows(document: &[u8], manifest: &Manifest, performer: &dyn Performer) -> Vec<Row> {
+    let solved = documents::read_model(document).and_then(|model| performer.solution(&model, &manifest.values));
     match (&manifest.refused, solved) {
         (Some(refused), Ok(_)) => vec![Row::failure("refused", &refused.code, "a solution")],
         (Some(refused), Err(problem)) => refusal_rows(refused, problem),
         (None, Err(problem)) => vec![Row::failure("result", "a solution", &told(&problem))],
-        (None, Ok(solved)) => solution_rows(manifest, solved),
+        (None, Ok(solved)) => solution_rows(manifest, &solved, performer),
     }
 }
 
@@ -42,14 +36,9 @@ fn refusal_rows(refused: &Refused, problem: Problem) -> Vec<Row> {
     places.into_iter().chain([compare_refusal(refused, Err(problem))]).collect()
 }
 
-fn solution_rows(manifest: &Manifest, solved: Solved) -> Vec<Row> {
-    let got = match SolveReport::of(solved).map(|report| (serde_json::to_value(&report.space), report)) {
-        Ok((Ok(space), report)) => (space, report),
-        Ok((Err(error), _)) => return vec![Row::failure("result", "JSON", &error.to_string())],
-        Err(problem) => return vec![Row::failure("result", "finite numbers", &told(&problem))],
-    };
-    let (space, report) = got;
-    let mut rows = compare::stated(manifest, &space);
+fn solution_rows(manifest: &Manifest, solved: &Solution, performer: &dyn Performer) -> Vec<Row> {
+    let space = &solved.space;
+    let mut rows = compare::stated(manifest, space);
     for (pointer, expected) in &manifest.entry {
         let found = space["entries"].as_array().and_then(|entries| entries.iter().find(|entry| entry["pointer"] == pointer.as_str()));
         rows.extend(entry_rows(pointer, expected, found));
@@ -58,7 +47,7 @@ fn solution_rows(manifest: &Manifest, solved: Solved) -> Vec<Row> {
     let told_degrees = format!("{degrees:?} with {parameters:?} parameters");
     rows.push(Row::verdict("degrees_of_freedom", "the number of parameters", &told_degrees, degrees.is_some() && degrees == parameters));
     rows.push(Row::measured("residual", "0", &space["residual"].to_string(), space["residual"].as_f64(), RESIDUAL));
-    rows.push(filled_row(&report));
+    rows.push(filled_row(&solved.model, performer));
     rows
 }
 
@@ -81,18 +70,11 @@ fn entry_rows(pointer: &str, expected: &ExpectedEntry, found: Option<&Value>) ->
 }
 
 /// The filled model is a document again, and its constraints hold without anything left to solve.
-fn filled_row(report: &SolveReport) -> Row {
+fn filled_row(text: &str, performer: &dyn Performer) -> Row {
     let (field, expected) = ("model", "a document whose constraints hold");
-    let text = documents::model_file(&report.model);
-    let again = documents::read_model(text.as_bytes()).and_then(|model| {
-        let solved = watched(PLAN_TIME, |budget| production::solve(&model, &std::collections::BTreeMap::new(), budget));
-        solved.map_err(|problem| match problem {
-            SolveProblem::Model(problem) => problem,
-            SolveProblem::Value { message, .. } => Problem::internal(message),
-        })
-    });
+    let again = documents::read_model(text.as_bytes()).and_then(|model| performer.solution(&model, &BTreeMap::new()));
     match again {
-        Ok(solved) => Row::measured(field, expected, "residual", Some(solved.space.residual), RESIDUAL),
+        Ok(solved) => Row::measured(field, expected, "residual", solved.space["residual"].as_f64(), RESIDUAL),
         Err(problem) => Row::failure(field, expected, &told(&problem)),
     }
 }

@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 use crate::Job;
 use crate::certificate::OperandStatement;
 use crate::job::Input;
-use crate::run::{JobError, Plan, lower_all, not_carried, stl_bytes, wrong_inputs};
+use crate::run::{JobError, Plan, held_bytes, lower_all, not_carried, stl_bytes, wrong_inputs};
 
 /// An input as a solid.
 pub(crate) struct Operand {
@@ -227,15 +227,18 @@ pub(crate) fn rounded(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, JobErr
 /// Predicts the cost of making solids of the inputs.
 pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
     let share = share(sources, tolerance)?;
-    let mut plan = Plan::default();
+    let (mut plan, mut accounted) = (Plan::default(), 0.0);
     for source in sources {
         if source.radius_mm > 0.0 {
             let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, budget)?;
             plan.triangles += prediction.triangles;
-            plan.memory_bytes += prediction.memory_bytes;
+            accounted += prediction.memory_bytes;
         } else {
             plan.triangles += source.attractor.roots().len() as f64;
         }
+    }
+    if accounted > 0.0 {
+        plan.memory_bytes = held_bytes(accounted);
     }
     plan.output_bytes = stl_bytes(plan.triangles);
     Ok(plan)

@@ -89,4 +89,5 @@ sleep 1
 row "status while the kernel has both cores, p99 (limit 5 ms)" \
   "$(wrk -t1 -c4 "-d${seconds}s" --latency "$url/v1/jobs/$busy" | awk '$1 == "99%" { print $2 }')"
 row "memory after all of it" "$(awk '/VmRSS/ { printf "%.1f MB", $2 / 1024 }' "/proc/$service/status")"
+row "memory of its processes, at work" "$(ps -o rss= --ppid "$service" | awk '{ sum += $1 } END { printf "%.1f MB", sum / 1024 }')"
 stop

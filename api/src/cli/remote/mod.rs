@@ -3,12 +3,13 @@
 mod download;
 mod follow;
 pub(super) mod jobs;
+pub(super) mod questions;
 mod server;
 
 use std::path::{Path, PathBuf};
 
 use lacuna_fabrication::{Certificate, Plan};
-use lacuna_kernel::budget::CancelToken;
+use lacuna_kernel::budget::{CancelToken, ProgressSink};
 use ureq::http::Method;
 use uuid::Uuid;
 
@@ -60,7 +61,11 @@ fn done(server: &Server, document: &[u8], manner: Manner<'_>) -> Result<JobView,
     let token = CancelToken::new();
     stop::on_signals(&token)?;
     let reporter = Reporter::new(manner.progress, manner.quiet);
-    let sink = reporter.sink();
+    followed(server, document, &token, reporter.sink().as_ref())
+}
+
+/// Submits a job and follows it to its end; it is stopped there when the token is fired.
+fn followed(server: &Server, document: &[u8], token: &CancelToken, sink: Option<&ProgressSink>) -> Result<JobView, Problem> {
     // A submission whose answer is lost may be sent again: it is the same job.
     let key = Uuid::now_v7().to_string();
     let submit = || server.json::<JobView>(Method::POST, "/v1/jobs", &[("idempotency-key", &key)], document);
@@ -68,8 +73,8 @@ fn done(server: &Server, document: &[u8], manner: Manner<'_>) -> Result<JobView,
     if view.state.is_final() {
         return follow::succeeded(view);
     }
-    let _canceller = Canceller::start(server, &view.id, &token)?;
-    let ended = follow::follow(server, &view.id, &mut |event| follow::report(event, sink.as_ref()))?;
+    let _canceller = Canceller::start(server, &view.id, token)?;
+    let ended = follow::follow(server, &view.id, &mut |event| follow::report(event, sink))?;
     follow::succeeded(ended)
 }
 

@@ -35,17 +35,13 @@ impl Server {
     pub(in super::super) fn at(url: &str) -> Result<Self, Problem> {
         let usage = |detail: String| Problem::new(ProblemKind::Usage, detail);
         let base = url.trim().trim_end_matches('/');
-        if base.starts_with("https://") {
-            let detail = format!(
-                "{base}: this command speaks HTTP without TLS only; reach the service through a tunnel or a proxy on this machine that adds TLS, and name that one as http://127.0.0.1:PORT"
-            );
-            return Err(usage(detail).code("no-tls"));
-        }
-        if base.strip_prefix("http://").is_none_or(str::is_empty) {
-            return Err(usage(format!("{base:?} is no address of a service; http://HOST:PORT is expected")));
+        let address = base.strip_prefix("http://").or_else(|| base.strip_prefix("https://"));
+        if address.is_none_or(str::is_empty) {
+            return Err(usage(format!("{base:?} is no address of a service; http://HOST:PORT or https://HOST:PORT is expected")));
         }
         let key = std::env::var(KEY).ok().map(|key| key.trim().to_owned()).filter(|key| !key.is_empty());
         let config = Agent::config_builder()
+            .tls_config(crate::trust::tls())
             .http_status_as_error(false)
             .max_redirects(0)
             .max_redirects_will_error(false)
@@ -138,7 +134,7 @@ mod tests {
 
     #[test]
     fn addresses_that_cannot_be_served_are_refused() {
-        for bad in ["https://localhost:1", "localhost:7878", "ftp://x", "http://", ""] {
+        for bad in ["localhost:7878", "ftp://x", "http://", "https://", ""] {
             assert_eq!(Server::at(bad).unwrap_err().kind.exit_code(), 2, "{bad}");
         }
         assert_eq!(Server::at("http://127.0.0.1:7878/").unwrap().base(), "http://127.0.0.1:7878");

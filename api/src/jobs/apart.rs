@@ -1,0 +1,146 @@
+//! A process that does jobs for a worker of the service, one after the other: the other end of `process.rs`.
+//!
+//! It is asked on stdin, answers on stdout, and knows neither the store nor the network. When stdin closes, because the
+//! service has gone, however it went, this process ends at once.
+
+use std::io::{self, BufReader};
+use std::path::Path;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use lacuna_exchange::format::Format;
+use lacuna_kernel::budget::{Budget, CancelToken, Limits, Progress};
+
+use super::making::{self, Task, Workshop};
+use super::memory;
+use super::messages::{self, Said, Told};
+use super::record::Step;
+use crate::documents::{Stored, StoredMesh};
+use crate::files::PendingFile;
+use crate::problem::Problem;
+use crate::production;
+
+/// Shortest time between two words on the progress of a phase; the service tells its listeners less often.
+const PROGRESS_EVERY: Duration = Duration::from_millis(50);
+
+/// Does jobs until nobody asks for more.
+///
+/// # Errors
+/// When stdin or stdout fails, or what comes in is not understood.
+pub fn serve() -> Result<(), Problem> {
+    memory::give_way();
+    memory::go_first();
+    let (sender, heard) = mpsc::sync_channel(1);
+    let listener = std::thread::Builder::new().name("listener".into()).spawn(move || listen(&sender));
+    listener.map_err(|error| Problem::io("no thread to listen", &error))?;
+    let desk = Desk { heard, said: Arc::default() };
+    while let Some(heard) = desk.next() {
+        let Heard::Job(task) = heard else { return Err(Problem::internal("an answer without a question")) };
+        let said =
+            production::guarded(|| desk.perform(&task)).and_then(|said| said).unwrap_or_else(|problem| Said::Failed(Box::new(problem)));
+        drop(task);
+        desk.say(&said).map_err(|error| Problem::io("stdout", &error))?;
+    }
+    Ok(())
+}
+
+/// What came in, with its bytes.
+enum Heard {
+    Job(Box<Task>),
+    Mesh(Option<StoredMesh>),
+    File(String),
+}
+
+/// Listens for the whole life of the process, whatever it computes.
+fn listen(sender: &SyncSender<Heard>) {
+    let mut stdin = BufReader::new(io::stdin());
+    while let Ok(Some(heard)) = hear(&mut stdin) {
+        if sender.send(heard).is_err() {
+            break;
+        }
+    }
+    // Nobody is there any more who could want a result.
+    std::process::exit(0);
+}
+
+fn hear(stdin: &mut BufReader<io::Stdin>) -> io::Result<Option<Heard>> {
+    let Some(told) = messages::receive(stdin)? else { return Ok(None) };
+    Ok(Some(match told {
+        Told::Job { bytes, most, input_digest } => {
+            let document = messages::announced(stdin, bytes)?;
+            Heard::Job(Box::new(Task { document, most: most.into(), input_digest }))
+        }
+        Told::Mesh(None) => Heard::Mesh(None),
+        Told::Mesh(Some(head)) => {
+            let bytes = messages::announced(stdin, head.bytes)?;
+            let format = Format::from_name(&head.format).ok_or(io::ErrorKind::InvalidData)?;
+            // By which word it is found again is the service's business.
+            Heard::Mesh(Some(StoredMesh { name: head.name, format, bytes, reference: String::new() }))
+        }
+        Told::File(name) => Heard::File(name),
+    }))
+}
+
+/// Where the process hears and speaks.
+struct Desk {
+    heard: Receiver<Heard>,
+    /// When it last told of its progress, and in which phase; who holds it speaks.
+    said: Arc<Mutex<Option<(Instant, String)>>>,
+}
+
+impl Desk {
+    fn next(&self) -> Option<Heard> {
+        self.heard.recv().ok()
+    }
+
+    fn perform(&self, task: &Task) -> Result<Said, Problem> {
+        memory::limit(task.most.memory_bytes)?;
+        let made = making::make(task, production::compute, self)?;
+        // The files stay: they are the service's.
+        let outputs = made.files.into_iter().map(|(_, output)| output).collect();
+        Ok(Said::Done { outputs, certificate: Box::new(made.certificate) })
+    }
+
+    fn say(&self, said: &Said) -> io::Result<()> {
+        let _alone = crate::locked(&self.said);
+        messages::send(&mut io::stdout().lock(), said, &[])
+    }
+}
+
+impl Workshop for Desk {
+    fn stored(&self, reference: &str) -> Option<Stored> {
+        self.say(&Said::NeedsMesh(reference.to_owned())).ok()?;
+        match self.next() {
+            Some(Heard::Mesh(mesh)) => mesh.map(Stored::Mesh),
+            _ => None,
+        }
+    }
+
+    fn begin(&self, limits: Limits) -> Result<Budget, Problem> {
+        memory::limit(limits.memory_bytes)?;
+        let begun = Said::Begun { seconds: limits.seconds, memory_bytes: limits.memory_bytes };
+        self.say(&begun).map_err(|error| Problem::io("stdout", &error))?;
+        let said = Arc::clone(&self.said);
+        let sink = move |progress: &Progress| tell(&said, progress);
+        Ok(Budget { limits, cancel: CancelToken::new(), progress: Some(Arc::new(sink)) })
+    }
+
+    fn new_file(&self) -> io::Result<PendingFile> {
+        self.say(&Said::NeedsFile)?;
+        match self.next() {
+            Some(Heard::File(name)) => PendingFile::lent(Path::new(&name)),
+            _ => Err(io::ErrorKind::UnexpectedEof.into()),
+        }
+    }
+}
+
+fn tell(said: &Mutex<Option<(Instant, String)>>, progress: &Progress) {
+    let mut last = crate::locked(said);
+    if last.as_ref().is_some_and(|(time, phase)| phase == progress.phase && time.elapsed() < PROGRESS_EVERY) {
+        return;
+    }
+    *last = Some((Instant::now(), progress.phase.to_owned()));
+    // A service that does not listen has gone, and stdin says so.
+    let _ = messages::send(&mut io::stdout().lock(), &Said::Progress(Step::from(progress)), &[]);
+}

@@ -1,0 +1,177 @@
+//! `verify`, `bless` and `diff` as the continuous integration of another repository uses them: a folder with cases of its own.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use lacuna_tests::support::binary::{lacuna, succeed};
+use lacuna_tests::support::cases;
+use lacuna_tests::support::root;
+use lacuna_tests::support::scratch::Scratch;
+use lacuna_tests::support::service::Service;
+use serde_json::{Value, json};
+
+/// Another repository: two parts that nobody has a formula for.
+fn repository() -> Scratch {
+    let scratch = Scratch::new();
+    for (name, radius) in [("handle", 1.5), ("rail", 2.0)] {
+        let folder = scratch.join("parts").join(name);
+        fs::create_dir_all(&folder).unwrap();
+        fs::copy(cases::named("meshes/segment").model(), folder.join("model.json")).unwrap();
+        let case = format!("about = \"the {name} of the drawer\"\nkind = \"solidify\"\ntolerance_mm = 0.1\nradius_mm = {radius}\n");
+        fs::write(folder.join("expected.toml"), case).unwrap();
+    }
+    scratch
+}
+
+fn at(folder: &Path, server: Option<&Service>, arguments: &[&str]) -> Output {
+    let mut command = Command::new(lacuna());
+    command.env_remove("LACUNA_SERVER").current_dir(folder).args(arguments);
+    if let Some(service) = server {
+        command.args(["--server", &format!("http://{}", service.address)]);
+    }
+    command.output().unwrap()
+}
+
+fn words(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+#[track_caller]
+fn ends_with(output: &Output, code: i32, word: &str) {
+    assert_eq!(output.status.code(), Some(code), "{}", words(output));
+    assert!(words(output).contains(word), "{word:?} is not said:\n{}", words(output));
+}
+
+fn edit(path: &Path, change: impl FnOnce(&mut Value)) {
+    let mut value: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    change(&mut value);
+    fs::write(path, serde_json::to_vec(&value).unwrap()).unwrap();
+}
+
+#[test]
+fn a_repository_blesses_its_parts_and_learns_when_they_change() {
+    let scratch = repository();
+    let folder = scratch.path();
+    // A case that states nothing and that nobody has approved of shows nothing.
+    ends_with(&at(folder, None, &["verify", "parts"]), 1, "or a blessing");
+    ends_with(&at(folder, None, &["bless", "parts"]), 2, "--reason");
+    ends_with(&at(folder, None, &["bless", "parts", "--reason", " "]), 2, "--reason is empty");
+    assert!(!folder.join("parts/rail/blessed.json").exists());
+    // A blessing never counts as a verification.
+    ends_with(&at(folder, None, &["bless", "parts", "--reason", "measured on the first print"]), 1, "no verification");
+    let blessed: Value = serde_json::from_slice(&fs::read(folder.join("parts/rail/blessed.json")).unwrap()).unwrap();
+    assert_eq!((&blessed["reason"], &blessed["version"]), (&json!("measured on the first print"), &json!("0.1.0")));
+    assert!(blessed["blessed"].as_str().unwrap().ends_with('Z') && blessed["certificate"]["components"] == 1);
+
+    let output = at(folder, None, &["verify", "parts", "--junit", "report.xml"]);
+    ends_with(&output, 0, "2 cases, 0 failed");
+    assert!(fs::read_to_string(folder.join("report.xml")).unwrap().contains("tests=\"2\" failures=\"0\""));
+    // The same work by the same version is the same to the last bit.
+    let rail = folder.join("parts/rail/blessed.json");
+    edit(&rail, |value| value["certificate"]["triangles"] = json!(value["certificate"]["triangles"].as_u64().unwrap() + 1));
+    ends_with(&at(folder, None, &["verify", "parts"]), 1, "blessed triangles");
+    // Another version may use other triangles, but not another shape.
+    edit(&rail, |value| value["certificate"]["kernel_version"] = json!("0.0.9"));
+    ends_with(&at(folder, None, &["verify", "parts"]), 0, "0 failed");
+    edit(&rail, |value| value["certificate"]["volume_mm3"] = json!([1.0, 2.0]));
+    let output = at(folder, None, &["verify", "parts", "--junit", "report.xml"]);
+    ends_with(&output, 1, "blessed volume_mm3");
+    let report = fs::read_to_string(folder.join("report.xml")).unwrap();
+    assert!(report.contains("failures=\"1\"") && report.contains("blessed volume_mm3"), "{report}");
+    // What changed is told when it is approved of, and then it holds.
+    let output = at(folder, None, &["bless", "parts", "--filter", "rail", "--reason", "the rail is right after all"]);
+    ends_with(&output, 1, "APART");
+    ends_with(&at(folder, None, &["verify", "parts"]), 0, "0 failed");
+    // What a case states from a source of its own no blessing changes.
+    let expected = folder.join("parts/rail/expected.toml");
+    fs::write(&expected, fs::read_to_string(&expected).unwrap() + "[exact]\ngenus = 1\nsource = \"wishes\"\n").unwrap();
+    let before = fs::read(&rail).unwrap();
+    ends_with(&at(folder, None, &["bless", "parts", "--reason", "please"]), 1, "NOT BLESSED  rail: genus is 0");
+    assert_eq!(before, fs::read(&rail).unwrap());
+    // Half a blessing is a failed case.
+    fs::write(&rail, &before[..before.len() / 2]).unwrap();
+    ends_with(&at(folder, None, &["verify", "parts"]), 1, "blessed.json");
+}
+
+#[test]
+fn a_service_verifies_as_this_machine_does() {
+    let (scratch, data) = (repository(), Scratch::new());
+    let service = Service::start_with(data.path(), &[("LACUNA_SUBMISSIONS_PER_MINUTE", "100000")]);
+    ends_with(&at(scratch.path(), Some(&service), &["bless", "parts", "--reason", "as drawn"]), 1, "2 of 2 cases");
+    ends_with(&at(scratch.path(), None, &["verify", "parts"]), 0, "0 failed");
+    ends_with(&at(scratch.path(), Some(&service), &["verify", "parts"]), 0, "0 failed");
+    let posted = service.get("/v1/jobs").json()["items"].as_array().unwrap().len();
+    assert_eq!(posted, 4, "the service did not do the work");
+    edit(&scratch.join("parts/rail/blessed.json"), |value| value["certificate"]["genus"] = json!(7));
+    ends_with(&at(scratch.path(), Some(&service), &["verify", "parts"]), 1, "blessed genus");
+    // Refusals, solutions, points at addresses and jobs with files, from our own cases.
+    for case in ["malformed", "bcifs/free", "curves/beta_spline", "meshes", "jobs/boxes"] {
+        let here = at(&root(), None, &["verify", "fixtures", "--filter", case, "--json"]);
+        let there = at(&root(), Some(&service), &["verify", "fixtures", "--filter", case, "--json"]);
+        assert!(here.status.success() && there.status.success(), "{case}: {}\n{}", words(&here), String::from_utf8_lossy(&there.stderr));
+        let rows = |output: &Output| -> Vec<Value> {
+            let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+            report["cases"].as_array().unwrap().iter().map(|case| case["rows"].clone()).collect()
+        };
+        assert_eq!(rows(&here), rows(&there), "{case}");
+    }
+}
+
+#[test]
+fn differences_are_told_with_their_units() {
+    let scratch = Scratch::new();
+    let model = cases::named("meshes/segment").model();
+    for (name, tolerance) in [("coarse", "0.2"), ("fine", "0.02")] {
+        let file = |ending: &str| scratch.join(&format!("{name}.{ending}")).into_os_string();
+        let arguments = ["solidify", "--quiet", "--radius", "1", "--tolerance", tolerance].map(std::ffi::OsString::from);
+        let paths = [model.clone().into_os_string(), "-o".into(), file("stl"), "--certificate".into(), file("json")];
+        succeed(arguments.into_iter().chain(paths));
+    }
+    let diff = |arguments: &[&str]| at(scratch.path(), None, &[&["diff"], arguments].concat());
+    ends_with(&diff(&["fine.json", "fine.json"]), 0, "0 differ");
+    // Another tolerance is another order; everything that is proven of the shape agrees.
+    let output = diff(&["coarse.json", "fine.json", "--json"]);
+    ends_with(&output, 1, "requested_tolerance_mm");
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let apart: Vec<&Value> = told["differences"].as_array().unwrap().iter().filter(|row| row["verdict"] == "apart").collect();
+    assert!(apart.len() == 1 && apart[0]["field"] == "requested_tolerance_mm" && apart[0]["unit"] == "mm", "{apart:?}");
+    let volume = told["differences"].as_array().unwrap().iter().find(|row| row["field"] == "volume_mm3").unwrap();
+    assert_eq!((&volume["unit"], &volume["verdict"], &volume["difference"]), (&json!("mm^3"), &json!("within"), &json!(0.0)));
+    // Files: by the distance of their surfaces.
+    ends_with(&diff(&["fine.stl", "fine.stl"]), 0, "0 differ");
+    ends_with(&diff(&["coarse.stl", "fine.stl"]), 2, "--within");
+    ends_with(&diff(&["coarse.stl", "fine.stl", "--within", "0.22"]), 0, "within");
+    ends_with(&diff(&["coarse.stl", "fine.stl", "--within", "0.001"]), 1, "APART");
+    // What is neither, and what does not belong together.
+    fs::write(scratch.join("other.json"), "{\"lacuna\": 1}").unwrap();
+    ends_with(&diff(&["other.json", "fine.json"]), 3, "neither a certificate nor a mesh file");
+    ends_with(&diff(&["fine.stl", "fine.json", "--within", "1"]), 2, "two of a kind");
+    ends_with(&diff(&["absent.json", "fine.json"]), 6, "absent.json");
+}
+
+#[test]
+fn the_example_workflow_runs_as_it_stands_there() {
+    let workflow = fs::read_to_string(root().join("docker/workflow.example.yaml")).unwrap();
+    // The lines of the step's script, with the container left out: the command is at hand here.
+    let lines = workflow.lines().map(str::trim).filter(|line| line.starts_with("lacuna "));
+    let commands: Vec<&str> = lines.map(|line| line.trim_end_matches('\\').trim()).collect();
+    assert!(commands.len() >= 2, "{commands:?}");
+    let scratch = repository();
+    ends_with(&at(scratch.path(), None, &["bless", "parts", "--reason", "first"]), 1, "2 of 2");
+    let data = Scratch::new();
+    let service = Service::start(data.path());
+    for command in commands {
+        let output = Command::new("sh")
+            .args(["-c", &format!("lacuna() {{ \"$LACUNA\" \"$@\"; }}\n{command}")])
+            .env("LACUNA", lacuna())
+            .env("LACUNA_SERVER", format!("http://{}", service.address))
+            .current_dir(scratch.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{command}: {}", words(&output));
+    }
+    assert!(
+        fs::read_to_string(scratch.join("report.xml")).unwrap().contains("<testsuite name=\"lacuna verify\" tests=\"2\" failures=\"0\"")
+    );
+}
