@@ -301,6 +301,7 @@ fn new_record(submission: Submission, document: Digest) -> JobRecord {
         kind: submission.kind,
         state: JobState::Queued,
         attempt: 0,
+        handed_back: 0,
         created: crate::clock::now(),
         started: None,
         finished: None,

@@ -104,6 +104,9 @@ pub struct JobView {
     pub state: JobState,
     /// How often it was started; 2 after the service stopped during the first time.
     pub attempt: u32,
+    /// How often a worker gave it back because it was told to end; those starts are not counted against the job.
+    #[serde(skip_serializing_if = "is_zero", default)]
+    pub handed_back: u32,
     /// When it was accepted.
     pub created: String,
     /// When a worker took it.
@@ -165,7 +168,7 @@ impl JobView {
         self.progress = None;
         match self.state {
             JobState::Cancelling => self.end_cancelled(),
-            JobState::Running if self.attempt >= ATTEMPTS => {
+            JobState::Running if self.attempt.saturating_sub(self.handed_back) >= ATTEMPTS => {
                 let detail = format!("The work was started {ATTEMPTS} times, and each time its worker stopped before the end");
                 self.fail(Problem::new(ProblemKind::Interrupted, detail));
             }
@@ -182,7 +185,10 @@ impl JobView {
             Ending::Failed(problem) => self.fail(*problem),
             Ending::Stopped if self.state == JobState::Cancelling => self.end_cancelled(),
             // The service goes down: somebody else takes the job up again.
-            Ending::Stopped => self.take_up(),
+            Ending::Stopped => {
+                self.handed_back += 1;
+                self.take_up();
+            }
         }
     }
 
@@ -191,6 +197,11 @@ impl JobView {
         self.finished = Some(crate::clock::now());
         self.progress = None;
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks like this")]
+fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// How a worker's work on a job ended.
