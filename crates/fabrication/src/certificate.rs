@@ -15,7 +15,7 @@ use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 use crate::level::LevelStatement;
 use crate::operand::Operand;
 use crate::run::{JobError, not_carried};
-use crate::shape_measures::{OrientedBoxStatement, ThicknessStatement};
+use crate::shape_measures::{EnclosedStatement, OrientedBoxStatement, ThicknessStatement};
 use crate::solidify::{ClosingStatement, WallStatement};
 use crate::split::SplitStatement;
 use crate::{Operation, Part};
@@ -147,6 +147,9 @@ pub struct Certificate {
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub volume_mm3: Option<Interval>,
+    /// What a closed surface that is no mesh encloses: of a `measure` alone.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub enclosed: Option<EnclosedStatement>,
     /// Area of the exact shape's boundary.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]

@@ -31,6 +31,8 @@ pub(crate) struct Operand {
     pub(crate) leaf_cells: u64,
     pub(crate) warnings: Vec<String>,
     pub(crate) meshes: Vec<TriMesh>,
+    /// Whether every mesh is proven to be a solid that does not meet itself.
+    pub(crate) is_proven: bool,
 }
 
 /// An input before it is a solid: its shape, its radius (0 for the solid itself) and its box.
@@ -99,12 +101,14 @@ pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tole
 pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result<Operand, JobError> {
     let Source { input, attractor, radius_mm, bounds } = source;
     let (mut warnings, mut bounds) = (attractor.warnings().to_vec(), *bounds);
+    let mut is_proven = false;
     let (meshes, inner, outer, leaf_cells) = if *radius_mm > 0.0 {
         let dilation = dilate(attractor, Radius::new(*radius_mm)?, tolerance, budget)?;
         if dilation.crossings > 0 {
             warnings.push(format!("{} pairs of triangles of input '{}' cross", dilation.crossings, input.name));
         }
         bounds = dilation.bounds;
+        is_proven = dilation.crossings == 0;
         (vec![dilation.solid.into_mesh()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
     } else if is_solid(attractor) {
         (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
@@ -126,7 +130,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         triangles: meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
         mesh_volume_mm3: volume,
     };
-    Ok(Operand { statement, bounds, volume_error, leaf_cells, warnings, meshes })
+    Ok(Operand { statement, bounds, volume_error, leaf_cells, warnings, meshes, is_proven })
 }
 
 /// A closed surface of any family as a mesh, with its deviation and its cells.
@@ -185,7 +189,7 @@ impl Operand {
         if self.meshes.len() > 1 {
             let meshes: Vec<&TriMesh> = self.meshes.iter().collect();
             let joined = ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| at_fault(error, |_| &self.statement.name))?;
-            self.meshes = vec![joined];
+            (self.meshes, self.is_proven) = (vec![joined], false);
         }
         Ok(())
     }

@@ -13,7 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::operand::{is_solid, surfaces};
-use crate::shape_measures::{least_thickness, no_solid, smallest_box};
+use crate::shape_measures::{enclosed, least_thickness, no_solid, smallest_box};
 use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, slice, solidify, split};
 
@@ -259,6 +259,10 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
+        }
+        match enclosed(attractor, budget)? {
+            Ok(found) => certificate.enclosed = found,
+            Err(reason) => certificate.warnings.push(reason),
         }
         if job.params.thickness {
             let surfaces = if is_solid(attractor) { surfaces(attractor) } else { Vec::new() };

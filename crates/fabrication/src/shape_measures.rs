@@ -4,7 +4,7 @@ use lacuna_kernel::attractor::{Attractor, RefineError, refine};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::error::Kind;
 use lacuna_kernel::measure::mass::mesh_of;
-use lacuna_kernel::measure::{Side, oriented_box, thickness};
+use lacuna_kernel::measure::{NotEnclosed, Side, enclosed_volume, oriented_box, thickness};
 use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
@@ -28,6 +28,27 @@ pub struct OrientedBoxStatement {
     pub volume_mm3: Interval,
     /// Whether the bounds are within a thousandth of each other, and what the tolerance takes.
     pub complete: bool,
+}
+
+/// How a volume was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum VolumeMethod {
+    /// From trilinear forms of the control points that solve the subdivision's linear systems: exact but for rounding, which the interval holds.
+    TrilinearForms,
+}
+
+/// The volume that a closed surface encloses. The surface itself, being a sheet, has none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct EnclosedStatement {
+    /// The volume; where the surface passes through itself, parts are counted as often as it winds around them.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub volume_mm3: Interval,
+    /// How it was found.
+    pub method: VolumeMethod,
 }
 
 /// A least thickness, and where it is.
@@ -60,6 +81,16 @@ pub struct ThicknessStatement {
 const RELATIVE: f64 = 1e-3;
 /// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
 const MOST_CELLS: u64 = 30_000;
+
+/// The volume that a closed surface encloses, or why it is not known; neither for shapes that are no closed surface.
+pub(crate) fn enclosed(attractor: &Attractor, budget: &Budget) -> Result<Result<Option<EnclosedStatement>, String>, JobError> {
+    match enclosed_volume(attractor, budget) {
+        Ok(volume) => Ok(Ok(Some(EnclosedStatement { volume_mm3: [volume.low, volume.high], method: VolumeMethod::TrilinearForms }))),
+        Err(NotEnclosed::NoSurface | NotEnclosed::Open(_)) => Ok(Ok(None)),
+        Err(NotEnclosed::Stopped(stopped)) => Err(stopped.into()),
+        Err(reason) => Ok(Err(format!("the enclosed volume is not known: {reason}"))),
+    }
+}
 
 /// The smallest box of a shape dilated by a radius, 0 for the shape itself.
 pub(crate) fn smallest_box(

@@ -258,6 +258,16 @@ impl Attractor {
         Ok(self)
     }
 
+    /// The B-rep and where it begins, when the states have one.
+    pub(crate) fn brep(&self) -> Option<(&Topology, &complex::Start)> {
+        self.brep.as_ref().map(|(topology, start)| (topology.as_ref(), start))
+    }
+
+    /// Largest distance between control points of boundaries that were glued, in mm.
+    pub(crate) fn seam_mm(&self) -> f64 {
+        self.seam_mm
+    }
+
     /// Cuts surfaces along loops: those of their roots are drawn that are inside.
     #[must_use]
     pub(crate) fn with_trimmed(mut self, trimmed: Vec<TrimmedSurface>) -> Self {
