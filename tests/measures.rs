@@ -207,3 +207,24 @@ fn what_a_smooth_surface_encloses() {
     let found = measured(Model { name: None, shape: document(bezier) }, Params::new(0.01));
     assert!(found.enclosed.is_none() && found.warnings.is_empty(), "{:?}", found.warnings);
 }
+
+/// A cube of edge 2 across its diagonal, Koch's curve across its base, and a ball whatever way it is seen.
+#[test]
+fn extents_along_a_direction() {
+    let corners = (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0);
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let cube = PolygonMesh { vertices: corners.collect(), faces: faces.map(|f| f.to_vec()).to_vec(), interior: Interior::Auto };
+    let along = |shape: Shape, direction: DVec3, radius_mm: Option<f64>| {
+        let params = Params { direction: Some(direction), radius_mm, ..Params::new(0.1) };
+        measured(Model { name: None, shape }, params).extent.unwrap()
+    };
+    let found = along(Shape::Mesh(cube.clone()), DVec3::splat(1e-200), None);
+    assert_within(found.width_mm, 12.0_f64.sqrt(), 1e-9);
+    assert_within(found.from_mm, 0.0, 1e-9);
+    let found = along(Shape::Mesh(cube), DVec3::new(3.0, 4.0, 0.0), Some(0.5));
+    assert_within(found.width_mm, 2.8 + 1.0, 1e-9);
+    assert_within(found.from_mm, -0.5, 1e-9);
+    let found = along(classic("koch_curve"), -DVec3::Y, None);
+    assert_within(found.width_mm, 100.0 * 3.0_f64.sqrt() / 6.0, 1e-6);
+    assert_within(found.to_mm, 0.0, 1e-6);
+}

@@ -21,8 +21,8 @@ use manifold_rust::types::{Error as Status, MeshGLP, OpType};
 
 use crate::{BooleanEngine, BooleanError, Operand, Operation, operand};
 
-/// Operands of fewer triangles in all are combined in less time than it takes to look at the caller's token, on one thread.
-const SMALL: usize = 2000;
+/// Operands of fewer triangles in all are combined in a few milliseconds: nobody looks at the caller's token meanwhile.
+const SMALL: usize = 4000;
 /// How often the caller's token is looked at; below what a person notices, above what costs anything.
 const POLL: Duration = Duration::from_millis(5);
 
@@ -47,16 +47,19 @@ impl BooleanEngine for ManifoldRust {
             made.unwrap_or_else(|panic| Err(BooleanError::Engine(words(panic.as_ref()))))
         };
         let triangles: usize = operands.iter().map(|operand| operand.mesh.triangles.len()).sum();
-        let (sound, made) = if triangles < SMALL {
-            let sound = checked();
-            let made = if sound.is_ok() { evaluated(&EngineToken::new()) } else { Ok(TriMesh::default()) };
+        let both = |token: &EngineToken| {
+            if operands.iter().all(|operand| operand.is_proven) {
+                return (Ok(()), evaluated(token));
+            }
+            // The engine stays on this thread, whose memory is warm.
+            let mut sound = Ok(());
+            let made = rayon::in_place_scope(|scope| {
+                scope.spawn(|_| sound = checked().inspect_err(|_| token.cancel()));
+                evaluated(token)
+            });
             (sound, made)
-        } else {
-            watched(cancel, |token| {
-                let look = || checked().inspect_err(|_| token.cancel());
-                rayon::join(look, || evaluated(token))
-            })
         };
+        let (sound, made) = if triangles < SMALL { both(&EngineToken::new()) } else { watched(cancel, both) };
         // What was made of unsound operands means nothing.
         sound?;
         cancel.check()?;
@@ -91,20 +94,31 @@ fn evaluate(operation: Operation, operands: &[Operand<'_>], token: &EngineToken)
             operands.iter().enumerate().map(|(index, operand)| import(index, operand.mesh).map(Manifold::from_impl)).collect();
         return finished(&Manifold::hull_manifolds(&solids?));
     }
-    let mut leaves = Vec::with_capacity(operands.len());
-    for (index, operand) in operands.iter().enumerate() {
-        leaves.push(CsgNode::leaf(import(index, operand.mesh)?));
-        if token.is_cancelled() {
-            // The caller's token tells why.
-            return Ok(TriMesh::default());
-        }
-    }
     let kind = match operation {
         Operation::Union | Operation::Hull => OpType::Add,
         Operation::Intersection => OpType::Intersect,
         Operation::Difference => OpType::Subtract,
     };
-    finished(&Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token))))
+    let mut solids = Vec::with_capacity(operands.len());
+    for (index, operand) in operands.iter().enumerate() {
+        solids.push(import(index, operand.mesh)?);
+        if token.is_cancelled() {
+            // The caller's token tells why.
+            return Ok(TriMesh::default());
+        }
+    }
+    // The tree copies its leaves and its result, which for two costs as much as a tenth of the work.
+    let result = match <[ManifoldImpl; 2]>::try_from(solids) {
+        Ok(two) => {
+            let [first, second] = two.map(Manifold::from_impl);
+            first.boolean_with_token(&second, kind, Some(token))
+        }
+        Err(many) => {
+            let leaves = many.into_iter().map(CsgNode::leaf).collect();
+            Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token)))
+        }
+    };
+    finished(&result)
 }
 
 fn finished(result: &Manifold) -> Result<TriMesh, BooleanError> {

@@ -1,6 +1,5 @@
 //! Inputs as solids: dilated by a ball, or what their closed surfaces bound.
 
-use glam::DVec3;
 use lacuna_boolean::{BooleanEngine, BooleanError, ManifoldRust};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
@@ -12,7 +11,6 @@ use lacuna_kernel::model::CellKind;
 use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use crate::Job;
@@ -111,7 +109,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         is_proven = dilation.crossings == 0;
         (vec![dilation.solid.into_mesh()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
     } else if is_solid(attractor) {
-        (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
+        (attractor.surfaces(), 0.0, 0.0, attractor.roots().len() as u64)
     } else {
         let (mesh, deviation, leaf_cells) = closed_surface(&input.name, attractor, tolerance, budget)?;
         (vec![mesh], deviation, deviation, leaf_cells)
@@ -160,27 +158,6 @@ fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
     let length: f64 = mesh.triangles.iter().map(perimeter).sum();
     let balls = mesh.triangles.len() as f64 * 4.0 / 3.0 * PI * d.powi(3);
     2.0 * d * area(mesh) + 0.5 * PI * d * d * length + balls
-}
-
-/// The closed surfaces of a shape, their vertices joined as the model has them.
-pub(crate) fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
-    let mut meshes = Vec::with_capacity(attractor.solids().len());
-    for surface in attractor.solids() {
-        let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());
-        for (index, corners) in surface.triangles.iter().enumerate() {
-            let points = &attractor.roots()[surface.first_root + index].points;
-            let mut number = |k: usize| {
-                *numbers.entry(corners[k]).or_insert_with(|| {
-                    mesh.vertices.push(DVec3::new(points[k][0], points[k][1], points[k][2]));
-                    mesh.vertices.len() as u32 - 1
-                })
-            };
-            let triangle = [number(0), number(1), number(2)];
-            mesh.triangles.push(triangle);
-        }
-        meshes.push(mesh);
-    }
-    meshes
 }
 
 impl Operand {

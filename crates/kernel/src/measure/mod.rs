@@ -5,7 +5,6 @@ pub mod contact;
 pub mod dimension;
 pub mod enclosed;
 pub mod hausdorff;
-pub mod inside;
 pub mod mass;
 pub mod oriented_box;
 pub mod section;
@@ -17,7 +16,6 @@ pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, inter
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use enclosed::{NotEnclosed, enclosed_volume};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};
-pub use inside::{Inside, first_inside};
 pub use oriented_box::{OrientedBox, oriented_box};
 pub use thickness::{Side, Thickness, thickness};
 
