@@ -151,7 +151,9 @@ Certificate = TypedDict('Certificate', {
     'degenerate_triangles': 'NotRequired[int | None]',
     'dimension': 'NotRequired[DimensionStatement | None]',
     'edges': 'int',
+    'enclosed': 'NotRequired[EnclosedStatement | None]',
     'euler': 'NotRequired[int | None]',
+    'extent': 'NotRequired[ExtentStatement | None]',
     'flipped_pairs': 'NotRequired[int | None]',
     'genus': 'NotRequired[int | None]',
     'hausdorff': 'NotRequired[HausdorffStatement | None]',
@@ -285,9 +287,21 @@ EmbeddedModel = TypedDict('EmbeddedModel', {
     'units': "NotRequired[Literal['um', 'mm', 'cm', 'm', 'in']]",
 })
 
+EnclosedStatement = TypedDict('EnclosedStatement', {
+    'method': 'VolumeMethod',
+    'volume_mm3': 'list[float]',
+})
+
 ExactNumber = TypedDict('ExactNumber', {
     'exact': 'str',
     'value': 'float',
+})
+
+ExtentStatement = TypedDict('ExtentStatement', {
+    'direction': 'list[float]',
+    'from_mm': 'list[float]',
+    'to_mm': 'list[float]',
+    'width_mm': 'list[float]',
 })
 
 Finding = TypedDict('Finding', {
@@ -425,6 +439,7 @@ JobParams = TypedDict('JobParams', {
     'closing_mm': 'NotRequired[float]',
     'cuts_mm': 'NotRequired[list[list[float]]]',
     'density_g_cm3': 'NotRequired[float]',
+    'direction': 'NotRequired[list[float]]',
     'key_mm': 'NotRequired[float]',
     'level': 'NotRequired[int]',
     'normal': 'NotRequired[list[float]]',
@@ -977,6 +992,8 @@ Version = TypedDict('Version', {
     'name': 'str',
     'version': 'str',
 })
+
+VolumeMethod: TypeAlias = Literal['trilinear_forms']
 
 WallSide: TypeAlias = Literal['inward', 'outward']
 
