@@ -62,6 +62,28 @@ fn a_fractal_and_what_lies_beside_it() {
     assert_eq!(ball["contact"]["verdict"], "disjoint");
 }
 
+/// Solids and mesh files against each other: what they enclose counts.
+#[test]
+fn how_far_solids_are_from_each_other() {
+    let folder = Scratch::new();
+    let outer = write(&folder, "outer.json", &cube(-10.0, 10.0));
+    let file = folder.join("inner.off");
+    let corners: String = (0..8).map(|k| format!("{} {} {}\n", 4 * (k & 1), 4 * (k >> 1 & 1), 4 * (k >> 2))).collect();
+    let faces = "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n";
+    std::fs::write(&file, format!("OFF\n8 6 0\n{corners}{faces}")).unwrap();
+    let found = told(&["measure", "--tolerance", "0.2"], &[&outer, &file])["hausdorff"].clone();
+    // From the corner (-10, -10, -10) to (0, 0, 0); no point of the inner one is beyond the outer.
+    assert_within(&found["from_first"]["distance_mm"], 300.0_f64.sqrt(), 0.2);
+    assert_within(&found["from_second"]["distance_mm"], 0.0, 0.2);
+    // A sphere's worth of surface around nothing: its middle is far from it.
+    let mut hollow = cube(-10.0, 10.0);
+    hollow["interior"] = json!("surface");
+    let hollow = write(&folder, "hollow.json", &hollow);
+    let found = told(&["measure", "--tolerance", "0.2"], &[&outer, &hollow])["hausdorff"].clone();
+    assert_within(&found["from_first"]["distance_mm"], 10.0, 0.2);
+    assert_eq!(found["complete"], true);
+}
+
 #[test]
 fn what_cannot_be_compared_is_refused() {
     let folder = Scratch::new();
@@ -72,6 +94,8 @@ fn what_cannot_be_compared_is_refused() {
         vec!["intersect", "--tolerance", "0.1", "--with", "cone:0,0,1"],
         vec!["intersect", "--tolerance", "0.1", "--with", "point:0,0,0", "--operation", "union", "-o", "a.stl"],
         vec!["intersect", "--tolerance", "0.1", "--operation", "union"],
+        vec!["measure", "--tolerance", "0.1", "--direction", "0,0,0"],
+        vec!["measure", "--tolerance", "0.1", "--direction", "1,2"],
     ] {
         let output = binary::run(words.iter().map(OsStr::new).chain([path.as_os_str()]));
         assert_eq!(output.status.code(), Some(2), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));

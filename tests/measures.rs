@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use lacuna_exchange::document::{DocumentLimits, read_model};
 use lacuna_exchange::library;
 use lacuna_fabrication::certificate::DimensionBasis;
+use lacuna_fabrication::shape_measures::VolumeMethod;
 use lacuna_fabrication::{Certificate, Input, Job, JobKind, Params, run};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
@@ -177,4 +178,53 @@ fn walls_gaps_and_the_smallest_box_of_two_balls() {
     let params = Params { thickness: true, ..Params::new(0.02) };
     let job = Job { kind: JobKind::Measure, inputs, params, outputs: Vec::new(), limits: Limits::default() };
     assert_eq!(run(&job, &Budget::default()).unwrap_err().code, "job.not-a-solid");
+}
+
+/// Hakenberg, Reif, Schaefer, Warren 2014: Doo and Sabin's surface of the unit cube encloses 6241/9920. The surface itself has no volume.
+#[test]
+fn what_a_smooth_surface_encloses() {
+    let cage = |scheme: &str, more: &str| {
+        document(&format!(
+            r#"{{"lacuna": 1, "shape": {{"family": "subdivision", "scheme": "{scheme}"{more}, "mesh": {{
+            "vertices": [[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1,1]],
+            "faces": [[0,2,3,1],[4,5,7,6],[0,1,5,4],[2,6,7,3],[0,4,6,2],[1,3,7,5]]}}}}}}"#
+        ))
+    };
+    let found = measured(Model { name: None, shape: cage("doo_sabin", "") }, Params::new(0.01));
+    let enclosed = found.enclosed.unwrap();
+    assert_eq!((enclosed.method, found.volume_mm3), (VolumeMethod::TrilinearForms, None));
+    assert_within(enclosed.volume_mm3, 6241.0 / 9920.0, 1e-12);
+    // Faces that hardly shrink: no number, and the reason.
+    let wild = r#", "coefficients": [{"weights": [[0.85, 0.05, 0.05, 0.05]]}]"#;
+    let found = measured(Model { name: None, shape: cage("doo_sabin", wild) }, Params::new(0.01));
+    assert!(
+        found.enclosed.is_none() && found.warnings.iter().any(|warning| warning.contains("not proven to converge")),
+        "{:?}",
+        found.warnings
+    );
+    // An open surface encloses nothing, and a warning would say nothing new.
+    let bezier = r#"{"lacuna": 1, "shape": {"family": "bezier_surface", "control_points": [[[0,0,0],[0,1,0]],[[1,0,0],[1,1,1]]]}}"#;
+    let found = measured(Model { name: None, shape: document(bezier) }, Params::new(0.01));
+    assert!(found.enclosed.is_none() && found.warnings.is_empty(), "{:?}", found.warnings);
+}
+
+/// A cube of edge 2 across its diagonal, Koch's curve across its base, and a ball whatever way it is seen.
+#[test]
+fn extents_along_a_direction() {
+    let corners = (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0);
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let cube = PolygonMesh { vertices: corners.collect(), faces: faces.map(|f| f.to_vec()).to_vec(), interior: Interior::Auto };
+    let along = |shape: Shape, direction: DVec3, radius_mm: Option<f64>| {
+        let params = Params { direction: Some(direction), radius_mm, ..Params::new(0.1) };
+        measured(Model { name: None, shape }, params).extent.unwrap()
+    };
+    let found = along(Shape::Mesh(cube.clone()), DVec3::splat(1e-200), None);
+    assert_within(found.width_mm, 12.0_f64.sqrt(), 1e-9);
+    assert_within(found.from_mm, 0.0, 1e-9);
+    let found = along(Shape::Mesh(cube), DVec3::new(3.0, 4.0, 0.0), Some(0.5));
+    assert_within(found.width_mm, 2.8 + 1.0, 1e-9);
+    assert_within(found.from_mm, -0.5, 1e-9);
+    let found = along(classic("koch_curve"), -DVec3::Y, None);
+    assert_within(found.width_mm, 100.0 * 3.0_f64.sqrt() / 6.0, 1e-6);
+    assert_within(found.to_mm, 0.0, 1e-6);
 }

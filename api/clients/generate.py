@@ -13,6 +13,8 @@ import sys
 import textwrap
 from pathlib import Path
 
+# Types that fit are written on one line of so many characters.
+LINE = 121
 HERE = Path(__file__).resolve().parent
 CONTRACT = HERE.parent / "openapi.json"
 NOTE = "Generated from api/openapi.json by api/clients/generate.py: do not edit."
@@ -162,8 +164,10 @@ def python_types(schemas):
         for member, value in found[0].items():
             kind = said.say(value)
             kind = kind if member in found[1] else f"NotRequired[{kind}]"
-            fields.append(f"    {member!r}: {kind!r},\n")
-        yield f"{name} = TypedDict({name!r}, {{\n{''.join(fields)}}})\n"
+            fields.append(f"{member!r}: {kind!r}")
+        line = f"{name} = TypedDict({name!r}, {{{', '.join(fields)}}})\n"
+        listed = "".join(f"    {field},\n" for field in fields)
+        yield line if len(line) <= LINE else f"{name} = TypedDict({name!r}, {{\n{listed}}})\n"
 
 
 def python_method(operation):

@@ -179,7 +179,9 @@ export interface Certificate {
   /** Triangles without area. */ degenerate_triangles?: number | null;
   dimension?: DimensionStatement | null;
   /** Edges of the result. */ edges: number;
+  enclosed?: EnclosedStatement | null;
   /** vertices - edges + triangles. */ euler?: number | null;
+  extent?: ExtentStatement | null;
   /** Pairs of triangles that run along their edge in the same direction. */ flipped_pairs?: number | null;
   /** Sum of the shells' genera. */ genus?: number | null;
   hausdorff?: HausdorffStatement | null;
@@ -343,10 +345,24 @@ export interface EmbeddedModel {
   /** The unit of every length of the model; converted to mm on reading. Weights, linear parts and operators have no unit. */ units?: "um" | "mm" | "cm" | "m" | "in";
 }
 
+/** The volume that a closed surface encloses. The surface itself, being a sheet, has none. */
+export interface EnclosedStatement {
+  /** How it was found. */ method: VolumeMethod;
+  volume_mm3: Array<number>;
+}
+
 /** An exact number. */
 export interface ExactNumber {
   /** As a fraction in lowest terms, for example `-3/4`; a decimal where the fraction outgrew 256 bits. */ exact: string;
   /** The nearest double. */ value: number;
+}
+
+/** How far a shape extends along a direction: between two planes across it that touch the shape. */
+export interface ExtentStatement {
+  /** The direction, of length 1. */ direction: Array<number>;
+  from_mm: Array<number>;
+  to_mm: Array<number>;
+  width_mm: Array<number>;
 }
 
 /** One finding with its place. */
@@ -406,7 +422,7 @@ export interface GroupShape {
   /** The shapes, each with an optional name and place. */ parts: Array<Part>;
 }
 
-/** The Hausdorff distance of two shapes. A model that stands for a solid is its surface here. */
+/** The Hausdorff distance of two shapes. A model that stands for a solid is all that it encloses. */
 export interface HausdorffStatement {
   /** Whether the intervals are as narrow as the tolerance. */ complete: boolean;
   distance_mm: Array<number>;
@@ -515,6 +531,7 @@ export interface JobParams {
   /** Gaps of the dilated shape that are narrower than this are filled, in mm, above zero: by closing it with a ball of half the size. For solidify with radius_mm alone. */ closing_mm?: number;
   /** For split: where to cut across x, y and z, in mm: three arrays, empty where the volume tells or nothing is cut. */ cuts_mm?: Array<Array<number>>;
   /** The density of the material, in g/cm3, above zero, for the mass: for measure alone. */ density_g_cm3?: number;
+  /** Along which the extent of the shape is told, as by planes that touch it on both sides, of any length: for measure alone. */ direction?: Array<number>;
   /** For split: the width and length of pegs that stand in sockets of the neighbouring parts, in mm; walls are half of that. No keys when absent. */ key_mm?: number;
   /** For solidify of a model of the family ifs, instead of radius_mm: the union of all copies of the primitive along addresses of this length, as an exact solid; the primitive is the model's solid, or else the box of its attractor. */ level?: number;
   /** What the planes of slice are perpendicular to, of any length; [0, 0, 1] when absent. */ normal?: Array<number>;
@@ -1200,6 +1217,9 @@ export interface Version {
   /** `lacuna`. */ name: string;
   /** The version of the service and of the kernel in it. */ version: string;
 }
+
+/** How a volume was found. */
+export type VolumeMethod = "trilinear_forms";
 
 /** On which side of a closed surface its wall is. */
 export type WallSide = "inward" | "outward";

@@ -300,7 +300,7 @@ pub(super) struct MeasureArgs {
     /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
     pub(super) model: PathBuf,
     /// Another one: tell the Hausdorff distance of both instead.
-    #[arg(conflicts_with_all = ["radius", "density", "oriented_box", "thickness"])]
+    #[arg(conflicts_with_all = ["radius", "density", "direction", "oriented_box", "thickness"])]
     pub(super) other: Option<PathBuf>,
     /// Hausdorff bound on what is measured, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
@@ -308,6 +308,9 @@ pub(super) struct MeasureArgs {
     /// Radius of the ball, in mm: measure the solid instead of the shape itself.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) radius: Option<f64>,
+    /// Tell how far the shape extends along a direction too.
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    pub(super) direction: Option<[f64; 3]>,
     /// Find the smallest box, whatever way it is turned.
     #[arg(long)]
     pub(super) oriented_box: bool,
@@ -613,6 +616,11 @@ fn numbers<const N: usize>(text: &str, between: char) -> Option<[f64; N]> {
 
 fn point(text: &str) -> Result<[f64; 3], String> {
     numbers(text, ',').ok_or_else(|| "three numbers are expected, for example 1.5,-2,0".to_owned())
+}
+
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    let vector: Option<[f64; 3]> = numbers(text, ',').filter(|vector: &[f64; 3]| vector.iter().any(|part| *part != 0.0));
+    vector.ok_or_else(|| "a vector with a length is expected, for example 1,1,0".to_owned())
 }
 
 fn cut_plane(text: &str) -> Result<[f64; 4], String> {

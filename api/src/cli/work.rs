@@ -66,6 +66,7 @@ pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner<'_>) -> Result<(), Pr
 pub(super) fn measure(args: &MeasureArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let params = Params {
         radius_mm: args.radius,
+        direction: args.direction.map(Into::into),
         oriented_box: args.oriented_box,
         thickness: args.thickness,
         density_g_cm3: args.density,

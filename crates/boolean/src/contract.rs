@@ -9,14 +9,15 @@ use lacuna_kernel::budget::{CancelToken, StopReason};
 use lacuna_kernel::error::Kind;
 use lacuna_kernel::solid::TriMesh;
 
-use crate::{BooleanEngine, BooleanError, Fault, ManifoldRust, Operation};
+use crate::{BooleanEngine, BooleanError, Fault, ManifoldRust, Operand, Operation};
 
 fn engines() -> Vec<Box<dyn BooleanEngine>> {
     vec![Box::new(ManifoldRust)]
 }
 
 fn combine(engine: &dyn BooleanEngine, operation: Operation, operands: &[&TriMesh]) -> TriMesh {
-    let result = engine.combine(operation, operands, &CancelToken::new()).unwrap();
+    let operands: Vec<Operand<'_>> = operands.iter().copied().map(Operand::from).collect();
+    let result = engine.combine(operation, &operands, &CancelToken::new()).unwrap();
     assert_closed(&result);
     result
 }
@@ -271,6 +272,32 @@ fn operands_that_are_no_solids_are_named() {
         }
         let refused = engine.union(&[&cases[0].0], &CancelToken::new()).unwrap_err();
         assert!(matches!(refused, BooleanError::NotASolid { operand: 0, fault: Fault::NotClosed { .. } }), "{refused}");
+    }
+}
+
+/// Operands that are checked while others are combined already.
+#[test]
+fn large_operands_that_are_no_solids() {
+    let sound = ball(DVec3::ZERO, 64);
+    let mut crossing = sound.clone();
+    crossing.append(&ball(DVec3::X, 64));
+    let mut open = sound.clone();
+    open.triangles.pop();
+    for engine in engines() {
+        for (bad, code) in [(&crossing, "boolean.self-intersecting"), (&open, "boolean.not-closed")] {
+            let refused = engine.union(&[&sound, bad], &CancelToken::new()).unwrap_err();
+            assert_eq!((refused.kind(), refused.code()), (Kind::Invalid, code));
+        }
+        // Two balls that touch in a point, as one operand: it meets itself, and overlaps nowhere.
+        let mut touching = sound.clone();
+        touching.append(&ball(DVec3::Z * 2.0, 64));
+        let both = combine(&*engine, Operation::Union, &[&touching, &ball(DVec3::X * 5.0, 64)]);
+        assert_near(volume(&both), 3.0 * volume(&sound), 1e-9);
+        // What is proven gives the same, to the last bit.
+        let proven = |mesh| Operand { mesh, is_proven: true };
+        let (one, other) = (&sound, &ball(DVec3::X, 64));
+        let made = engine.combine(Operation::Union, &[proven(one), proven(other)], &CancelToken::new()).unwrap();
+        assert_eq!(made, combine(&*engine, Operation::Union, &[one, other]));
     }
 }
 

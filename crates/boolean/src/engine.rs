@@ -5,7 +5,7 @@ use lacuna_kernel::budget::CancelToken;
 use lacuna_kernel::measure::section::PlaneFrame;
 use lacuna_kernel::solid::TriMesh;
 
-use crate::BooleanError;
+use crate::{BooleanError, Operand};
 
 /// How solids are combined. All operations are regularised: a face, an edge or a point that two solids merely
 /// share leaves nothing behind.
@@ -34,14 +34,14 @@ pub trait BooleanEngine: Send + Sync {
     ///
     /// # Errors
     /// [`BooleanError`] when an operand is not a solid, when the token is fired, or when the engine fails.
-    fn combine(&self, operation: Operation, operands: &[&TriMesh], cancel: &CancelToken) -> Result<TriMesh, BooleanError>;
+    fn combine(&self, operation: Operation, operands: &[Operand<'_>], cancel: &CancelToken) -> Result<TriMesh, BooleanError>;
 
     /// What lies in any of the solids.
     ///
     /// # Errors
     /// As [`Self::combine`].
     fn union(&self, solids: &[&TriMesh], cancel: &CancelToken) -> Result<TriMesh, BooleanError> {
-        self.combine(Operation::Union, solids, cancel)
+        self.combine(Operation::Union, &unproven(solids), cancel)
     }
 
     /// What lies in all of the solids.
@@ -49,7 +49,7 @@ pub trait BooleanEngine: Send + Sync {
     /// # Errors
     /// As [`Self::combine`].
     fn intersection(&self, solids: &[&TriMesh], cancel: &CancelToken) -> Result<TriMesh, BooleanError> {
-        self.combine(Operation::Intersection, solids, cancel)
+        self.combine(Operation::Intersection, &unproven(solids), cancel)
     }
 
     /// What lies in `solid` and in none of `tools`.
@@ -57,7 +57,7 @@ pub trait BooleanEngine: Send + Sync {
     /// # Errors
     /// As [`Self::combine`]; operand 0 is `solid`.
     fn difference(&self, solid: &TriMesh, tools: &[&TriMesh], cancel: &CancelToken) -> Result<TriMesh, BooleanError> {
-        let operands: Vec<&TriMesh> = std::iter::once(solid).chain(tools.iter().copied()).collect();
+        let operands: Vec<Operand<'_>> = std::iter::once(solid).chain(tools.iter().copied()).map(Operand::from).collect();
         self.combine(Operation::Difference, &operands, cancel)
     }
 
@@ -72,6 +72,10 @@ pub trait BooleanEngine: Send + Sync {
         let beyond = self.intersection(&[solid, &half_space], cancel)?;
         Ok([behind, beyond])
     }
+}
+
+fn unproven<'a>(solids: &[&'a TriMesh]) -> Vec<Operand<'a>> {
+    solids.iter().copied().map(Operand::from).collect()
 }
 
 /// A box that holds all of a solid that lies beyond a plane, and ends at the plane; `None` if nothing lies there.

@@ -1,8 +1,9 @@
 //! The default engine: manifold-rust, a port of Manifold to Rust in double precision.
 //!
-//! Two habits of the library decide the code. Its batch operation is a left fold, whose cost grows with the square
+//! Three habits of the library decide the code. Its batch operation is a left fold, whose cost grows with the square
 //! of the number of operands; the expression tree joins them smallest first. And it takes a closed mesh that crosses
-//! itself without a word and then counts the overlap twice, so operands are searched for crossings first.
+//! itself without a word and then counts the overlap twice, so operands are searched for crossings. And it works on one thread: operands are checked on the others
+//! meanwhile, and what was made of unsound ones is thrown away.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,8 +19,10 @@ use manifold_rust::impl_mesh::ManifoldImpl;
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{Error as Status, MeshGLP, OpType};
 
-use crate::{BooleanEngine, BooleanError, Fault, Operation, operand};
+use crate::{BooleanEngine, BooleanError, Operand, Operation, operand};
 
+/// Operands of fewer triangles in all are combined in a few milliseconds: nobody looks at the caller's token meanwhile.
+const SMALL: usize = 4000;
 /// How often the caller's token is looked at; below what a person notices, above what costs anything.
 const POLL: Duration = Duration::from_millis(5);
 
@@ -32,20 +35,35 @@ impl BooleanEngine for ManifoldRust {
         "manifold-rust 0.19.2"
     }
 
-    fn combine(&self, operation: Operation, operands: &[&TriMesh], cancel: &CancelToken) -> Result<TriMesh, BooleanError> {
+    fn combine(&self, operation: Operation, operands: &[Operand<'_>], cancel: &CancelToken) -> Result<TriMesh, BooleanError> {
         cancel.check()?;
         if operands.is_empty() {
             return if operation == Operation::Union { Ok(TriMesh::default()) } else { Err(BooleanError::NoOperand) };
         }
-        for (index, mesh) in operands.iter().enumerate() {
-            operand::check(index, mesh)?;
-        }
         // The library has more than a hundred places that may panic; none of them may take the caller along.
-        let made = catch_unwind(AssertUnwindSafe(|| watched(cancel, |token| evaluate(operation, operands, token))));
-        match made {
-            Ok(result) => result.and_then(|mesh| cancel.check().map(|()| mesh).map_err(BooleanError::from)),
-            Err(panic) => Err(BooleanError::Engine(words(panic.as_ref()))),
-        }
+        let checked = || operand::check(operands, cancel, overlaps);
+        let evaluated = |token: &EngineToken| {
+            let made = catch_unwind(AssertUnwindSafe(|| evaluate(operation, operands, token)));
+            made.unwrap_or_else(|panic| Err(BooleanError::Engine(words(panic.as_ref()))))
+        };
+        let triangles: usize = operands.iter().map(|operand| operand.mesh.triangles.len()).sum();
+        let both = |token: &EngineToken| {
+            if operands.iter().all(|operand| operand.is_proven) {
+                return (Ok(()), evaluated(token));
+            }
+            // The engine stays on this thread, whose memory is warm.
+            let mut sound = Ok(());
+            let made = rayon::in_place_scope(|scope| {
+                scope.spawn(|_| sound = checked().inspect_err(|_| token.cancel()));
+                evaluated(token)
+            });
+            (sound, made)
+        };
+        let (sound, made) = if triangles < SMALL { both(&EngineToken::new()) } else { watched(cancel, both) };
+        // What was made of unsound operands means nothing.
+        sound?;
+        cancel.check()?;
+        made
     }
 }
 
@@ -70,26 +88,37 @@ fn watched<T: Send>(cancel: &CancelToken, work: impl FnOnce(&EngineToken) -> T) 
     })
 }
 
-fn evaluate(operation: Operation, operands: &[&TriMesh], token: &EngineToken) -> Result<TriMesh, BooleanError> {
+fn evaluate(operation: Operation, operands: &[Operand<'_>], token: &EngineToken) -> Result<TriMesh, BooleanError> {
     if operation == Operation::Hull {
         let solids: Result<Vec<Manifold>, BooleanError> =
-            operands.iter().enumerate().map(|(index, mesh)| import(index, mesh).map(Manifold::from_impl)).collect();
+            operands.iter().enumerate().map(|(index, operand)| import(index, operand.mesh).map(Manifold::from_impl)).collect();
         return finished(&Manifold::hull_manifolds(&solids?));
-    }
-    let mut leaves = Vec::with_capacity(operands.len());
-    for (index, mesh) in operands.iter().enumerate() {
-        leaves.push(CsgNode::leaf(import(index, mesh)?));
-        if token.is_cancelled() {
-            // The caller's token tells why.
-            return Ok(TriMesh::default());
-        }
     }
     let kind = match operation {
         Operation::Union | Operation::Hull => OpType::Add,
         Operation::Intersection => OpType::Intersect,
         Operation::Difference => OpType::Subtract,
     };
-    finished(&Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token))))
+    let mut solids = Vec::with_capacity(operands.len());
+    for (index, operand) in operands.iter().enumerate() {
+        solids.push(import(index, operand.mesh)?);
+        if token.is_cancelled() {
+            // The caller's token tells why.
+            return Ok(TriMesh::default());
+        }
+    }
+    // The tree copies its leaves and its result, which for two costs as much as a tenth of the work.
+    let result = match <[ManifoldImpl; 2]>::try_from(solids) {
+        Ok(two) => {
+            let [first, second] = two.map(Manifold::from_impl);
+            first.boolean_with_token(&second, kind, Some(token))
+        }
+        Err(many) => {
+            let leaves = many.into_iter().map(CsgNode::leaf).collect();
+            Manifold::from_impl(CsgNode::op_n(kind, leaves).evaluate_with_token(Some(token)))
+        }
+    };
+    finished(&result)
 }
 
 fn finished(result: &Manifold) -> Result<TriMesh, BooleanError> {
@@ -105,7 +134,6 @@ fn import(index: usize, mesh: &TriMesh) -> Result<ManifoldImpl, BooleanError> {
     if mesh.triangles.is_empty() {
         return Ok(Manifold::empty().into_impl());
     }
-    let not_a_solid = |fault| BooleanError::NotASolid { operand: index, fault };
     let solid = Manifold::from_mesh_glp(&MeshGLP::<f64, u32> {
         num_prop: 3,
         vert_properties: mesh.vertices.iter().flat_map(|p| p.to_array()).collect(),
@@ -113,10 +141,15 @@ fn import(index: usize, mesh: &TriMesh) -> Result<ManifoldImpl, BooleanError> {
         ..MeshGLP::default()
     });
     match solid.status() {
-        Status::NoError if solid.has_self_intersections() => Err(not_a_solid(Fault::SelfIntersecting)),
         Status::NoError => Ok(solid.into_impl()),
         status => Err(BooleanError::Engine(format!("operand {index} was refused: {status:?}"))),
     }
+}
+
+/// Whether a mesh meets itself in more than points and edges.
+fn overlaps(index: usize, mesh: &TriMesh) -> Result<bool, BooleanError> {
+    let looked = || import(index, mesh).map(|solid| Manifold::from_impl(solid).has_self_intersections());
+    catch_unwind(looked).unwrap_or_else(|panic| Err(BooleanError::Engine(words(panic.as_ref()))))
 }
 
 fn export(solid: &Manifold) -> TriMesh {

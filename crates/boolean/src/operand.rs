@@ -1,25 +1,60 @@
-//! What is checked of an operand before any engine sees it.
+//! What an engine combines, and what is checked of it.
 //!
 //! An engine's own import says less (which triangle, which edge) or nothing at all: a closed mesh that faces
-//! inwards is taken for its complement, and a count that is no multiple of three may end the process in others.
+//! inwards is taken for its complement, one that crosses itself is counted twice where it overlaps, and a count that is no multiple of three
+//! may end the process in others.
 
-use std::collections::HashSet;
-
-use lacuna_kernel::solid::TriMesh;
+use lacuna_kernel::budget::{Budget, CancelToken, Stopped};
+use lacuna_kernel::solid::{Crossings, TriMesh};
+use rayon::prelude::*;
 
 use crate::{BooleanError, Fault};
+
+/// A solid that is to be combined.
+#[derive(Clone, Copy, Debug)]
+pub struct Operand<'a> {
+    /// Its mesh.
+    pub mesh: &'a TriMesh,
+    /// Whether it is proven already to be closed, to look outwards and not to meet itself: then nothing is checked again.
+    pub is_proven: bool,
+}
+
+impl<'a> From<&'a TriMesh> for Operand<'a> {
+    /// A mesh of which nothing is known.
+    fn from(mesh: &'a TriMesh) -> Self {
+        Self { mesh, is_proven: false }
+    }
+}
 
 /// Corners that an engine with signed 32-bit indices can number.
 const CORNERS: usize = i32::MAX as usize;
 
-/// Checks everything but self-intersections, which the engine can find much faster. A mesh without triangles is
-/// the empty solid.
-pub(crate) fn check(operand: usize, mesh: &TriMesh) -> Result<(), BooleanError> {
-    let count = mesh.triangles.len().saturating_mul(3);
-    if count > CORNERS {
-        return Err(BooleanError::TooLarge { operand, count });
+/// Checks all operands that are not proven. A mesh without triangles is the empty solid. `overlaps` decides of a mesh that meets itself whether it does so elsewhere
+/// than in points and edges, which is allowed. Cost: n log n, on all threads.
+pub(crate) fn check(
+    operands: &[Operand<'_>],
+    cancel: &CancelToken,
+    overlaps: impl Fn(usize, &TriMesh) -> Result<bool, BooleanError>,
+) -> Result<(), BooleanError> {
+    for (operand, Operand { mesh, .. }) in operands.iter().enumerate().filter(|(_, operand)| !operand.is_proven) {
+        let count = mesh.triangles.len().saturating_mul(3);
+        if count > CORNERS {
+            return Err(BooleanError::TooLarge { operand, count });
+        }
+        let refused = |fault| Err(BooleanError::NotASolid { operand, fault });
+        if let Some(fault) = fault(mesh) {
+            return refused(fault);
+        }
+        if meets_itself(mesh, cancel)? && overlaps(operand, mesh)? {
+            return refused(Fault::SelfIntersecting);
+        }
     }
-    fault(mesh).map_or(Ok(()), |fault| Err(BooleanError::NotASolid { operand, fault }))
+    Ok(())
+}
+
+fn meets_itself(mesh: &TriMesh, cancel: &CancelToken) -> Result<bool, Stopped> {
+    let budget = Budget { cancel: cancel.clone(), ..Budget::default() };
+    Ok(Crossings::of(mesh, &budget)?.count > 0)
 }
 
 fn fault(mesh: &TriMesh) -> Option<Fault> {
@@ -33,13 +68,20 @@ fn fault(mesh: &TriMesh) -> Option<Fault> {
     open_edge(mesh).or_else(|| (!mesh.triangles.is_empty() && six_volumes(mesh) <= 0.0).then_some(Fault::InsideOut))
 }
 
-/// A directed edge that occurs twice, or whose opposite does not occur.
+/// The first directed edge that occurs twice, or whose opposite does not occur, or that occurs only as an opposite.
 fn open_edge(mesh: &TriMesh) -> Option<Fault> {
-    let directed = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-    let mut seen = HashSet::with_capacity(3 * mesh.triangles.len());
-    let doubled = directed().find(|edge| !seen.insert(*edge));
-    let unmatched = || directed().find(|&(from, to)| !seen.contains(&(to, from)));
-    doubled.or_else(unmatched).map(|(from, to)| Fault::NotClosed { from, to })
+    // As numbers, since they are quickly sorted.
+    let name = |from: u32, to: u32| u64::from(from) << 32 | u64::from(to);
+    let sorted = |backwards: bool| -> Vec<u64> {
+        let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let mut names: Vec<u64> = edges.map(|(a, b)| if backwards { name(b, a) } else { name(a, b) }).collect();
+        names.par_sort_unstable();
+        names
+    };
+    let (edges, opposites) = (sorted(false), sorted(true));
+    let doubled = edges.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
+    let unmatched = || edges.iter().zip(&opposites).find(|(edge, opposite)| edge != opposite).map(|(edge, opposite)| *edge.min(opposite));
+    doubled.or_else(unmatched).map(|edge| Fault::NotClosed { from: (edge >> 32) as u32, to: edge as u32 })
 }
 
 /// Six times the enclosed volume, seen from a vertex of the mesh so that a place far from the origin costs no digits.

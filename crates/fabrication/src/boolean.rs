@@ -83,7 +83,7 @@ fn evaluate(operation: Operation, operands: &mut [Operand], budget: &Budget) -> 
     }
     let (mut meshes, mut owners) = (Vec::new(), Vec::new());
     for operand in operands.iter() {
-        meshes.extend(&operand.meshes);
+        meshes.extend(operand.meshes.iter().map(|mesh| lacuna_boolean::Operand { mesh, is_proven: operand.is_proven }));
         owners.resize(meshes.len(), operand.statement.name.as_str());
     }
     let combined = ManifoldRust.combine(engine_operation, &meshes, &budget.cancel);

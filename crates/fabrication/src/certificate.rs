@@ -15,7 +15,7 @@ use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 use crate::level::LevelStatement;
 use crate::operand::Operand;
 use crate::run::{JobError, not_carried};
-use crate::shape_measures::{OrientedBoxStatement, ThicknessStatement};
+use crate::shape_measures::{EnclosedStatement, ExtentStatement, OrientedBoxStatement, ThicknessStatement};
 use crate::solidify::{ClosingStatement, WallStatement};
 use crate::split::SplitStatement;
 use crate::{Operation, Part};
@@ -147,6 +147,12 @@ pub struct Certificate {
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub volume_mm3: Option<Interval>,
+    /// How far the exact shape extends along the direction that a `measure` asks for.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub extent: Option<ExtentStatement>,
+    /// What a closed surface that is no mesh encloses: of a `measure` alone.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub enclosed: Option<EnclosedStatement>,
     /// Area of the exact shape's boundary.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
@@ -300,7 +306,7 @@ pub struct DirectedStatement {
     pub near_mm: [f64; 3],
 }
 
-/// The Hausdorff distance of two shapes. A model that stands for a solid is its surface here.
+/// The Hausdorff distance of two shapes. A model that stands for a solid is all that it encloses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "wire", serde(deny_unknown_fields))]

@@ -7,14 +7,15 @@ use lacuna_kernel::measure::contact::{
     CellPair, Contact, ContactError, ContactQuery, Place, Primitive, Verdict, intersect, intersect_primitive,
 };
 use lacuna_kernel::measure::hausdorff::{Directed, Hausdorff, hausdorff};
-use lacuna_kernel::measure::{AxisBox, Inside, bounding_box, first_inside};
+use lacuna_kernel::measure::{AxisBox, bounding_box};
+use lacuna_kernel::solid::Inside;
 use lacuna_kernel::tolerance::{LENGTHS_MM, Tolerance};
 
 use crate::certificate::{
     self, CellPairStatement, ContactStatement, ContactVerdict, DirectedStatement, HausdorffStatement, Holder, InsideStatement,
     PlaceStatement,
 };
-use crate::operand::{is_solid, surfaces};
+use crate::operand::is_solid;
 use crate::run::{JobError, Outcome, lower_all, wrong_inputs};
 use crate::{Geometry, Job};
 
@@ -59,24 +60,17 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     let mut stated = statement(&found);
     if found.distance_mm.low > 0.0 {
         let held = match (shapes.as_slice(), &job.params.with) {
-            ([(first, _), (second, _)], _) => match holds(second, &samples(first, &found, budget)?, budget)? {
-                Inside::None => (Holder::First, holds(first, &samples(second, &found, budget)?, budget)?),
-                held => (Holder::Second, held),
+            ([(first, _), (second, _)], _) => match held(second, &samples(first, &found, budget)?, budget)? {
+                None => held(first, &samples(second, &found, budget)?, budget)?.map(|point| (Holder::First, point)),
+                Some(point) => Some((Holder::Second, point)),
             },
-            ([(shape, _)], Some(primitive)) => (Holder::First, holds(shape, &point_of(primitive), budget)?),
-            _ => (Holder::First, Inside::None),
+            ([(shape, _)], Some(primitive)) => held(shape, &point_of(primitive), budget)?.map(|point| (Holder::First, point)),
+            _ => None,
         };
-        match held {
-            (_, Inside::None) => {}
-            (holder, Inside::Point(point)) => {
-                let surface_distance_mm = stated.distance_mm;
-                stated.inside = Some(InsideStatement { holder, point_mm: point.to_array(), surface_distance_mm });
-                (stated.verdict, stated.distance_mm) = (ContactVerdict::Touching, [0.0; 2]);
-            }
-            (_, Inside::Undecided) => {
-                certificate.warnings.push("whether one shape lies inside the other is not decided: the surfaces are very close".into());
-                (stated.verdict, stated.distance_mm[0], stated.complete) = (ContactVerdict::Near, 0.0, false);
-            }
+        if let Some((holder, point)) = held {
+            let surface_distance_mm = stated.distance_mm;
+            stated.inside = Some(InsideStatement { holder, point_mm: point.to_array(), surface_distance_mm });
+            (stated.verdict, stated.distance_mm) = (ContactVerdict::Touching, [0.0; 2]);
         }
     }
     certificate.contact = Some(stated);
@@ -102,17 +96,23 @@ fn point_of(primitive: &Primitive) -> Vec<DVec3> {
     }
 }
 
-/// Whether a shape that stands for solids holds one of the points, which are not on its surfaces.
-fn holds(shape: &Attractor, points: &[DVec3], budget: &Budget) -> Result<Inside, JobError> {
+/// Points looked at together.
+const CHUNK: usize = 1 << 12;
+
+/// The first of the points that a shape which stands for solids holds; none of them is on its surfaces.
+fn held(shape: &Attractor, points: &[DVec3], budget: &Budget) -> Result<Option<DVec3>, JobError> {
     if is_solid(shape) {
-        for surface in surfaces(shape) {
-            let found = first_inside(&surface, points, budget)?;
-            if found != Inside::None {
-                return Ok(found);
+        for surface in shape.surfaces() {
+            let inside = Inside::new(&surface);
+            for chunk in points.chunks(CHUNK) {
+                budget.cancel.check()?;
+                if let Some(&point) = chunk.iter().find(|point| inside.winding(**point) > 0) {
+                    return Ok(Some(point));
+                }
             }
         }
     }
-    Ok(Inside::None)
+    Ok(None)
 }
 
 /// Does a job of kind `measure` with two inputs: how far one shape is from being the other.

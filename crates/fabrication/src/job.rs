@@ -136,6 +136,8 @@ pub struct Params {
     pub split: Option<Split>,
     /// The planes of a `slice`.
     pub planes: Option<Planes>,
+    /// Along which a `measure` tells how far the shape extends, of any length.
+    pub direction: Option<glam::DVec3>,
     /// Whether a `measure` finds the smallest box, whatever way it is turned.
     pub oriented_box: bool,
     /// Whether a `measure` finds the least walls and gaps.
@@ -165,6 +167,7 @@ impl Params {
             plane: None,
             split: None,
             planes: None,
+            direction: None,
             oriented_box: false,
             thickness: false,
             density_g_cm3: None,

@@ -1,6 +1,5 @@
 //! Inputs as solids: dilated by a ball, or what their closed surfaces bound.
 
-use glam::DVec3;
 use lacuna_boolean::{BooleanEngine, BooleanError, ManifoldRust};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
@@ -12,7 +11,6 @@ use lacuna_kernel::model::CellKind;
 use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use crate::Job;
@@ -31,6 +29,8 @@ pub(crate) struct Operand {
     pub(crate) leaf_cells: u64,
     pub(crate) warnings: Vec<String>,
     pub(crate) meshes: Vec<TriMesh>,
+    /// Whether every mesh is proven to be a solid that does not meet itself.
+    pub(crate) is_proven: bool,
 }
 
 /// An input before it is a solid: its shape, its radius (0 for the solid itself) and its box.
@@ -99,15 +99,17 @@ pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tole
 pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget) -> Result<Operand, JobError> {
     let Source { input, attractor, radius_mm, bounds } = source;
     let (mut warnings, mut bounds) = (attractor.warnings().to_vec(), *bounds);
+    let mut is_proven = false;
     let (meshes, inner, outer, leaf_cells) = if *radius_mm > 0.0 {
         let dilation = dilate(attractor, Radius::new(*radius_mm)?, tolerance, budget)?;
         if dilation.crossings > 0 {
             warnings.push(format!("{} pairs of triangles of input '{}' cross", dilation.crossings, input.name));
         }
         bounds = dilation.bounds;
+        is_proven = dilation.crossings == 0;
         (vec![dilation.solid.into_mesh()], dilation.inner_mm, dilation.outer_mm, dilation.leaf_cells)
     } else if is_solid(attractor) {
-        (surfaces(attractor), 0.0, 0.0, attractor.roots().len() as u64)
+        (attractor.surfaces(), 0.0, 0.0, attractor.roots().len() as u64)
     } else {
         let (mesh, deviation, leaf_cells) = closed_surface(&input.name, attractor, tolerance, budget)?;
         (vec![mesh], deviation, deviation, leaf_cells)
@@ -126,7 +128,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         triangles: meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
         mesh_volume_mm3: volume,
     };
-    Ok(Operand { statement, bounds, volume_error, leaf_cells, warnings, meshes })
+    Ok(Operand { statement, bounds, volume_error, leaf_cells, warnings, meshes, is_proven })
 }
 
 /// A closed surface of any family as a mesh, with its deviation and its cells.
@@ -158,34 +160,13 @@ fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
     2.0 * d * area(mesh) + 0.5 * PI * d * d * length + balls
 }
 
-/// The closed surfaces of a shape, their vertices joined as the model has them.
-pub(crate) fn surfaces(attractor: &Attractor) -> Vec<TriMesh> {
-    let mut meshes = Vec::with_capacity(attractor.solids().len());
-    for surface in attractor.solids() {
-        let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());
-        for (index, corners) in surface.triangles.iter().enumerate() {
-            let points = &attractor.roots()[surface.first_root + index].points;
-            let mut number = |k: usize| {
-                *numbers.entry(corners[k]).or_insert_with(|| {
-                    mesh.vertices.push(DVec3::new(points[k][0], points[k][1], points[k][2]));
-                    mesh.vertices.len() as u32 - 1
-                })
-            };
-            let triangle = [number(0), number(1), number(2)];
-            mesh.triangles.push(triangle);
-        }
-        meshes.push(mesh);
-    }
-    meshes
-}
-
 impl Operand {
     /// Makes one mesh of several: what lies in any of them.
     pub(crate) fn join(&mut self, budget: &Budget) -> Result<(), JobError> {
         if self.meshes.len() > 1 {
             let meshes: Vec<&TriMesh> = self.meshes.iter().collect();
             let joined = ManifoldRust.union(&meshes, &budget.cancel).map_err(|error| at_fault(error, |_| &self.statement.name))?;
-            self.meshes = vec![joined];
+            (self.meshes, self.is_proven) = (vec![joined], false);
         }
         Ok(())
     }

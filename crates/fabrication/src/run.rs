@@ -12,8 +12,8 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
-use crate::operand::{is_solid, surfaces};
-use crate::shape_measures::{least_thickness, no_solid, smallest_box};
+use crate::operand::is_solid;
+use crate::shape_measures::{enclosed, extent, least_thickness, no_solid, smallest_box};
 use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, slice, solidify, split};
 
@@ -260,10 +260,17 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
         }
+        match enclosed(attractor, budget)? {
+            Ok(found) => certificate.enclosed = found,
+            Err(reason) => certificate.warnings.push(reason),
+        }
         if job.params.thickness {
-            let surfaces = if is_solid(attractor) { surfaces(attractor) } else { Vec::new() };
+            let surfaces = if is_solid(attractor) { attractor.surfaces() } else { Vec::new() };
             let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
             certificate.thickness = Some(least_thickness(mesh, budget)?);
+        }
+        if let Some(direction) = job.params.direction {
+            certificate.extent = Some(extent(attractor, direction, [0.0; 2], budget)?);
         }
         if job.params.oriented_box {
             certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
@@ -276,6 +283,9 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
     let difference = dilated_difference(volume(mesh), dilation.least_radius_mm, dilation.inner_mm, dilation.outer_mm);
     certificate.state_mass(mesh, difference, &dilation.bounds.grown(dilation.outer_mm), job.params.density_g_cm3);
     certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
+    if let Some(direction) = job.params.direction {
+        certificate.extent = Some(extent(attractor, direction, attractor.radii(radius.mm()), budget)?);
+    }
     if job.params.oriented_box {
         certificate.oriented_box = smallest_box(attractor, radius.mm(), tolerance, budget)?;
     }

@@ -1,15 +1,17 @@
 //! Measures of a shape that are made when they are asked for: its smallest box, and the thickness of walls and gaps.
 
+use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, RefineError, refine};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::error::Kind;
 use lacuna_kernel::measure::mass::mesh_of;
-use lacuna_kernel::measure::{Side, oriented_box, thickness};
+use lacuna_kernel::measure::section::{NoDirection, PlaneFrame};
+use lacuna_kernel::measure::{NotEnclosed, Side, enclosed_volume, extent_along, oriented_box, thickness};
 use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::Interval;
-use crate::operand::{is_solid, surfaces};
+use crate::operand::is_solid;
 use crate::run::JobError;
 
 /// The smallest box around the exact shape, whatever way it is turned.
@@ -28,6 +30,45 @@ pub struct OrientedBoxStatement {
     pub volume_mm3: Interval,
     /// Whether the bounds are within a thousandth of each other, and what the tolerance takes.
     pub complete: bool,
+}
+
+/// How far a shape extends along a direction: between two planes across it that touch the shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct ExtentStatement {
+    /// The direction, of length 1.
+    pub direction: [f64; 3],
+    /// The least x . direction of points x of the shape.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub from_mm: Interval,
+    /// The largest.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub to_mm: Interval,
+    /// Their difference: the width of the shape along the direction.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub width_mm: Interval,
+}
+
+/// How a volume was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
+pub enum VolumeMethod {
+    /// From trilinear forms of the control points that solve the subdivision's linear systems: exact but for rounding, which the interval holds.
+    TrilinearForms,
+}
+
+/// The volume that a closed surface encloses. The surface itself, being a sheet, has none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
+pub struct EnclosedStatement {
+    /// The volume; where the surface passes through itself, parts are counted as often as it winds around them.
+    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
+    pub volume_mm3: Interval,
+    /// How it was found.
+    pub method: VolumeMethod,
 }
 
 /// A least thickness, and where it is.
@@ -61,6 +102,26 @@ const RELATIVE: f64 = 1e-3;
 /// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
 const MOST_CELLS: u64 = 30_000;
 
+/// How far a shape, dilated by a radius between two, extends along a direction.
+pub(crate) fn extent(attractor: &Attractor, direction: DVec3, radii_mm: [f64; 2], budget: &Budget) -> Result<ExtentStatement, JobError> {
+    let no_direction = |error: NoDirection| JobError::new(Kind::Invalid, "bad-parameter", error.to_string());
+    let direction = PlaneFrame::new(direction).map_err(no_direction)?.normal();
+    let [least, largest] = extent_along(attractor, direction, budget)?;
+    let [from, to] = [[least.low - radii_mm[1], least.high - radii_mm[0]], [largest.low + radii_mm[0], largest.high + radii_mm[1]]];
+    let width_mm = [(to[0] - from[1]).next_down().max(0.0), (to[1] - from[0]).next_up()];
+    Ok(ExtentStatement { direction: direction.to_array(), from_mm: from, to_mm: to, width_mm })
+}
+
+/// The volume that a closed surface encloses, or why it is not known; neither for shapes that are no closed surface.
+pub(crate) fn enclosed(attractor: &Attractor, budget: &Budget) -> Result<Result<Option<EnclosedStatement>, String>, JobError> {
+    match enclosed_volume(attractor, budget) {
+        Ok(volume) => Ok(Ok(Some(EnclosedStatement { volume_mm3: [volume.low, volume.high], method: VolumeMethod::TrilinearForms }))),
+        Err(NotEnclosed::NoSurface | NotEnclosed::Open(_)) => Ok(Ok(None)),
+        Err(NotEnclosed::Stopped(stopped)) => Err(stopped.into()),
+        Err(reason) => Ok(Err(format!("the enclosed volume is not known: {reason}"))),
+    }
+}
+
 /// The smallest box of a shape dilated by a radius, 0 for the shape itself.
 pub(crate) fn smallest_box(
     attractor: &Attractor,
@@ -70,7 +131,7 @@ pub(crate) fn smallest_box(
 ) -> Result<Option<OrientedBoxStatement>, JobError> {
     let (points, slack) = match mesh_of(attractor) {
         // Corners once, and not once for every triangle.
-        _ if is_solid(attractor) => (surfaces(attractor).into_iter().flat_map(|surface| surface.vertices).collect(), 0.0),
+        _ if is_solid(attractor) => (attractor.surfaces().into_iter().flat_map(|surface| surface.vertices).collect(), 0.0),
         Some((mesh, _)) => (mesh.vertices, 0.0),
         None => sampled(attractor, tolerance, budget)?,
     };
@@ -85,7 +146,7 @@ pub(crate) fn smallest_box(
 }
 
 /// Points of a shape, and how far it and they are from each other.
-fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(Vec<glam::DVec3>, f64), JobError> {
+fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(Vec<DVec3>, f64), JobError> {
     let limits = Limits { cells: MOST_CELLS.min(budget.limits.cells), ..budget.limits };
     let few = Budget { limits, progress: None, ..budget.clone() };
     let mut coarse = tolerance.mm();

@@ -355,6 +355,47 @@ fn hausdorff_distances_of_known_shapes() {
     holds(found.from_first.distance_mm, 0.5);
 }
 
+/// Solids are what they enclose: cubes about the origin, hollow ones, and surfaces that enclose nothing.
+#[test]
+fn hausdorff_distances_of_solids() {
+    let quads = [[0_u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let corners = |half: f64, at: DVec3| {
+        (0..8).map(move |k| at + half * (DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0))
+    };
+    let faces = |first: u32, inward: bool| {
+        quads.map(|quad| {
+            let quad = quad.map(|corner| corner + first);
+            if inward { quad.into_iter().rev().collect() } else { quad.to_vec() }
+        })
+    };
+    let made = |vertices: Vec<DVec3>, faces: Vec<Vec<u32>>, interior: Interior| {
+        Model { name: None, shape: Shape::Mesh(PolygonMesh { vertices, faces, interior }) }.lower().unwrap().attractor
+    };
+    let cube = |half: f64, at: DVec3| made(corners(half, at).collect(), faces(0, false).to_vec(), Interior::Auto);
+    let (large, small) = (cube(10.0, DVec3::ZERO), cube(5.0, DVec3::ZERO));
+    // The small one lies in the large one, whose corners are the farthest.
+    let found = far(&large, &small, 0.25);
+    holds(found.from_first.distance_mm, 5.0 * 3.0_f64.sqrt());
+    holds(found.from_second.distance_mm, 0.0);
+    // The middle of the solid is the farthest from its surface.
+    let surface = made(corners(10.0, DVec3::ZERO).collect(), faces(0, false).to_vec(), Interior::Surface);
+    let found = far(&large, &surface, 0.25);
+    holds(found.from_first.distance_mm, 10.0);
+    holds(found.from_second.distance_mm, 0.0);
+    assert!(DVec3::from_array(found.from_first.place.centre).length() <= 0.25);
+    // A solid with a void: the middle of the void is the farthest.
+    let vertices: Vec<DVec3> = corners(10.0, DVec3::ZERO).chain(corners(4.0, DVec3::new(1.0, 0.0, -2.0))).collect();
+    let hollow = made(vertices, [faces(0, false), faces(8, true)].concat(), Interior::Auto);
+    let found = far(&large, &hollow, 0.25);
+    holds(found.from_first.distance_mm, 4.0);
+    holds(found.from_second.distance_mm, 0.0);
+    // Apart, and a point within.
+    holds(far(&small, &cube(5.0, DVec3::new(30.0, 0.0, 0.0)), 0.25).distance_mm(), 30.0);
+    let found = far(&cloud(&[DVec3::new(1.0, 2.0, 3.0)]), &small, 0.25);
+    holds(found.from_first.distance_mm, 0.0);
+    holds(found.from_second.distance_mm, DVec3::new(6.0, 7.0, 8.0).length());
+}
+
 #[test]
 fn hostile_queries_are_refused() {
     let shape = sierpinski(40.0, DVec3::ZERO);

@@ -5,30 +5,11 @@ mod agreement;
 mod cages;
 
 use agreement::agreed;
-use cages::{attractor, cube, evaluated, grid, model, patches, tetrahedron, torus};
+use cages::{attractor, cube, evaluated, grid, model, tetrahedron, torus, volume};
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::model::{BoundaryRule, CellKind, Coefficients, Corner, Crease, Scheme, Subdivision};
 use lacuna_kernel::tessellation::Tessellation;
-
-/// Volume by the divergence theorem on the bilinear patches, extrapolated from three depths: the error of smooth
-/// surfaces is a power series in 4^-depth.
-fn volume(attractor: &Attractor, depth: usize) -> f64 {
-    let at = |depth: usize| -> f64 {
-        let triangle = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c)) / 6.0;
-        patches(attractor, depth)
-            .iter()
-            .map(|p| match p.as_slice() {
-                [a, b, c] => triangle(*a, *b, *c),
-                [a, b, c, d] => 0.5 * (triangle(*a, *b, *c) + triangle(*a, *c, *d) + triangle(*a, *b, *d) + triangle(*b, *c, *d)),
-                _ => panic!("triangles and quads"),
-            })
-            .sum()
-    };
-    let (a, b, c) = (at(depth - 2), at(depth - 1), at(depth));
-    let (d, e) = ((4.0 * b - a) / 3.0, (4.0 * c - b) / 3.0);
-    (16.0 * e - d) / 15.0
-}
 
 fn has_point(tessellation: &Tessellation, point: DVec3) -> bool {
     tessellation.vertices.iter().any(|vertex| vertex.distance(point) < 1e-9)

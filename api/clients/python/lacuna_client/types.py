@@ -67,9 +67,7 @@ BezierCurveShape = TypedDict('BezierCurveShape', {
     'weights': 'NotRequired[list[float]]',
 })
 
-BezierScheme = TypedDict('BezierScheme', {
-    'family': "Literal['bezier_curve']",
-})
+BezierScheme = TypedDict('BezierScheme', {'family': "Literal['bezier_curve']"})
 
 BezierSurfaceShape = TypedDict('BezierSurfaceShape', {
     'control_points': 'list[list[ControlPoint]]',
@@ -85,10 +83,7 @@ Border = TypedDict('Border', {
     'vertices': 'NotRequired[list[int]]',
 })
 
-Boundary = TypedDict('Boundary', {
-    'incidence': 'Matrix',
-    'state': 'str',
-})
+Boundary = TypedDict('Boundary', {'incidence': 'Matrix', 'state': 'str'})
 
 Cage = TypedDict('Cage', {
     'boundary_loops': 'NotRequired[int | None]',
@@ -130,12 +125,7 @@ CellPairStatement = TypedDict('CellPairStatement', {
     'second_mm': 'list[float]',
 })
 
-CellPlace = TypedDict('CellPlace', {
-    'address': 'str',
-    'centre_mm': 'list[float]',
-    'radius_mm': 'float',
-    'state': 'str',
-})
+CellPlace = TypedDict('CellPlace', {'address': 'str', 'centre_mm': 'list[float]', 'radius_mm': 'float', 'state': 'str'})
 
 Certificate = TypedDict('Certificate', {
     'achieved_bound_mm': 'float',
@@ -151,7 +141,9 @@ Certificate = TypedDict('Certificate', {
     'degenerate_triangles': 'NotRequired[int | None]',
     'dimension': 'NotRequired[DimensionStatement | None]',
     'edges': 'int',
+    'enclosed': 'NotRequired[EnclosedStatement | None]',
     'euler': 'NotRequired[int | None]',
+    'extent': 'NotRequired[ExtentStatement | None]',
     'flipped_pairs': 'NotRequired[int | None]',
     'genus': 'NotRequired[int | None]',
     'hausdorff': 'NotRequired[HausdorffStatement | None]',
@@ -187,21 +179,11 @@ Certificate = TypedDict('Certificate', {
     'warnings': 'list[str]',
 })
 
-ClassicView = TypedDict('ClassicView', {
-    'name': 'str',
-    'source': 'str',
-    'title': 'str',
-})
+ClassicView = TypedDict('ClassicView', {'name': 'str', 'source': 'str', 'title': 'str'})
 
-ClosingStatement = TypedDict('ClosingStatement', {
-    'ball_radius_mm': 'float',
-    'width_mm': 'float',
-})
+ClosingStatement = TypedDict('ClosingStatement', {'ball_radius_mm': 'float', 'width_mm': 'float'})
 
-Coefficients = TypedDict('Coefficients', {
-    'faces': 'NotRequired[list[int]]',
-    'weights': 'list[list[float]]',
-})
+Coefficients = TypedDict('Coefficients', {'faces': 'NotRequired[list[int]]', 'weights': 'list[list[float]]'})
 
 ContactStatement = TypedDict('ContactStatement', {
     'complete': 'bool',
@@ -214,19 +196,13 @@ ContactStatement = TypedDict('ContactStatement', {
 
 ContactVerdict: TypeAlias = Literal['disjoint', 'near', 'touching']
 
-ControlMesh = TypedDict('ControlMesh', {
-    'faces': 'list[list[int]]',
-    'vertices': 'list[list[float]]',
-})
+ControlMesh = TypedDict('ControlMesh', {'faces': 'list[list[int]]', 'vertices': 'list[list[float]]'})
 
 ControlPoint: TypeAlias = list[float]
 
 CopiedPrimitive: TypeAlias = Literal['stated', 'box']
 
-Corner = TypedDict('Corner', {
-    'sharpness': "float | Literal['infinite']",
-    'vertex': 'int',
-})
+Corner = TypedDict('Corner', {'sharpness': "float | Literal['infinite']", 'vertex': 'int'})
 
 CornerCuttingScheme = TypedDict('CornerCuttingScheme', {
     'a': 'NotRequired[float]',
@@ -243,10 +219,7 @@ CornerCuttingShape = TypedDict('CornerCuttingShape', {
     'family': "Literal['corner_cutting']",
 })
 
-Crease = TypedDict('Crease', {
-    'edge': 'list[int]',
-    'sharpness': "float | Literal['infinite']",
-})
+Crease = TypedDict('Crease', {'edge': 'list[int]', 'sharpness': "float | Literal['infinite']"})
 
 CriticalRadiusStatement = TypedDict('CriticalRadiusStatement', {
     'change': 'TopologyChange',
@@ -260,23 +233,13 @@ CurveScheme: TypeAlias = 'BezierScheme | NurbsScheme | CatmullRomScheme | BetaSp
 
 CurveShape: TypeAlias = 'BezierCurveShape | NurbsCurveShape | CatmullRomShape | BetaSplineShape | CornerCuttingShape | FourPointShape | InterpolationShape'
 
-DeterminedParameter = TypedDict('DeterminedParameter', {
-    'name': 'str',
-    'stated': 'float',
-    'value': 'float',
-})
+DeterminedParameter = TypedDict('DeterminedParameter', {'name': 'str', 'stated': 'float', 'value': 'float'})
 
 DimensionBasis: TypeAlias = Literal['elementary', 'similarities', 'overlapping_similarities', 'contraction']
 
-DimensionStatement = TypedDict('DimensionStatement', {
-    'basis': 'DimensionBasis',
-    'bounds': 'list[float]',
-})
+DimensionStatement = TypedDict('DimensionStatement', {'basis': 'DimensionBasis', 'bounds': 'list[float]'})
 
-DirectedStatement = TypedDict('DirectedStatement', {
-    'distance_mm': 'list[float]',
-    'near_mm': 'list[float]',
-})
+DirectedStatement = TypedDict('DirectedStatement', {'distance_mm': 'list[float]', 'near_mm': 'list[float]'})
 
 EmbeddedModel = TypedDict('EmbeddedModel', {
     'lacuna': 'NotRequired[Literal[1]]',
@@ -285,9 +248,15 @@ EmbeddedModel = TypedDict('EmbeddedModel', {
     'units': "NotRequired[Literal['um', 'mm', 'cm', 'm', 'in']]",
 })
 
-ExactNumber = TypedDict('ExactNumber', {
-    'exact': 'str',
-    'value': 'float',
+EnclosedStatement = TypedDict('EnclosedStatement', {'method': 'VolumeMethod', 'volume_mm3': 'list[float]'})
+
+ExactNumber = TypedDict('ExactNumber', {'exact': 'str', 'value': 'float'})
+
+ExtentStatement = TypedDict('ExtentStatement', {
+    'direction': 'list[float]',
+    'from_mm': 'list[float]',
+    'to_mm': 'list[float]',
+    'width_mm': 'list[float]',
 })
 
 Finding = TypedDict('Finding', {
@@ -318,12 +287,7 @@ FourPointShape = TypedDict('FourPointShape', {
     'w': 'NotRequired[float]',
 })
 
-FreeParameter = TypedDict('FreeParameter', {
-    'declared': 'bool',
-    'name': 'str',
-    'pointer': 'str',
-    'value': 'float',
-})
+FreeParameter = TypedDict('FreeParameter', {'declared': 'bool', 'name': 'str', 'pointer': 'str', 'value': 'float'})
 
 Glue = TypedDict('Glue', {
     'between': 'list[list[int]]',
@@ -344,16 +308,11 @@ HausdorffStatement = TypedDict('HausdorffStatement', {
     'from_second': 'DirectedStatement',
 })
 
-Health = TypedDict('Health', {
-    'status': 'str',
-})
+Health = TypedDict('Health', {'status': 'str'})
 
 Holder: TypeAlias = Literal['first', 'second']
 
-IfsScheme = TypedDict('IfsScheme', {
-    'family': "Literal['ifs']",
-    'maps': 'list[AffineMap]',
-})
+IfsScheme = TypedDict('IfsScheme', {'family': "Literal['ifs']", 'maps': 'list[AffineMap]'})
 
 IfsShape = TypedDict('IfsShape', {
     'family': "Literal['ifs']",
@@ -362,11 +321,7 @@ IfsShape = TypedDict('IfsShape', {
     'primitive': 'NotRequired[Primitive]',
 })
 
-Incidence = TypedDict('Incidence', {
-    'boundary': 'int',
-    'children': 'list[list[int]]',
-    'state': 'str',
-})
+Incidence = TypedDict('Incidence', {'boundary': 'int', 'children': 'list[list[int]]', 'state': 'str'})
 
 InsideStatement = TypedDict('InsideStatement', {
     'holder': 'Holder',
@@ -415,16 +370,14 @@ JobLimits = TypedDict('JobLimits', {
     'triangles': 'NotRequired[int]',
 })
 
-JobPage = TypedDict('JobPage', {
-    'items': 'list[JobView]',
-    'next': 'NotRequired[str | None]',
-})
+JobPage = TypedDict('JobPage', {'items': 'list[JobView]', 'next': 'NotRequired[str | None]'})
 
 JobParams = TypedDict('JobParams', {
     'clearance_mm': 'NotRequired[float]',
     'closing_mm': 'NotRequired[float]',
     'cuts_mm': 'NotRequired[list[list[float]]]',
     'density_g_cm3': 'NotRequired[float]',
+    'direction': 'NotRequired[list[float]]',
     'key_mm': 'NotRequired[float]',
     'level': 'NotRequired[int]',
     'normal': 'NotRequired[list[float]]',
@@ -464,10 +417,7 @@ JobView = TypedDict('JobView', {
     'warnings': 'list[str]',
 })
 
-Join = TypedDict('Join', {
-    'between': 'list[Border]',
-    'strip': 'NotRequired[bool]',
-})
+Join = TypedDict('Join', {'between': 'list[Border]', 'strip': 'NotRequired[bool]'})
 
 Kind: TypeAlias = Literal['sourced', 'chosen']
 
@@ -484,9 +434,7 @@ LevelStatement = TypedDict('LevelStatement', {
     'primitive': 'CopiedPrimitive',
 })
 
-LibraryPage = TypedDict('LibraryPage', {
-    'items': 'list[ClassicView]',
-})
+LibraryPage = TypedDict('LibraryPage', {'items': 'list[ClassicView]'})
 
 LimitCapability = TypedDict('LimitCapability', {
     'body_bytes': 'int',
@@ -505,12 +453,7 @@ LimitCapability = TypedDict('LimitCapability', {
     'wait_seconds': 'int',
 })
 
-LocalSolution = TypedDict('LocalSolution', {
-    'equations': 'int',
-    'rank': 'int',
-    'starts': 'int',
-    'unknowns': 'int',
-})
+LocalSolution = TypedDict('LocalSolution', {'equations': 'int', 'rank': 'int', 'starts': 'int', 'unknowns': 'int'})
 
 LocatedPoint = TypedDict('LocatedPoint', {
     'address': 'str',
@@ -527,16 +470,11 @@ Material = TypedDict('Material', {
     'title': 'str',
 })
 
-MaterialPage = TypedDict('MaterialPage', {
-    'items': 'list[Material]',
-})
+MaterialPage = TypedDict('MaterialPage', {'items': 'list[Material]'})
 
 Matrix: TypeAlias = list[list[float | None | str]]
 
-MeshData = TypedDict('MeshData', {
-    'faces': 'list[list[int]]',
-    'vertices': 'list[list[float]]',
-})
+MeshData = TypedDict('MeshData', {'faces': 'list[list[int]]', 'vertices': 'list[list[float]]'})
 
 MeshFile: TypeAlias = str
 
@@ -584,10 +522,7 @@ Model = TypedDict('Model', {
     'units': "NotRequired[Literal['um', 'mm', 'cm', 'm', 'in']]",
 })
 
-ModelPage = TypedDict('ModelPage', {
-    'items': 'list[ModelView]',
-    'next': 'NotRequired[str | None]',
-})
+ModelPage = TypedDict('ModelPage', {'items': 'list[ModelView]', 'next': 'NotRequired[str | None]'})
 
 ModelView = TypedDict('ModelView', {
     'bytes': 'int',
@@ -624,11 +559,7 @@ NurbsCurveShape = TypedDict('NurbsCurveShape', {
     'weights': 'NotRequired[list[float]]',
 })
 
-NurbsScheme = TypedDict('NurbsScheme', {
-    'degree': 'int',
-    'family': "Literal['nurbs_curve']",
-    'knots': 'list[float]',
-})
+NurbsScheme = TypedDict('NurbsScheme', {'degree': 'int', 'family': "Literal['nurbs_curve']", 'knots': 'list[float]'})
 
 NurbsSurfaceShape = TypedDict('NurbsSurfaceShape', {
     'control_points': 'list[list[ControlPoint]]',
@@ -672,13 +603,7 @@ OrientedBoxStatement = TypedDict('OrientedBoxStatement', {
     'volume_mm3': 'list[float]',
 })
 
-Output = TypedDict('Output', {
-    'bytes': 'int',
-    'digest': 'str',
-    'file_name': 'str',
-    'media_type': 'str',
-    'name': 'str',
-})
+Output = TypedDict('Output', {'bytes': 'int', 'digest': 'str', 'file_name': 'str', 'media_type': 'str', 'name': 'str'})
 
 Part: TypeAlias = Any
 
@@ -742,27 +667,13 @@ Problem = TypedDict('Problem', {
 
 ProblemKind: TypeAlias = Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/forbidden', '/problems/not-found', '/problems/method-not-allowed', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/unavailable', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']
 
-ProblemPage = TypedDict('ProblemPage', {
-    'exit_code': 'int',
-    'status': 'int',
-    'title': 'str',
-    'type': 'ProblemKind',
-})
+ProblemPage = TypedDict('ProblemPage', {'exit_code': 'int', 'status': 'int', 'title': 'str', 'type': 'ProblemKind'})
 
-Profile = TypedDict('Profile', {
-    'name': 'str',
-    'quantities': 'list[Quantity]',
-    'title': 'str',
-})
+Profile = TypedDict('Profile', {'name': 'str', 'quantities': 'list[Quantity]', 'title': 'str'})
 
-ProfilePage = TypedDict('ProfilePage', {
-    'items': 'list[Profile]',
-})
+ProfilePage = TypedDict('ProfilePage', {'items': 'list[Profile]'})
 
-Prompt = TypedDict('Prompt', {
-    'code': 'str',
-    'message': 'str',
-})
+Prompt = TypedDict('Prompt', {'code': 'str', 'message': 'str'})
 
 Quantity = TypedDict('Quantity', {
     'kind': 'Kind',
@@ -775,16 +686,9 @@ Quantity = TypedDict('Quantity', {
     'value': 'float',
 })
 
-RadiusByLevel = TypedDict('RadiusByLevel', {
-    'first_mm': 'float',
-    'least_mm': 'float',
-    'ratio': 'float',
-})
+RadiusByLevel = TypedDict('RadiusByLevel', {'first_mm': 'float', 'least_mm': 'float', 'ratio': 'float'})
 
-Relation = TypedDict('Relation', {
-    'equal': 'list[Side]',
-    'state': 'str',
-})
+Relation = TypedDict('Relation', {'equal': 'list[Side]', 'state': 'str'})
 
 Remark = TypedDict('Remark', {
     'code': 'str',
@@ -795,10 +699,7 @@ Remark = TypedDict('Remark', {
     'severity': 'Severity',
 })
 
-RootCell = TypedDict('RootCell', {
-    'control_points': 'list[ControlPoint | None]',
-    'state': 'str',
-})
+RootCell = TypedDict('RootCell', {'control_points': 'list[ControlPoint | None]', 'state': 'str'})
 
 SectionsStatement = TypedDict('SectionsStatement', {
     'normal': 'list[float]',
@@ -822,10 +723,7 @@ ShortOrder = TypedDict('ShortOrder', {
     'supersedes': 'NotRequired[str]',
 })
 
-Side = TypedDict('Side', {
-    'boundary': 'NotRequired[list[int]]',
-    'path': 'NotRequired[list[int]]',
-})
+Side = TypedDict('Side', {'boundary': 'NotRequired[list[int]]', 'path': 'NotRequired[list[int]]'})
 
 SolutionMethod: TypeAlias = Literal['exact', 'local']
 
@@ -883,11 +781,7 @@ State = TypedDict('State', {
     'transitions': 'list[Transition]',
 })
 
-Step = TypedDict('Step', {
-    'count': 'int',
-    'fraction': 'float',
-    'phase': 'str',
-})
+Step = TypedDict('Step', {'count': 'int', 'fraction': 'float', 'phase': 'str'})
 
 SubdivisionShape = TypedDict('SubdivisionShape', {
     'boundary': "NotRequired[Literal['smooth', 'sharp_corners']]",
@@ -899,11 +793,7 @@ SubdivisionShape = TypedDict('SubdivisionShape', {
     'scheme': "Literal['catmull_clark', 'doo_sabin', 'loop']",
 })
 
-SumShape = TypedDict('SumShape', {
-    'family': "Literal['sum']",
-    'u': 'CurveShape',
-    'v': 'CurveShape',
-})
+SumShape = TypedDict('SumShape', {'family': "Literal['sum']", 'u': 'CurveShape', 'v': 'CurveShape'})
 
 TensorShape = TypedDict('TensorShape', {
     'control_points': 'list[list[ControlPoint]] | list[list[list[ControlPoint]]]',
@@ -930,15 +820,9 @@ ThicknessStatement = TypedDict('ThicknessStatement', {
 
 TopologyChange: TypeAlias = Literal['joins', 'closes', 'fills', 'unclear']
 
-Transition = TypedDict('Transition', {
-    'operator': 'Matrix',
-    'to': 'str',
-})
+Transition = TypedDict('Transition', {'operator': 'Matrix', 'to': 'str'})
 
-Trim = TypedDict('Trim', {
-    'inner': 'NotRequired[list[list[TrimCurve]]]',
-    'outer': 'NotRequired[list[TrimCurve]]',
-})
+Trim = TypedDict('Trim', {'inner': 'NotRequired[list[list[TrimCurve]]]', 'outer': 'NotRequired[list[TrimCurve]]'})
 
 TrimBezier = TypedDict('TrimBezier', {
     'control_points': 'list[TrimPoint]',
@@ -958,10 +842,7 @@ TrimNurbs = TypedDict('TrimNurbs', {
 
 TrimPoint: TypeAlias = list[float]
 
-TrimPolyline = TypedDict('TrimPolyline', {
-    'family': "Literal['polyline']",
-    'points': 'list[list[float]]',
-})
+TrimPolyline = TypedDict('TrimPolyline', {'family': "Literal['polyline']", 'points': 'list[list[float]]'})
 
 ValidationReport = TypedDict('ValidationReport', {
     'constraint_residual': 'NotRequired[float | None]',
@@ -972,11 +853,9 @@ ValidationReport = TypedDict('ValidationReport', {
     'valid': 'bool',
 })
 
-Version = TypedDict('Version', {
-    'api': 'str',
-    'name': 'str',
-    'version': 'str',
-})
+Version = TypedDict('Version', {'api': 'str', 'name': 'str', 'version': 'str'})
+
+VolumeMethod: TypeAlias = Literal['trilinear_forms']
 
 WallSide: TypeAlias = Literal['inward', 'outward']
 

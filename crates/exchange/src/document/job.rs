@@ -219,8 +219,9 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
         walker.fault(&place, code::CONFLICTING_MEMBERS, || "a comparison delivers numbers and no files; remove \"outputs\"".into());
         return None;
     }
-    let Params { radius_mm, density_g_cm3, oriented_box, thickness, .. } = document.params;
+    let Params { radius_mm, density_g_cm3, direction, oriented_box, thickness, .. } = document.params;
     if oriented_box
+        || direction.is_some()
         || thickness
         || radius_mm.is_some()
         || density_g_cm3.is_some()
@@ -228,7 +229,7 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
     {
         let place = members.get("params").unwrap_or(members.place);
         walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-            "shapes are compared as they are: remove \"radius_mm\", \"density_g_cm3\", \"oriented_box\" and \"thickness\", or ask for an \"operation\"".into()
+            "shapes are compared as they are: remove \"radius_mm\", \"density_g_cm3\", \"direction\", \"oriented_box\" and \"thickness\", or ask for an \"operation\"".into()
         });
         return None;
     }
@@ -380,6 +381,8 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let density_g_cm3 = stated(density.map(|place| walker.positive(place, "a density in g/cm3")))?;
     let planes = planes(walker, &members, kind)?;
     let measured = (JobKind::Measure, "measure");
+    let along = owned(walker, &members, kind, "direction", measured)?;
+    let along = stated(along.map(|place| direction(walker, place, "the direction along which the shape is measured")))?;
     let oriented_box = flag_of(walker, &members, kind, "oriented_box", measured, false)?;
     let thickness = flag_of(walker, &members, kind, "thickness", measured, false)?;
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
@@ -399,6 +402,7 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         plane,
         split,
         planes,
+        direction: along,
         oriented_box,
         thickness,
         density_g_cm3,
@@ -581,20 +585,23 @@ fn planes(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>)
     if kind != Some(JobKind::Slice) {
         return legal.then_some(None);
     }
-    let normal = members.get("normal").map_or(Some(DVec3::Z), |place| {
-        let normal = DVec3::from_array(walker.numbers(place, "a vector of three numbers")?);
-        if normal == DVec3::ZERO {
-            walker.fault(&place, code::NOT_POSITIVE, || "has no length; expected the direction across the planes".into());
-            return None;
-        }
-        Some(normal)
-    });
+    let normal = members.get("normal").map_or(Some(DVec3::Z), |place| direction(walker, place, "the direction across the planes"));
     one_of(walker, members, &["offsets_mm", "step_mm"], "slice")?;
     let offsets = members
         .get("offsets_mm")
         .map_or(Some(Vec::new()), |place| walker.each_of(place, 1, "an array of offsets in mm", |walker, place| walker.number(place)));
     let step = members.get("step_mm").map(|place| walker.positive(place, "the height of a layer in mm"));
     Some(Some(Planes { normal: normal?, offsets_mm: offsets?, step_mm: stated(step)? }))
+}
+
+/// A vector that has a direction.
+fn direction(walker: &mut Walker<'_>, place: Place<'_>, expected: &str) -> Option<DVec3> {
+    let vector = DVec3::from_array(walker.numbers(place, "a vector of three numbers")?);
+    if vector == DVec3::ZERO {
+        walker.fault(&place, code::NOT_POSITIVE, || format!("has no length; expected {expected}"));
+        return None;
+    }
+    Some(vector)
 }
 
 /// A flag that one kind of job takes, what that kind is called, and what the flag is when absent.

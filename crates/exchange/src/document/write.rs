@@ -336,6 +336,7 @@ object! {
         .put_some("normal", params.planes.as_ref().map(|planes| planes.normal.to_array().map(Number)).as_ref())?
         .put_some("offsets_mm", params.planes.as_ref().filter(|planes| planes.step_mm.is_none()).map(|planes| planes.offsets_mm.iter().copied().map(Number).collect::<Vec<_>>()).as_ref())?
         .put_some("step_mm", params.planes.as_ref().and_then(|planes| planes.step_mm).map(Number).as_ref())?
+        .put_some("direction", params.direction.map(|direction| direction.to_array().map(Number)).as_ref())?
         .put_if(params.oriented_box, "oriented_box", &true)?
         .put_if(params.thickness, "thickness", &true)?
         .put_some("density_g_cm3", params.density_g_cm3.map(Number).as_ref())?

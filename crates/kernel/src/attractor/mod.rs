@@ -24,17 +24,20 @@ use crate::automaton::topology::{Topology, TopologyError};
 use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, State, StateId, convergence};
 use crate::budget::Budget;
 use crate::error::Kind;
+use crate::solid::TriMesh;
 use crate::tolerance::Tolerance;
 pub(crate) use address::rounding;
 pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
+use glam::DVec3;
 pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use precision::LinearPrecision;
 pub use radii::OwnRadius;
 pub use refine::{RefineError, Streamed, count_cells, refine, refine_with_normals, stream};
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
 pub use tangent::{NoTangentPlane, TangentPlanes};
 use trim::TrimmedSurface;
 
@@ -76,7 +79,8 @@ pub struct Attractor {
     roots: Vec<Root>,
     solids: Vec<SolidSurface>,
     bounds: Vec<StateBound>,
-    covers: Vec<Option<PointCover>>,
+    /// Worked out when first asked for: measures and comparisons do without, and it is most of what lowering takes.
+    covers: OnceLock<Vec<Option<PointCover>>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
     precisions: Vec<Option<LinearPrecision>>,
@@ -216,7 +220,6 @@ impl Attractor {
             return Err(AttractorError::Overflow);
         }
         defect::measure_drawings(&mut automaton, &bounds);
-        let covers = cover::covers(&automaton, &bounds, &contraction);
         let connected = connected::connected(&automaton, &bounds, &contraction);
         let precisions = precision::precisions(&automaton, &bounds);
         let attractor = Self {
@@ -224,7 +227,7 @@ impl Attractor {
             roots,
             solids,
             bounds,
-            covers,
+            covers: OnceLock::new(),
             connected,
             precisions,
             contraction,
@@ -256,6 +259,16 @@ impl Attractor {
         self.brep = Some((Arc::new(topology), start));
         self.seam_mm = seam_mm;
         Ok(self)
+    }
+
+    /// The B-rep and where it begins, when the states have one.
+    pub(crate) fn brep(&self) -> Option<(&Topology, &complex::Start)> {
+        self.brep.as_ref().map(|(topology, start)| (topology.as_ref(), start))
+    }
+
+    /// Largest distance between control points of boundaries that were glued, in mm.
+    pub(crate) fn seam_mm(&self) -> f64 {
+        self.seam_mm
     }
 
     /// Cuts surfaces along loops: those of their roots are drawn that are inside.
@@ -351,6 +364,27 @@ impl Attractor {
         &self.solids
     }
 
+    /// The same as meshes, their vertices joined as the model has them.
+    #[must_use]
+    pub fn surfaces(&self) -> Vec<TriMesh> {
+        let mesh_of = |surface: &SolidSurface| {
+            let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());
+            for (index, corners) in surface.triangles.iter().enumerate() {
+                let points = &self.roots[surface.first_root + index].points;
+                let mut number = |k: usize| {
+                    *numbers.entry(corners[k]).or_insert_with(|| {
+                        mesh.vertices.push(DVec3::new(points[k][0], points[k][1], points[k][2]));
+                        mesh.vertices.len() as u32 - 1
+                    })
+                };
+                let triangle = [number(0), number(1), number(2)];
+                mesh.triangles.push(triangle);
+            }
+            mesh
+        };
+        self.solids.iter().map(mesh_of).collect()
+    }
+
     /// Proven bounds of the joint spectral radius.
     #[must_use]
     pub fn contraction(&self) -> &Contraction {
@@ -365,7 +399,8 @@ impl Attractor {
 
     /// The points that stand for a state, where they are known.
     pub(crate) fn cover(&self, state: StateId) -> Option<&PointCover> {
-        self.covers[state.index()].as_ref()
+        let covers = self.covers.get_or_init(|| cover::covers(&self.automaton, &self.bounds, &self.contraction));
+        covers[state.index()].as_ref()
     }
 
     /// Parameters of a state's points, where its curves or faces are proven to have linear precision.

@@ -8,13 +8,19 @@
 //! d(c, B) is enclosed by the nodes of B's tree that may hold the points of B closest to the piece: those no farther from c
 //! than d(c, B) + 2 r, as a point x of the piece has its closest point within d(x, B) <= d(c, B) + r of it. A piece hands
 //! its nodes to its parts, so that no search begins at the roots.
+//!
+//! A solid is what it encloses. Of a point within B the distance is 0, and of a piece around it at most r - d(c, surface of B). The inside of A is searched in cubes:
+//! those whose centre is outside of A, and farther than r from its surface, hold nothing of it. What a cube that meets the surface holds is within 2 r of points
+//! of the surface, which are pieces themselves; so small cubes there are not searched, and 2 r is added in the end.
 
 use super::Interval;
 use super::contact::{Body, ContactError, Nature, NodeId, Tree, corners, tree};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Ball, Point, Site, distance_squared};
 use crate::budget::Budget;
+use crate::solid::{Inside, TriMesh};
 use crate::tolerance::Tolerance;
+use glam::DVec3;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
@@ -51,6 +57,17 @@ impl Hausdorff {
 const MOST_NODES: u64 = 20_000_000;
 const MOST_BYTES: u64 = 512 << 20;
 
+/// What a closed surface encloses.
+struct Filled<'a> {
+    mesh: &'a TriMesh,
+    inside: Inside<'a>,
+}
+
+/// Whether some solid holds a point: on a surface either is right.
+fn holds(solids: &[Filled<'_>], point: &Point) -> bool {
+    solids.iter().any(|solid| solid.inside.winding(DVec3::from_array(*point)) > 0)
+}
+
 /// The Hausdorff distance of two shapes, both ways, as intervals no wider than the tolerance unless a limit is hit.
 ///
 /// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Shapes that
@@ -59,8 +76,10 @@ const MOST_BYTES: u64 = 512 << 20;
 /// # Errors
 /// [`ContactError`] for a trimmed surface, or when stopped. Limits are no errors.
 pub fn hausdorff(a: &Attractor, b: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Hausdorff, ContactError> {
-    let (from_first, first_complete) = directed(tree(a, budget)?, tree(b, budget)?, tolerance, budget)?;
-    let (from_second, second_complete) = directed(tree(b, budget)?, tree(a, budget)?, tolerance, budget)?;
+    let surfaces = [a, b].map(Attractor::surfaces);
+    let solids = surfaces.each_ref().map(|own| own.iter().map(|mesh| Filled { mesh, inside: Inside::new(mesh) }).collect::<Vec<_>>());
+    let (from_first, first_complete) = directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], tolerance, budget)?;
+    let (from_second, second_complete) = directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], tolerance, budget)?;
     Ok(Hausdorff { from_first, from_second, complete: first_complete && second_complete })
 }
 
@@ -70,6 +89,8 @@ enum Part {
     Node(NodeId),
     /// A part of a simplex.
     Site(Site),
+    /// What a cube, by its centre and half its edge, holds of the inside.
+    Cube(Point, f64),
 }
 
 /// A piece in the queue.
@@ -81,6 +102,8 @@ struct Piece {
     part: Part,
     /// Nodes of the second shape that may hold the closest points.
     near: Vec<NodeId>,
+    /// Of a cube, nodes of the first shape that may hold those of its surface.
+    own: Vec<NodeId>,
 }
 
 impl PartialEq for Piece {
@@ -103,6 +126,8 @@ impl Ord for Piece {
 struct Search<'a> {
     first: Tree<'a>,
     second: Tree<'a>,
+    /// Solids of the first and of the second.
+    solids: [&'a [Filled<'a>]; 2],
     budget: &'a Budget,
     slack: f64,
     /// How narrow distances from the second shape need not be: a small share of the tolerance.
@@ -115,14 +140,22 @@ struct Search<'a> {
     /// The largest lower end, and where.
     low: f64,
     place: Ball,
+    /// Points of the inside that were not searched are within this of the surface.
+    skin: f64,
 }
 
-fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Budget) -> Result<(Directed, bool), ContactError> {
+fn directed<'a>(
+    [first, second]: [Tree<'a>; 2],
+    solids: [&'a [Filled<'a>]; 2],
+    tolerance: Tolerance,
+    budget: &'a Budget,
+) -> Result<(Directed, bool), ContactError> {
     let mut search = Search {
         slack: first.slack + second.slack,
         place: first.node(0).body.ball,
         first,
         second,
+        solids,
         budget,
         accuracy_mm: tolerance.mm() / 16.0,
         queue: BinaryHeap::new(),
@@ -130,14 +163,21 @@ fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Bu
         looked: 0,
         number: 0,
         low: 0.0,
+        skin: 0.0,
     };
-    search.look(Part::Node(0), &[0], f64::INFINITY);
+    search.look(Part::Node(0), &[0], &[], f64::INFINITY);
+    for solid in solids[0] {
+        let Some(low) = solid.mesh.vertices.iter().copied().reduce(DVec3::min) else { continue };
+        let high = solid.mesh.vertices.iter().copied().fold(low, DVec3::max);
+        let (centre, half) = (0.5 * (low + high), 0.5 * (high - low).max_element() * (1.0 + 1e-9));
+        search.look(Part::Cube(centre.to_array(), half), &[0], &[0], f64::INFINITY);
+    }
     // A piece that cannot be split ends the search: all others are no farther.
     let mut high = 0.0;
     let mut complete = true;
     while let Some(piece) = search.queue.pop() {
         high = piece.high;
-        if high - search.low <= tolerance.mm() {
+        if high + search.skin - search.low <= tolerance.mm() {
             break;
         }
         budget.cancel.check()?;
@@ -152,15 +192,15 @@ fn directed(first: Tree<'_>, second: Tree<'_>, tolerance: Tolerance, budget: &Bu
         }
         high = 0.0;
     }
-    let distance_mm = Interval { low: search.low.min(high.max(search.low)), high: high.max(search.low) };
+    let distance_mm = Interval { low: search.low, high: high.max(search.low) + search.skin };
     Ok((Directed { distance_mm, place: search.place }, complete))
 }
 
 fn memory(piece: &Piece) -> u64 {
-    (std::mem::size_of::<Piece>() + std::mem::size_of_val(piece.near.as_slice())) as u64
+    (std::mem::size_of::<Piece>() + std::mem::size_of_val(piece.near.as_slice()) + std::mem::size_of_val(piece.own.as_slice())) as u64
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
     /// Whether a limit was hit.
     fn is_exhausted(&self) -> bool {
         let limits = &self.budget.limits;
@@ -178,23 +218,44 @@ impl Search<'_> {
             Part::Node(id) if self.first.subdivides(id) => Vec::new(),
             Part::Node(id) => self.first.node(id).body.sites.iter().flat_map(halves).map(Part::Site).collect(),
             Part::Site(site) => halves(&site).into_iter().map(Part::Site).collect(),
+            Part::Cube(centre, half) => eighths(&centre, half).map(|centre| Part::Cube(centre, 0.5 * half)).into(),
         };
-        parts.iter().for_each(|&part| self.look(part, &piece.near, piece.high));
+        parts.iter().for_each(|&part| self.look(part, &piece.near, &piece.own, piece.high));
         !parts.is_empty()
     }
 
     /// Encloses the supremum over a part, at most `most`, and puts it into the queue if it may be the largest.
-    fn look(&mut self, part: Part, near: &[NodeId], most: f64) {
+    fn look(&mut self, part: Part, near: &[NodeId], own: &[NodeId], most: f64) {
         let (centre, radius, astray) = self.around(part);
-        let (least, farthest, near) = self.distance(&centre, radius, near);
-        let low = least - astray - self.slack;
-        if low > self.low {
-            (self.low, self.place) = (low, Ball { centre, radius: astray + self.slack });
+        let (mut least, mut farthest, near) = self.distance(Which::Second, &centre, radius, near);
+        if holds(self.solids[1], &centre) {
+            // The piece reaches beyond the surface by what is left of its radius there.
+            (least, farthest) = (0.0, -least);
         }
         let high = (farthest + radius + self.slack).min(most);
+        if high <= self.low {
+            return;
+        }
+        let (mut is_of_first, mut own_near) = (true, Vec::new());
+        if let Part::Cube(..) = part {
+            let (nearest, surface, near) = self.distance(Which::First, &centre, radius, own);
+            is_of_first = holds(self.solids[0], &centre);
+            if nearest > radius + self.slack && !is_of_first {
+                return;
+            }
+            if surface <= radius && radius <= 2.0 * self.accuracy_mm {
+                self.skin = self.skin.max(2.0 * radius + self.slack);
+                return;
+            }
+            own_near = near;
+        }
+        let low = least - astray - self.slack;
+        if is_of_first && low > self.low {
+            (self.low, self.place) = (low, Ball { centre, radius: astray + self.slack });
+        }
         if high > self.low {
             self.number += 1;
-            let piece = Piece { high, number: self.number, part, near };
+            let piece = Piece { high, number: self.number, part, near, own: own_near };
             self.bytes += memory(&piece);
             self.queue.push(piece);
         }
@@ -208,6 +269,7 @@ impl Search<'_> {
                 let c = middle(&site);
                 (c, farthest(&c, &site), 0.0)
             }
+            Part::Cube(centre, half) => (centre, half * 3.0_f64.sqrt() * (1.0 + 1e-12), 0.0),
             Part::Node(id) => {
                 let body = &self.first.node(id).body;
                 let c = middle(&body.sites[0]);
@@ -216,14 +278,14 @@ impl Search<'_> {
         }
     }
 
-    /// [least, most] of the distance of c from the second shape, and the nodes that may be closest to points within
+    /// [least, most] of the distance of c from one of the shapes, a solid being its surface here, and the nodes that may be closest to points within
     /// `radius` of c, all of `near` being known to be enough. The interval is narrow against the radius, or the
     /// tolerance, unless a limit is hit.
-    fn distance(&mut self, c: &Point, radius: f64, near: &[NodeId]) -> (f64, f64, Vec<NodeId>) {
+    fn distance(&mut self, which: Which, c: &Point, radius: f64, near: &[NodeId]) -> (f64, f64, Vec<NodeId>) {
         let mut queue = BinaryHeap::new();
         let mut high = f64::INFINITY;
         for &id in near {
-            self.enter(c, id, &mut queue, &mut high);
+            self.enter(which, c, id, &mut queue, &mut high);
         }
         let wanted = self.accuracy_mm.max(0.25 * radius);
         let mut done = Vec::new();
@@ -235,14 +297,14 @@ impl Search<'_> {
                 done.push((low, id));
                 break;
             }
-            let children = self.second.children(id);
+            let children = self.tree(which).children(id);
             if children.is_empty() {
                 // As narrow as can be: others may still be nearer than this one surely is.
                 least = least.min(low);
                 done.push((low, id));
                 continue;
             }
-            children.for_each(|child| self.enter(c, child, &mut queue, &mut high));
+            children.for_each(|child| self.enter(which, c, child, &mut queue, &mut high));
         }
         done.extend(queue.into_iter().map(|Reverse(Near { low, id })| (low, id)));
         done.retain(|&(low, _)| low <= high + 2.0 * (radius + self.slack));
@@ -251,16 +313,32 @@ impl Search<'_> {
         (least.min(high), high, done.into_iter().map(|(_, id)| id).collect())
     }
 
-    fn enter(&mut self, c: &Point, id: NodeId, queue: &mut BinaryHeap<Reverse<Near>>, high: &mut f64) {
+    fn enter(&mut self, which: Which, c: &Point, id: NodeId, queue: &mut BinaryHeap<Reverse<Near>>, high: &mut f64) {
         self.looked += 1;
-        let gap = Body::of_site(Site::Point(*c), Nature::Loose).gap(&self.second.node(id).body, self.slack);
+        let slack = self.slack;
+        let tree = self.tree(which);
+        let gap = Body::of_site(Site::Point(*c), Nature::Loose).gap(&tree.node(id).body, slack);
         *high = high.min(gap.high);
-        let slab = gap.direction.map_or(0.0, |n| -self.second.reach(id, &n.map(|x| -x)) - n.iter().zip(c).map(|(n, c)| n * c).sum::<f64>());
-        queue.push(Reverse(Near { low: gap.low.max(slab - self.slack), id }));
+        let slab = gap.direction.map_or(0.0, |n| -tree.reach(id, &n.map(|x| -x)) - n.iter().zip(c).map(|(n, c)| n * c).sum::<f64>());
+        queue.push(Reverse(Near { low: gap.low.max(slab - slack), id }));
+    }
+
+    fn tree(&mut self, which: Which) -> &mut Tree<'a> {
+        match which {
+            Which::First => &mut self.first,
+            Which::Second => &mut self.second,
+        }
     }
 }
 
-/// A node of the second shape, by its distance.
+/// Which of two shapes.
+#[derive(Clone, Copy)]
+enum Which {
+    First,
+    Second,
+}
+
+/// A node, by its distance.
 struct Near {
     low: f64,
     id: NodeId,
@@ -287,6 +365,11 @@ impl Ord for Near {
 fn middle(site: &Site) -> Point {
     let corners = corners(site);
     std::array::from_fn(|axis| corners.iter().map(|x| x[axis] / corners.len() as f64).sum())
+}
+
+/// The centres of a cube's eighths.
+fn eighths(centre: &Point, half: f64) -> [Point; 8] {
+    std::array::from_fn(|code| std::array::from_fn(|axis| centre[axis] + if code >> axis & 1 == 1 { 0.5 * half } else { -0.5 * half }))
 }
 
 /// Parts of half the size: two of a segment, four of a triangle, none of a point.

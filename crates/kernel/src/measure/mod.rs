@@ -3,8 +3,8 @@
 pub mod bounds;
 pub mod contact;
 pub mod dimension;
+pub mod enclosed;
 pub mod hausdorff;
-pub mod inside;
 pub mod mass;
 pub mod oriented_box;
 pub mod section;
@@ -14,8 +14,8 @@ pub mod triangle;
 pub use bounds::{AxisBox, bounding_box, extent_along};
 pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
+pub use enclosed::{NotEnclosed, enclosed_volume};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};
-pub use inside::{Inside, first_inside};
 pub use oriented_box::{OrientedBox, oriented_box};
 pub use thickness::{Side, Thickness, thickness};
 

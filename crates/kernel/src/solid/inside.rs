@@ -68,3 +68,17 @@ fn around(corners: &[DVec3; 3], x: DVec3) -> i64 {
     let side = orient3d(space(corners[0]), space(corners[1]), space(corners[2]), space(x));
     if side * turns as f64 > 0.0 { turns } else { 0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_about_a_tetrahedron() {
+        let vertices = vec![DVec3::ZERO, 3.0 * DVec3::X, 3.0 * DVec3::Y, 3.0 * DVec3::Z];
+        let mesh = TriMesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]] };
+        let inside = Inside::new(&mesh);
+        let windings = [5.0, 1.5, 1.0 + f64::EPSILON, 1.0 - f64::EPSILON, 0.9, f64::MIN_POSITIVE].map(|x| inside.winding(DVec3::splat(x)));
+        assert_eq!(windings, [0, 0, 0, 1, 1, 1]);
+    }
+}

@@ -193,6 +193,11 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             positive,
         ),
         optional(
+            "direction",
+            "Along which the extent of the shape is told, as by planes that touch it on both sides, of any length: for measure alone.",
+            vector,
+        ),
+        optional(
             "oriented_box",
             "Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent.",
             flag,

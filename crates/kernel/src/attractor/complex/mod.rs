@@ -112,6 +112,17 @@ impl Start {
         self.drawn[state.index()]
     }
 
+    /// Which cell of the complex a root shows at a position of its closure, and how it views it.
+    pub(crate) fn cell_of(&self, root: usize, cell: usize) -> (u32, View) {
+        let seen = self.roots[root][cell];
+        (seen.id, seen.view)
+    }
+
+    /// Whether a cell is an edge that is a single point in space.
+    pub(crate) fn is_collapsed(&self, cell: u32) -> bool {
+        self.collapsed[cell as usize]
+    }
+
     /// Glues roots along the given boundaries, makes the ends of collapsed edges one, and tabulates the topology's views.
     pub(super) fn new(
         topology: &mut Topology,
@@ -242,7 +253,7 @@ fn frontier(attractor: &Attractor, roots: &[usize]) -> u32 {
 impl Attractor {
     /// Whether a root's cells are drawn as one complex: curves between two vertices, wires that branch, or a
     /// face that its edges surround, and so all its descendants.
-    pub(super) fn has_brep(&self, root: usize) -> bool {
+    pub(crate) fn has_brep(&self, root: usize) -> bool {
         self.brep.as_ref().is_some_and(|(_, start)| start.drawn[self.roots[root].state.index()])
     }
 }
