@@ -561,6 +561,7 @@ export interface JobView {
   certificate?: Certificate | null;
   /** When it was accepted. */ created: string;
   /** When it ended. */ finished?: string | null;
+  /** How often a worker gave it back because it was told to end; those starts are not counted against the job. */ handed_back?: number;
   /** Its id. */ id: string;
   /** `sha256:` digest of the canonical job document. */ input_digest: string;
   /** What it does. */ kind: JobKind;
