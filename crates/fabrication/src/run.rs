@@ -66,7 +66,7 @@ pub struct Plan {
     pub leaf_cells: f64,
     /// Triangles of the lattice's mesh, against which the limit of triangles is held; simplification leaves a tenth to a hundredth of them.
     pub triangles: f64,
-    /// Peak memory in bytes, as it is on the fixtures as a rule; models whose cells overlap much take several times as much.
+    /// Peak memory of the process that does the job, in bytes: what simplification of models whose cells overlap much takes besides is not in it. 0 where nothing is predicted.
     pub memory_bytes: f64,
     /// Bytes of the lattice's mesh as binary STL.
     pub output_bytes: f64,
@@ -385,14 +385,14 @@ pub(crate) fn stl_bytes(triangles: f64) -> f64 {
     84.0 + 50.0 * triangles
 }
 
-/// What a process holds for each byte that a lattice is accounted for, and besides, in bytes: found on the fixtures, on two cores.
-/// `fixtures/ESTIMATES.md` shows how well they do.
+/// What a process holds for each byte that a lattice is accounted for: found on the fixtures, on two cores, as is the next. `fixtures/ESTIMATES.md` shows how well they do.
 const HELD_PER_BYTE: f64 = 2.0;
-const HELD_BESIDES: f64 = 2e6;
+/// What a process holds that does next to nothing, in bytes: the program, its threads and their stacks.
+const PROCESS_BYTES: f64 = 18e6;
 
 /// Peak memory of making a lattice that is accounted for so many bytes.
 pub(crate) fn held_bytes(accounted: f64) -> f64 {
-    HELD_BESIDES + HELD_PER_BYTE * accounted
+    HELD_PER_BYTE * accounted
 }
 
 /// Bytes that an evaluation holds for each leaf cell.
@@ -403,6 +403,12 @@ const BYTES_PER_CELL: f64 = 64.0;
 /// # Errors
 /// As [`run`], for what shows before the work.
 pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
+    let plan = planned(job, budget)?;
+    let memory_bytes = if plan.memory_bytes > 0.0 { PROCESS_BYTES + plan.memory_bytes } else { 0.0 };
+    Ok(Plan { memory_bytes, ..plan })
+}
+
+fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
         return level::plan(job, level, budget);
     }

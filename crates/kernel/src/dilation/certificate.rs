@@ -16,6 +16,8 @@ const MOST_PIECES: usize = 16;
 /// Sites that are tried to cut a tetrahedron at a corner: for the three others, and for the rest.
 const MOST_FIRST: usize = 1;
 const MOST_SECOND: usize = 2;
+/// Views that are kept at most: where sites are dense a vertex has hundreds, which are found again when they are asked for again.
+const MOST_VIEWS: usize = 1 << 20;
 /// Halvings that look for a place that two sites cover.
 const HALVINGS: usize = 16;
 
@@ -261,6 +263,10 @@ impl Nearby {
 
     /// Begins with a star: its corners, the middle first, are `corners` afterwards.
     pub(super) fn begin(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: impl Iterator<Item = (u32, Point)>) {
+        if self.views.len() > MOST_VIEWS {
+            self.views.clear();
+            self.ranges.fill(Range::default());
+        }
         self.star += 1;
         self.sites.clear();
         self.marked.clear();
