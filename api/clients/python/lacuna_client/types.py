@@ -405,6 +405,7 @@ JobView = TypedDict('JobView', {
     'certificate': 'NotRequired[Certificate | None]',
     'created': 'str',
     'finished': 'NotRequired[str | None]',
+    'handed_back': 'NotRequired[int]',
     'id': 'str',
     'input_digest': 'str',
     'kind': 'JobKind',
