@@ -199,7 +199,7 @@ fn refusals() {
         let output =
             run([OsStr::new("--error-format"), OsStr::new("json"), OsStr::new("run"), job.as_os_str(), OsStr::new("-o"), made.as_os_str()]);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code() == Some(3) && said.contains("job.no-geometry"), "{outputs}: {said}");
+        assert!(output.status.code() == Some(3) && said.contains("document.conflicting-members"), "{outputs}: {said}");
         assert!(!made.exists());
     }
 }

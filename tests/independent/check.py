@@ -94,7 +94,7 @@ def read_ply(path):
             "infinite": int(np.isinf(on_faces).sum()), "off_at_vertices": int((at_vertices != least).sum()),
             # Single precision, of coordinates and of lengths.
             "above_a_ray": int((on_faces > rays + 1e-6 * np.abs(vertices).max()).sum()),
-            "below_its_ray_by": float((rays - on_faces)[finite].max(initial=0.0)),
+            "below_its_ray_by": float((rays[finite] - on_faces[finite]).max(initial=0.0)),
         }
     return vertices, triangles, {"reader": "trimesh " + trimesh.__version__, "map": fields}
 
