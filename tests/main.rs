@@ -18,6 +18,7 @@
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `splits` | do the parts of a solid add up to it? |
+//! | `thickness_maps` | are maps of thickness what closed forms and rays say, in files that others read? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
 //! | `processes` | what does a job take with it when it takes down its process? |
@@ -58,4 +59,5 @@ mod slices;
 mod splits;
 mod surface;
 mod thickening;
+mod thickness_maps;
 mod uploads;

@@ -110,6 +110,7 @@ fn every_kind_of_work_is_the_same_at_a_service() {
     same(&service, meshes, &["intersect", "cube.off", "--with", "point:9,0,0", "--tolerance", "0.01"]);
     same(&service, meshes, &["slice", "cube.off", "--tolerance", "0.01", "--step", "1", "-o", "a.svg", "-o", "a.dxf"]);
     same(&service, meshes, &["convert", "--quiet", "cube.off", "a.stl"]);
+    same(&service, meshes, &["measure", "cube.off", "--tolerance", "0.01", "--thickness", "--map", "a.ply"]);
 
     // A job document, one that names a mesh file of its folder, and a limit from the command line.
     let job = json!({ "lacuna": 1, "kind": "solidify", "model": model, "params": { "tolerance_mm": 0.05, "radius_mm": 1.0 }, "outputs": ["stl"] });

@@ -5,7 +5,8 @@ use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
-use lacuna_exchange::format::{self, Fan, Format, FormatError, Metadata, NamedMesh, PointFile};
+use lacuna_exchange::format::{self, Fan, Format, FormatError, Metadata, NamedMesh, PointFile, ScalarField};
+use lacuna_fabrication::shape_measures::MappedThickness;
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Stack, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
@@ -159,8 +160,12 @@ pub fn write_file(
         Metadata { title: label.title, certificate: Some(&outcome.certificate), thumbnail_png: label.thumbnail_png, ..Metadata::default() };
     let failed = |error| Problem::io("the file could not be written", &error);
     let mut sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: &mut *pending, token });
-    if let Geometry::Sections(stack) = &outcome.geometry {
-        guarded(|| draw(format, stack, &metadata, &mut sink, token))??;
+    let apart = match &outcome.geometry {
+        Geometry::Sections(stack) => Some(guarded(|| draw(format, stack, &metadata, &mut sink, token))??),
+        Geometry::Thickness(map) => Some(guarded(|| write_map(format, map, &metadata, &mut sink))??),
+        _ => None,
+    };
+    if let Some(()) = apart {
         sink.flush().map_err(failed)?;
         drop(sink);
         return Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed);
@@ -197,6 +202,23 @@ fn draw(format: Format, stack: &Stack, metadata: &Metadata<'_>, sink: &mut impl 
         StreamError::NotPoints => Problem::internal("sections are no points"),
     })?;
     file.finish().map_err(|error| format_problem(&error))
+}
+
+/// Writes a map of thickness: wall_mm and gap_mm at every vertex and face.
+fn write_map(format: Format, map: &MappedThickness, metadata: &Metadata<'_>, sink: &mut impl Write) -> Result<(), Problem> {
+    if format != Format::Ply {
+        return Err(no_geometry(format));
+    }
+    let fields = [
+        (
+            "wall_mm",
+            "least thickness in mm along the normals, inwards, over a face or the faces around a vertex; inf where no face lies across",
+            &map.wall,
+        ),
+        ("gap_mm", "likewise outwards", &map.gap),
+    ];
+    let fields = fields.map(|(name, about, of)| ScalarField { name, about, vertices: &of.vertices, triangles: &of.faces });
+    format::write_fields(&map.mesh, &fields, metadata, sink).map_err(|error| format_problem(&error))
 }
 
 /// Evaluates a shape that is drawn as points straight into a PLY file, whatever their number; for every other shape
@@ -266,7 +288,7 @@ fn view<'g>(geometry: &'g Geometry, parts: &'g [NamedMesh<'g>]) -> Option<format
         Geometry::Solid(solid) => Some(solid.into()),
         Geometry::Parts(_) => Some(parts.into()),
         Geometry::Tessellation(tessellation) => Some(tessellation.into()),
-        Geometry::Polygons { .. } | Geometry::Sections(_) | Geometry::None => None,
+        Geometry::Polygons { .. } | Geometry::Sections(_) | Geometry::Thickness(_) | Geometry::None => None,
     }
 }
 
@@ -288,8 +310,7 @@ impl Cut {
 }
 
 fn no_geometry(format: Format) -> Problem {
-    Problem::new(ProblemKind::InvalidModel, format!("this kind of job makes numbers only, no {format} file; ask for no outputs"))
-        .code("job.no-geometry")
+    Problem::new(ProblemKind::InvalidModel, format!("this job makes no {format} file; ask for no outputs")).code("job.no-geometry")
 }
 
 /// A format's refusal as a problem; the chain of causes becomes one sentence.

@@ -3,7 +3,8 @@
     check.py < requests > reports
 
 One JSON document per line: a request is `{"file": PATH, "opinions": true}`, its report follows at once.
-STL is read by trimesh and 3MF by lib3mf in strict mode, the reader of the 3MF consortium. Counts come from our
+STL is read by trimesh and 3MF by lib3mf in strict mode, the reader of the 3MF consortium. PLY is read by trimesh, as a map of thickness, which is held
+against rays. Counts come from our
 own page of numpy below; if asked, also from trimesh and from Manifold, and self-intersections from CGAL through libigl
 with exact arithmetic. Whoever reads the reports compares them; nothing is judged here.
 """
@@ -54,6 +55,51 @@ def read_3mf(path):
     millimetres = model.GetUnit() == lib3mf.ModelUnit.MilliMeter
     remarks = {"warnings": warnings, "millimetres": millimetres, "valid": mesh.IsValid(), "oriented": mesh.IsManifoldAndOriented()}
     return vertices, triangles, {"reader": "lib3mf", "lib3mf": remarks}
+
+
+def first_hits(vertices, triangles, sign):
+    """From the middle of every face along its normal, times a sign: the way to the first face without a common corner (Moeller and Trumbore, 1997)."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    p, q = b - a, c - a
+    normals = np.cross(p, q)
+    directions = sign * normals / np.linalg.norm(normals, axis=1)[:, None]
+    first = np.full(len(triangles), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for k, (corners, direction) in enumerate(zip(triangles, directions)):
+            offset = vertices[corners].mean(axis=0) - a
+            across, turned = np.cross(direction, q), np.cross(offset, p)
+            determinant = np.einsum("ij,ij->i", p, across)
+            u = np.einsum("ij,ij->i", offset, across) / determinant
+            v = turned @ direction / determinant
+            way = np.einsum("ij,ij->i", q, turned) / determinant
+            apart = ~np.isin(triangles, corners).any(axis=1)
+            hit = apart & (u >= 0) & (v >= 0) & (u + v <= 1) & (way > 0)
+            first[k] = way[hit].min(initial=np.inf)
+    return first
+
+
+def read_ply(path):
+    """Vertices, triangles and remarks of a map of thickness."""
+    mesh = trimesh.load(path, file_type="ply", process=False)
+    raw = mesh.metadata["_ply_raw"]
+    vertices, triangles = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces)
+    fields = {}
+    for name, sign in (("wall_mm", -1.0), ("gap_mm", 1.0)):
+        at_vertices, on_faces = (raw[element]["data"][name].astype(np.float64) for element in ("vertex", "face"))
+        least = np.full(len(vertices), np.inf)
+        np.minimum.at(least, triangles.ravel(), np.repeat(on_faces, 3))
+        rays = first_hits(vertices, triangles, sign)
+        finite = np.isfinite(on_faces) & np.isfinite(rays)
+        fields[name] = {
+            "infinite": int(np.isinf(on_faces).sum()), "off_at_vertices": int((at_vertices != least).sum()),
+            # Single precision, of coordinates and of lengths.
+            "above_a_ray": int((on_faces > rays + 1e-6 * np.abs(vertices).max()).sum()),
+            "below_its_ray_by": float((rays[finite] - on_faces[finite]).max(initial=0.0)),
+        }
+    return vertices, triangles, {"reader": "trimesh " + trimesh.__version__, "map": fields}
+
+
+READERS = {".3mf": read_3mf, ".ply": read_ply}
 
 
 def pairs(count, first, second):
@@ -114,7 +160,7 @@ def second_opinions(vertices, triangles):
 def report(request):
     """The report on one file."""
     path = request["file"]
-    vertices, triangles, remarks = (read_3mf if path.endswith(".3mf") else read_stl)(path)
+    vertices, triangles, remarks = READERS.get(path[-4:], read_stl)(path)
     opinions = second_opinions(vertices, triangles) if request.get("opinions") else {}
     return {**remarks, "finite": bool(np.isfinite(vertices).all()), **counts(vertices, triangles), **opinions}
 

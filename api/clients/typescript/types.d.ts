@@ -494,7 +494,7 @@ export interface Job {
   /** What the job may use; the service's defaults when absent. */ limits?: JobLimits;
   /** The model, in full. */ model?: EmbeddedModel;
   /** The id of a stored model or of an uploaded mesh file. */ model_ref?: string;
-  /** Names of the formats wanted, for example 3mf and stl. */ outputs?: Array<"stl" | "3mf" | "glb" | "obj" | "ply" | "off" | "wrl" | "png" | "csv" | "svg" | "dxf">;
+  /** Names of the formats wanted, for example 3mf and stl. A measure makes none, but ply with thickness. */ outputs?: Array<"stl" | "3mf" | "glb" | "obj" | "ply" | "off" | "wrl" | "png" | "csv" | "svg" | "dxf">;
   /** How to do it. */ params: JobParams;
   /** For a service: the id of a job that is stopped once this one is accepted, because nobody wants it any more. */ supersedes?: string;
 }
@@ -545,7 +545,7 @@ export interface JobParams {
   /** Whether triangles are saved within the bound: for solidify alone; true when absent. */ simplify?: boolean;
   /** Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent. */ stability?: boolean;
   /** The height of layers, in mm, above zero: planes of slice are in their middles, from the bottom of the solid to its top. */ step_mm?: number;
-  /** Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent. */ thickness?: boolean;
+  /** Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent. With the output ply its map is made too: the mesh that is measured, with the thickness over every face as the property wall_mm (inwards) and gap_mm (outwards), and at every vertex the least of the faces around it; inf where no face lies across. */ thickness?: boolean;
   /** The Hausdorff bound on the result, in mm, above zero. Required but with level, which is exact but for the single precision of the files. */ tolerance_mm?: number;
   /** For split: the build volume along x, y and z, in mm, which every part fits; along axes without cuts of their own the job cuts as rarely as it can. */ volume_mm?: Array<number>;
   /** The thickness of a wall along the surface of the solid, in mm, above zero, which is made instead of the solid: of the dilation where there is a radius_mm, else of what the model's closed surface bounds. For solidify alone. */ wall_mm?: number;
@@ -1008,7 +1008,7 @@ export interface ShortOrder {
   /** What the job may use; the service's defaults when absent. */ limits?: JobLimits;
   /** The model, in full. */ model?: EmbeddedModel;
   /** The id of a stored model or of an uploaded mesh file. */ model_ref?: string;
-  /** Names of the formats wanted, for example 3mf and stl. */ outputs?: Array<"stl" | "3mf" | "glb" | "obj" | "ply" | "off" | "wrl" | "png" | "csv" | "svg" | "dxf">;
+  /** Names of the formats wanted, for example 3mf and stl. A measure makes none, but ply with thickness. */ outputs?: Array<"stl" | "3mf" | "glb" | "obj" | "ply" | "off" | "wrl" | "png" | "csv" | "svg" | "dxf">;
   /** How to do it. */ params: JobParams;
   /** For a service: the id of a job that is stopped once this one is accepted, because nobody wants it any more. */ supersedes?: string;
 }

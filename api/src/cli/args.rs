@@ -300,7 +300,7 @@ pub(super) struct MeasureArgs {
     /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
     pub(super) model: PathBuf,
     /// Another one: tell the Hausdorff distance of both instead.
-    #[arg(conflicts_with_all = ["radius", "density", "direction", "oriented_box", "thickness"])]
+    #[arg(conflicts_with_all = ["radius", "density", "direction", "oriented_box", "thickness", "map"])]
     pub(super) other: Option<PathBuf>,
     /// Hausdorff bound on what is measured, in mm.
     #[arg(long, value_name = "MM", value_parser = positive)]
@@ -317,6 +317,10 @@ pub(super) struct MeasureArgs {
     /// Find the least thickness of walls and gaps.
     #[arg(long)]
     pub(super) thickness: bool,
+    /// Write the thickness all over the surface: the mesh that is measured, every vertex and face with the properties `wall_mm` and `gap_mm`, `inf` where no
+    /// face lies across.
+    #[arg(long, value_name = "FILE.ply", requires = "thickness")]
+    pub(super) map: Option<PathBuf>,
     /// Density of the material, in g/cm3: the mass is told too.
     #[arg(long, value_name = "G/CM3", value_parser = positive)]
     pub(super) density: Option<f64>,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lacuna_exchange::format::{self, ReadLimits};
+use lacuna_exchange::format::{self, Format, ReadLimits};
 use lacuna_fabrication::{
     Certificate, CutPlane, Input, Job, JobKind, Operation, Outcome, Params, Planes, Split, SplitKey, WallOrder, WallSide,
 };
@@ -73,16 +73,38 @@ pub(super) fn measure(args: &MeasureArgs, manner: Manner<'_>) -> Result<(), Prob
         ..Params::new(args.tolerance)
     };
     let inputs = std::iter::once(&args.model).chain(&args.other).map(|path| input_of(path, manner)).collect::<Result<_, _>>()?;
-    tell(JobKind::Measure, inputs, params, &args.limits, manner)
+    let map = args.map.as_deref().map(map_target).transpose()?;
+    tell(JobKind::Measure, inputs, params, map.as_slice(), &args.limits, manner)
 }
 
-/// Does a job that makes numbers, and prints its certificate.
-fn tell(kind: JobKind, inputs: Vec<Given>, params: Params, limit_args: &LimitArgs, manner: Manner<'_>) -> Result<(), Problem> {
-    let order = order_of(kind, inputs, params, &[], limit_args);
-    if let Some(server) = manner.server {
-        return print_json(&remote::tell(server, &order, limit_args, manner)?);
+/// The file of a map of thickness: beside the certificate on stdout, and in the one format that has room for it.
+fn map_target(path: &Path) -> Result<Target, Problem> {
+    let usage = |detail: &str| Problem::new(ProblemKind::Usage, detail.to_owned());
+    if path == Path::new("-") {
+        return Err(usage("--map needs the name of a file: stdout carries the certificate"));
     }
-    let (outcome, _) = perform(&order.job, limit_args, manner, |_, _| Ok(Vec::new()))?;
+    let target = target(path, None)?;
+    if target.format == Format::Ply { Ok(target) } else { Err(usage("--map writes a PLY file; let its name end in .ply")) }
+}
+
+/// Does a job that makes numbers, and the files beside them if any, and prints its certificate.
+fn tell(
+    kind: JobKind,
+    inputs: Vec<Given>,
+    params: Params,
+    targets: &[Target],
+    limit_args: &LimitArgs,
+    manner: Manner<'_>,
+) -> Result<(), Problem> {
+    let names: Vec<&str> = targets.iter().filter_map(|target| target.name).collect();
+    let order = order_of(kind, inputs, params, &names, limit_args);
+    if let Some(server) = manner.server {
+        let (certificate, _) = remote::make(server, &order, targets, None, limit_args, manner)?;
+        return print_json(&certificate);
+    }
+    let job = &order.job;
+    let title = job.inputs.first().map(|input| input.name.as_str());
+    let (outcome, _) = perform(job, limit_args, manner, |outcome, budget| deliver(outcome, title, targets, None, budget))?;
     print_json(&outcome.certificate)
 }
 
@@ -116,7 +138,7 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner<'_>) -> Result<(), 
             let detail = format!("{} models are given; name two, one and --with, or an --operation", inputs.len());
             return Err(Problem::new(ProblemKind::Usage, detail));
         }
-        return tell(JobKind::Intersect, inputs, params, &args.limits, manner);
+        return tell(JobKind::Intersect, inputs, params, &[], &args.limits, manner);
     }
     let IntersectArgs { outputs, format, certificate, preview, .. } = args;
     let output =

@@ -13,7 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::operand::is_solid;
-use crate::shape_measures::{enclosed, extent, least_thickness, no_solid, smallest_box};
+use crate::shape_measures::{MappedThickness, enclosed, extent, no_solid, smallest_box, walls_and_gaps};
 use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, slice, solidify, split};
 
@@ -35,6 +35,8 @@ pub enum Geometry {
     },
     /// A solid and planes that cut it.
     Sections(Box<Stack>),
+    /// A solid with the thickness of its walls and gaps all over it.
+    Thickness(Box<MappedThickness>),
     /// Numbers only.
     None,
 }
@@ -253,6 +255,9 @@ fn split_of(job: &Job) -> Result<Split, JobError> {
 fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let radius = radius(job)?;
     let attractor = &lower(job, budget)?.attractor;
+    let mut geometry = Geometry::None;
+    // All that there is of a measure to write.
+    let mapped = !job.outputs.is_empty();
     let Some(radius) = radius else {
         let bounds = bounding_box(attractor, budget)?;
         let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
@@ -267,7 +272,8 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if job.params.thickness {
             let surfaces = if is_solid(attractor) { attractor.surfaces() } else { Vec::new() };
             let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
-            certificate.thickness = Some(least_thickness(mesh, budget)?);
+            let (least, map) = walls_and_gaps(mesh, mapped, budget)?;
+            (certificate.thickness, geometry) = (Some(least), map);
         }
         if let Some(direction) = job.params.direction {
             certificate.extent = Some(extent(attractor, direction, [0.0; 2], budget)?);
@@ -275,7 +281,7 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if job.params.oriented_box {
             certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
         }
-        return Ok(Outcome { geometry: Geometry::None, certificate });
+        return Ok(Outcome { geometry, certificate });
     };
     let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
     let mut certificate = certificate::of_dilation(attractor, &dilation, tolerance);
@@ -290,9 +296,10 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         certificate.oriented_box = smallest_box(attractor, radius.mm(), tolerance, budget)?;
     }
     if job.params.thickness {
-        certificate.thickness = Some(least_thickness(mesh, budget)?);
+        let (least, map) = walls_and_gaps(mesh, mapped, budget)?;
+        (certificate.thickness, geometry) = (Some(least), map);
     }
-    Ok(Outcome { geometry: Geometry::None, certificate })
+    Ok(Outcome { geometry, certificate })
 }
 
 /// The box, and the share of the tolerance that single precision leaves.

@@ -3,16 +3,16 @@
 use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, RefineError, refine};
 use lacuna_kernel::budget::{Budget, Limits};
-use lacuna_kernel::error::Kind;
+use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::mesh_of;
 use lacuna_kernel::measure::section::{NoDirection, PlaneFrame};
-use lacuna_kernel::measure::{NotEnclosed, Side, enclosed_volume, extent_along, oriented_box, thickness};
+use lacuna_kernel::measure::{NotEnclosed, Side, ThicknessMap, enclosed_volume, extent_along, oriented_box, thickness, thickness_map};
 use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::Interval;
 use crate::operand::is_solid;
-use crate::run::JobError;
+use crate::run::{Geometry, JobError};
 
 /// The smallest box around the exact shape, whatever way it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,6 +97,17 @@ pub struct ThicknessStatement {
     pub gap: Option<LeastThicknessStatement>,
 }
 
+/// A solid's mesh with the thickness of its walls and gaps, which is measured as that of a [`ThicknessStatement`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct MappedThickness {
+    /// The mesh that was measured, in double precision.
+    pub mesh: TriMesh,
+    /// Through the material.
+    pub wall: ThicknessMap,
+    /// Through the air.
+    pub gap: ThicknessMap,
+}
+
 /// Bounds of the smallest box differ by this share of it.
 const RELATIVE: f64 = 1e-3;
 /// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
@@ -159,8 +170,16 @@ fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Resu
     }
 }
 
-/// Least walls and gaps of a closed mesh.
-pub(crate) fn least_thickness(mesh: &TriMesh, budget: &Budget) -> Result<ThicknessStatement, JobError> {
+/// Least walls and gaps of a closed mesh, and their map if it is wanted.
+pub(crate) fn walls_and_gaps(mesh: &TriMesh, mapped: bool, budget: &Budget) -> Result<(ThicknessStatement, Geometry), JobError> {
+    let count = mesh.triangles.len() as u64;
+    if mapped && count > budget.limits.triangles {
+        #[expect(clippy::cast_precision_loss, reason = "limits are shown, not computed with")]
+        let (asked, allowed) = (count as f64, budget.limits.triangles as f64);
+        let message = format!("the map of thickness has the solid's {count} triangles; {allowed} are allowed");
+        let limit = Some(LimitFacts { limit: "triangles", asked, allowed, remedy: None });
+        return Err(JobError { limit, ..JobError::new(Kind::Limit, "thickness.triangles", message) });
+    }
     let crossings = Crossings::of(mesh, budget)?.count;
     if crossings > 0 {
         let message = format!("{crossings} pairs of faces of the solid meet where they are not joined: its walls have no thickness there");
@@ -173,7 +192,12 @@ pub(crate) fn least_thickness(mesh: &TriMesh, budget: &Budget) -> Result<Thickne
             between_mm: found.between.map(|point| point.to_array()),
         }))
     };
-    Ok(ThicknessStatement { wall: of(Side::Wall)?, gap: of(Side::Gap)? })
+    let least = ThicknessStatement { wall: of(Side::Wall)?, gap: of(Side::Gap)? };
+    if !mapped {
+        return Ok((least, Geometry::None));
+    }
+    let [wall, gap] = [thickness_map(mesh, Side::Wall, budget)?, thickness_map(mesh, Side::Gap, budget)?];
+    Ok((least, Geometry::Thickness(Box::new(MappedThickness { mesh: mesh.clone(), wall, gap }))))
 }
 
 /// The shape has no walls.

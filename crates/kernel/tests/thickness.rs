@@ -7,7 +7,7 @@ mod oracle;
 
 use glam::{DMat3, DVec3};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
-use lacuna_kernel::measure::{Side, Thickness, thickness};
+use lacuna_kernel::measure::{Side, Thickness, ThicknessMap, thickness, thickness_map};
 use lacuna_kernel::solid::TriMesh;
 use oracle::Random;
 
@@ -58,6 +58,10 @@ fn sphere(radius: f64, rings: u32, sectors: u32) -> TriMesh {
 
 fn least(mesh: &TriMesh, side: Side) -> Option<Thickness> {
     thickness(mesh, side, &Budget::default()).unwrap()
+}
+
+fn map(mesh: &TriMesh, side: Side) -> ThicknessMap {
+    thickness_map(mesh, side, &Budget::default()).unwrap()
 }
 
 #[track_caller]
@@ -115,11 +119,53 @@ fn balls_and_shells() {
     assert!(found.least.high <= 8.0 && found.least.low >= 7.97, "{found:?}");
 }
 
+/// The faces of a box are as thick as the box is along their normals, its corners as its least edge; nothing lies outside.
+#[test]
+fn the_map_of_a_cuboid() {
+    let size = DVec3::new(3.0, 5.0, 7.5);
+    let slab = cuboid(DVec3::new(-1.0, 2.0, 4.0), DVec3::new(-1.0, 2.0, 4.0) + size);
+    // Two triangles for each face, in the order of `cuboid`.
+    let exact = [3.0, 3.0, 5.0, 5.0, 7.5, 7.5].map(|edge| [edge; 2]);
+    let turn = DMat3::from_axis_angle(DVec3::new(1.0, -2.0, 3.0).normalize(), 0.8);
+    let turned = TriMesh { vertices: slab.vertices.iter().map(|p| turn * *p).collect(), ..slab.clone() };
+    for mesh in [slab, turned] {
+        let wall = map(&mesh, Side::Wall);
+        for (found, exact) in wall.faces.iter().zip(exact.as_flattened()) {
+            assert!((found - exact).abs() < 1e-12, "{:?}", wall.faces);
+        }
+        assert!(wall.vertices.iter().all(|found| (found - 3.0).abs() < 1e-12), "{:?}", wall.vertices);
+        let gap = map(&mesh, Side::Gap);
+        assert_eq!((gap.faces, gap.vertices), (vec![f64::INFINITY; 12], vec![f64::INFINITY; 8]));
+    }
+}
+
+/// Of a hollow ball all faces have the wall between both spheres, and only those inside have a gap, its diameter.
+#[test]
+fn the_map_of_a_hollow_ball() {
+    let (outer, inner) = (sphere(5.0, 47, 96), turned_inside_out(sphere(4.0, 47, 96)));
+    let (count, vertices) = (outer.triangles.len(), outer.vertices.len());
+    let shell = joined(&[outer, inner]);
+    // Faces are within their sphere by 1 - cos(pi / 96)^2 of its radius at most, and the corners of one of 0.33 by 0.33 are 0.24 from its middle, where the other
+    // sphere is farther by 0.24^2 / 8.
+    let flat = 1.0 - (std::f64::consts::PI / 96.0).cos().powi(2);
+    let wall = map(&shell, Side::Wall);
+    for found in wall.faces.iter().chain(&wall.vertices) {
+        assert!((1.0 - 5.0 * flat..=1.0 + 4.0 * flat + 0.008).contains(found), "{found}");
+    }
+    let gap = map(&shell, Side::Gap);
+    assert!(gap.faces[..count].iter().chain(&gap.vertices[..vertices]).all(|found| *found == f64::INFINITY));
+    for found in gap.faces[count..].iter().chain(&gap.vertices[vertices..]) {
+        assert!((8.0 * (1.0 - flat) - 0.02..=8.0).contains(found), "{found}");
+    }
+}
+
 #[test]
 fn a_search_ends_when_it_is_stopped() {
     let cancel = CancelToken::new();
     cancel.fire(StopReason::Cancelled);
-    assert!(thickness(&sphere(1.0, 20, 20), Side::Wall, &Budget { cancel, ..Budget::default() }).is_err());
+    let budget = Budget { cancel, ..Budget::default() };
+    assert!(thickness(&sphere(1.0, 20, 20), Side::Wall, &budget).is_err());
+    assert!(thickness_map(&sphere(1.0, 20, 20), Side::Gap, &budget).is_err());
 }
 
 /// The distance along a ray to a triangle (Moeller and Trumbore, 1997).
@@ -138,7 +184,7 @@ fn hit(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 1e-9).then_some(t)
 }
 
-/// No ray along a normal is shorter than the least thickness.
+/// No ray along a normal is shorter than the thickness over its face, and the least of the map is the least thickness.
 #[test]
 fn no_ray_is_shorter() {
     let mut random = Random(17);
@@ -152,8 +198,13 @@ fn no_ray_is_shorter() {
         let moved = TriMesh { vertices: lump.vertices.iter().map(|p| DVec3::new(3.0 + gap - p.x, -p.y, p.z)).collect(), ..lump.clone() };
         let mesh = joined(&[lump, moved]);
         for side in [Side::Wall, Side::Gap] {
-            let found = least(&mesh, side);
-            for own in &mesh.triangles {
+            let map = map(&mesh, side);
+            let thinnest = least(&mesh, side).map_or(f64::INFINITY, |found| f64::midpoint(found.least.low, found.least.high));
+            for values in [&map.faces, &map.vertices] {
+                let found = values.iter().copied().fold(f64::INFINITY, f64::min);
+                assert!(found == thinnest || (found - thinnest).abs() < 1e-12, "{side:?}: {found} and {thinnest}");
+            }
+            for (own, least) in mesh.triangles.iter().zip(&map.faces) {
                 let [a, b, c] = own.map(|corner| mesh.vertices[corner as usize]);
                 let normal = (b - a).cross(c - a).normalize();
                 let direction = if side == Side::Wall { -normal } else { normal };
@@ -162,8 +213,7 @@ fn no_ray_is_shorter() {
                 let origin = a + (b - a) * s + (c - a) * t;
                 for other in mesh.triangles.iter().filter(|other| !other.iter().any(|corner| own.contains(corner))) {
                     if let Some(length) = hit(origin, direction, other.map(|corner| mesh.vertices[corner as usize])) {
-                        let least = found.map_or(f64::INFINITY, |found| found.least.low);
-                        assert!(length >= least - 1e-9, "{side:?}: a ray of {length} is shorter than {least}");
+                        assert!(length >= *least - 1e-9, "{side:?}: a ray of {length} is shorter than {least}");
                     }
                 }
             }

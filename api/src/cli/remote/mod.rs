@@ -104,11 +104,6 @@ pub(super) fn make(
     Ok((certified(view)?, written))
 }
 
-/// Does a job of numbers.
-pub(super) fn tell(server: &Server, order: &Order, limits: &LimitArgs, manner: Manner<'_>) -> Result<Certificate, Problem> {
-    certified(done(server, &posted(order, &[], limits)?, manner)?)
-}
-
 /// Does the job of a document and puts its files into a folder.
 pub(super) fn run(
     server: &Server,

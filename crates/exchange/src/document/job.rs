@@ -213,6 +213,13 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
         _ => false,
     };
     if !compares {
+        let mapped = document.params.thickness && document.outputs.iter().all(|name| name == Format::Ply.facts().ending);
+        if let (JobKind::Measure, Some(place), false) = (document.kind, members.get("outputs"), mapped || document.outputs.is_empty()) {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+                "measure delivers numbers, and with \"thickness\" the output \"ply\", its map on the surface; remove all other \"outputs\"".into()
+            });
+            return None;
+        }
         return Some(());
     }
     if let (Some(place), false) = (members.get("outputs"), document.outputs.is_empty()) {
@@ -647,10 +654,6 @@ fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> 
         seen.push(name);
         Some(name.to_owned())
     })?;
-    if kind == Some(JobKind::Measure) && !outputs.is_empty() {
-        walker.fault(&place, code::CONFLICTING_MEMBERS, || "measure delivers numbers and no files; remove \"outputs\"".into());
-        return None;
-    }
     for (index, name) in outputs.iter().enumerate() {
         let drawing = Format::from_name(name).is_some_and(Format::is_drawing);
         if kind.is_some_and(|kind| (kind == JobKind::Slice) != drawing) {

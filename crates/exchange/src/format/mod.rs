@@ -42,7 +42,7 @@ mod vrml;
 pub use error::{FormatError, Place};
 pub use geometry::{Geometry, NamedMesh};
 pub use limits::ReadLimits;
-pub use ply::PointFile;
+pub use ply::{PointFile, ScalarField, write_fields};
 pub use read::{Fan, MeshFacts, MeshFile, Unit, detect, fanned, read};
 
 use geometry::Piece;

@@ -3,8 +3,10 @@
 //! Format: Turk, The PLY Polygon File Format (1994): a header in text that lists elements and the
 //! types of their properties, then the elements in that order.
 
+mod fields;
 mod read;
 
+pub use fields::{ScalarField, write_fields};
 pub(crate) use read::read;
 
 use super::error::{FormatError, Place};
@@ -77,9 +79,8 @@ fn push(vector: &DVec3, bytes: &mut Vec<u8>) {
 fn write_with_normals<W: Write>(piece: &Piece<'_>, split: &Split, metadata: &Metadata<'_>, sink: &mut W) -> Result<(), FormatError> {
     check_count(split.normals.len() as u64)?;
     let counts = [split.normals.len() as u64, split.triangles.len() as u64, piece.segments.len() as u64];
-    let header = header_of(counts, false, metadata);
-    let z = "property float z\n";
-    let mut bytes = header.replacen(z, &format!("{z}property float nx\nproperty float ny\nproperty float nz\n"), 1).into_bytes();
+    let further = Further { vertex: "property float nx\nproperty float ny\nproperty float nz\n".into(), ..Further::default() };
+    let mut bytes = header_of(counts, false, &further, metadata).into_bytes();
     let copies = split.copies.iter().map(|&vertex| &piece.vertices[vertex as usize]);
     for (vertex, normal) in piece.vertices.iter().chain(copies).zip(&split.normals) {
         push(vertex, &mut bytes);
@@ -151,7 +152,7 @@ impl<'a, W: Write + Seek> PointFile<'a, W> {
 
 /// The header of a file of points, with a comment of as many blanks as the number leaves of twenty digits.
 fn point_header(count: u64, metadata: &Metadata<'_>) -> String {
-    let header = header_of([count, 0, 0], false, metadata);
+    let header = header_of([count, 0, 0], false, &Further::default(), metadata);
     let blanks = " ".repeat(20 - count.to_string().len());
     // Titles may hold any words, but are before the elements.
     let (comments, elements) = header.split_at(header.rfind("element vertex").unwrap_or(header.len()));
@@ -165,18 +166,29 @@ fn counts_are_wide(pieces: &[Piece<'_>]) -> bool {
 
 fn header(pieces: &[Piece<'_>], metadata: &Metadata<'_>) -> String {
     let counts = counts(pieces);
-    header_of([counts.vertices, counts.faces, counts.segments], counts_are_wide(pieces), metadata)
+    header_of([counts.vertices, counts.faces, counts.segments], counts_are_wide(pieces), &Further::default(), metadata)
 }
 
-fn header_of([vertices, faces, segments]: [u64; 3], wide: bool, metadata: &Metadata<'_>) -> String {
+/// What a header says besides.
+#[derive(Default)]
+struct Further {
+    /// Comments.
+    comments: Vec<String>,
+    /// Lines of the vertices' properties after the coordinates.
+    vertex: String,
+    /// Lines of the faces' properties after the corners.
+    face: String,
+}
+
+fn header_of([vertices, faces, segments]: [u64; 3], wide: bool, further: &Further, metadata: &Metadata<'_>) -> String {
     let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment {} units mm\n", one_line(metadata.application));
-    if let Some(title) = metadata.title {
-        header.push_str(&format!("comment {}\n", one_line(title)));
+    for words in metadata.title.into_iter().chain(further.comments.iter().map(String::as_str)) {
+        header.push_str(&format!("comment {}\n", one_line(words)));
     }
-    header.push_str(&format!("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", vertices));
+    header.push_str(&format!("element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n{}", further.vertex));
     if faces > 0 {
         let count = if wide { "uint" } else { "uchar" };
-        header.push_str(&format!("element face {}\nproperty list {count} int vertex_indices\n", faces));
+        header.push_str(&format!("element face {faces}\nproperty list {count} int vertex_indices\n{}", further.face));
     }
     if segments > 0 {
         header.push_str(&format!("element edge {}\nproperty int vertex1\nproperty int vertex2\n", segments));

@@ -1,10 +1,10 @@
-//! The least thickness of the walls of a solid, and of the gaps between them: along the normals of its faces.
+//! How thick the walls of a solid are, and the gaps between them: along the normals of its faces, the least of all and face by face.
 //!
 //! The wall at a point of a face is the way along the inward normal to the first face that has no corner in common with it, the gap the same outwards. (Faces with
 //! a common corner are left out, because a wall ends in nothing at every edge that is sharper than a right angle; that is a property of the edge.) The
 //! least wall over all points of all faces is found exactly: over a face a, another face b has a height that is linear along a, so its least value over the
 //! common part of a and the shadow of b on a's plane is at a corner of that polygon. Where triangles do not cross, the first face that a normal meets is the
-//! nearest, so no order along the normal is needed.
+//! nearest, so the least height over a face is its thickness, and parts of the tree are left out that are beside the prism over the face or higher than what was found.
 
 use super::Interval;
 use crate::budget::{Budget, Stopped};
@@ -33,10 +33,17 @@ pub struct Thickness {
     pub faces: [u32; 2],
 }
 
-/// Triangles handled together.
-const CHUNK: usize = 256;
-/// Shares of the diagonal within which is looked first; twice as far each time nothing is found.
-const FIRST: f64 = 1.0 / 256.0;
+/// The thickness of a mesh on one side, all over it. Infinite where no face lies across.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ThicknessMap {
+    /// The least thickness over each triangle, in mm.
+    pub faces: Vec<f64>,
+    /// At each vertex the least of the triangles around it, in mm: the least of all vertices is that of the mesh.
+    pub vertices: Vec<f64>,
+}
+
+/// Triangles of which the least is found together.
+const CHUNK: u32 = 256;
 /// Shadows of less area than this share of the squared lengths have none: faces along the normal.
 const FLAT: f64 = 1e-12;
 
@@ -55,6 +62,21 @@ impl Face {
         let direction = if side == Side::Wall { -normal } else { normal };
         let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (normal.cross(to - from), from));
         Some(Self { origin: a, direction, sides })
+    }
+
+    /// The least height that a point of a box may have; `None` for a box that is behind the face, or beside the prism over it.
+    fn entry(&self, around: &Box32) -> Option<f64> {
+        let [low, high] = [around.low, around.high].map(|end| DVec3::from_array(end.map(f64::from)));
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        // Where the box begins and ends along a direction.
+        let span = |direction: DVec3, from: DVec3| {
+            let (at, reach) = ((middle - from).dot(direction), half.dot(direction.abs()));
+            [at - reach, at + reach]
+        };
+        let [from, to] = span(self.direction, self.origin);
+        // Comparisons with NaN, which the box of nothing gives, are false.
+        let over = to >= 0.0 && self.sides.iter().all(|&(inward, through)| span(inward, through)[1] >= 0.0);
+        over.then(|| from.max(0.0))
     }
 
     /// The least height of another triangle over the face, and where it is, if its shadow has an area in common with it.
@@ -96,74 +118,106 @@ impl Face {
     }
 }
 
+/// The height of a face over another one, which face it is, and a point of it.
+type Over = (f64, u32, DVec3);
+
+fn corners(mesh: &TriMesh, triangle: u32) -> [DVec3; 3] {
+    mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize])
+}
+
+/// A mesh with a tree over its triangles.
+struct Faces<'m> {
+    mesh: &'m TriMesh,
+    tree: BoxTree,
+}
+
+impl<'m> Faces<'m> {
+    fn of(mesh: &'m TriMesh) -> Self {
+        let mut tree = BoxTree::default();
+        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(mesh, triangle).map(|p| p.to_array()))), true);
+        Self { mesh, tree }
+    }
+
+    /// The nearest face over another one, at most as high as a bound; of equally high ones the first.
+    fn over(&self, below: u32, side: Side, bound: f64, polygons: &mut [Vec<DVec3>; 2]) -> Option<Over> {
+        let face = Face::new(corners(self.mesh, below), side)?;
+        let own = self.mesh.triangles[below as usize];
+        let mut best: Option<Over> = None;
+        let entry = |around: &Box32| face.entry(around);
+        self.tree.nearest(bound, entry, |leaf| {
+            for (&other, around) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)) {
+                if entry(around).is_none() || self.mesh.triangles[other as usize].iter().any(|corner| own.contains(corner)) {
+                    continue;
+                }
+                if let Some((height, point)) = face.height(corners(self.mesh, other), polygons)
+                    && height <= bound
+                    && best.is_none_or(|best| (height, other) < (best.0, best.1))
+                {
+                    best = Some((height, other, point));
+                }
+            }
+            best.map_or(bound, |best| best.0)
+        });
+        best
+    }
+}
+
 /// The least thickness on one side of a closed mesh that does not cross itself; `None` where no face has another one over it, as for the gaps of a ball. Cost:
-/// n log n for thicknesses of the order of the triangles, more where walls are thick and triangles small. The result does not depend on the number of threads.
+/// n log n for triangles of like size; a face over which many small ones lie costs as many as are not higher than the lowest by more than their boxes. The
+/// result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Stopped`].
 pub fn thickness(mesh: &TriMesh, side: Side, budget: &Budget) -> Result<Option<Thickness>, Stopped> {
-    let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize]);
-    let mut tree = BoxTree::default();
-    tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(triangle).map(|p| p.to_array()))), true);
-    let low = mesh.vertices.iter().copied().reduce(DVec3::min).unwrap_or_default();
-    let high = mesh.vertices.iter().copied().reduce(DVec3::max).unwrap_or_default();
-    let diagonal = low.distance(high);
-    let mut reach = FIRST * diagonal;
-    loop {
-        let found = least_within(mesh, &tree, side, reach, budget)?;
-        // What is farther than the reach was not all seen.
-        if let Some((height, faces, point)) = found.filter(|found| found.0 <= reach) {
-            let slack = 64.0 * f64::EPSILON * (low.abs().max(high.abs()).max_element() + diagonal);
-            let least = Interval { low: (height - slack).max(0.0), high: height + slack };
-            let face = Face::new(corners(faces[0]), side);
-            let foot = face.map_or(point, |face| point - face.direction * height);
-            return Ok(Some(Thickness { least, between: [foot, point], faces }));
+    let faces = Faces::of(mesh);
+    let count = mesh.triangles.len() as u32;
+    let least_of = |chunk: u32| {
+        let mut polygons = Default::default();
+        let mut best: Option<(u32, Over)> = None;
+        for face in chunk * CHUNK..count.min((chunk + 1) * CHUNK) {
+            if budget.cancel.reason().is_some() {
+                return None;
+            }
+            let bound = best.map_or(f64::INFINITY, |(_, (height, ..))| height);
+            best = match faces.over(face, side, bound, &mut polygons) {
+                Some(over) if over.0 < bound => Some((face, over)),
+                _ => best,
+            };
         }
-        if reach > diagonal {
-            return Ok(None);
-        }
-        reach *= 2.0;
-    }
+        best
+    };
+    let chunks: Vec<Option<(u32, Over)>> = (0..count.div_ceil(CHUNK)).into_par_iter().map(least_of).collect();
+    budget.cancel.check()?;
+    let least = chunks.into_iter().flatten().reduce(|a, b| if b.1.0 < a.1.0 { b } else { a });
+    Ok(least.map(|(face, (height, other, point))| {
+        let low = mesh.vertices.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high = mesh.vertices.iter().copied().reduce(DVec3::max).unwrap_or_default();
+        let slack = 64.0 * f64::EPSILON * (low.abs().max(high.abs()).max_element() + low.distance(high));
+        let least = Interval { low: (height - slack).max(0.0), high: height + slack };
+        let foot = Face::new(corners(mesh, face), side).map_or(point, |face| point - face.direction * height);
+        Thickness { least, between: [foot, point], faces: [face, other] }
+    }))
 }
 
-type Found = (f64, [u32; 2], DVec3);
-
-/// The least height among pairs of faces whose boxes are within a reach, the first of equal ones.
-fn least_within(mesh: &TriMesh, tree: &BoxTree, side: Side, reach: f64, budget: &Budget) -> Result<Option<Found>, Stopped> {
-    let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize]);
-    let count = mesh.triangles.len();
-    let chunks: Vec<Option<Found>> = (0..count.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let mut best: Option<Found> = None;
-            let mut polygons = [Vec::with_capacity(9), Vec::with_capacity(9)];
-            for a in (chunk * CHUNK) as u32..((chunk + 1) * CHUNK).min(count) as u32 {
-                if budget.cancel.reason().is_some() {
-                    return None;
-                }
-                let points = corners(a);
-                let Some(face) = Face::new(points, side) else { continue };
-                let own = mesh.triangles[a as usize];
-                let far = face.direction * best.map_or(reach, |best| best.0.min(reach));
-                let swept =
-                    Box32::of(&[points[0], points[1], points[2], points[0] + far, points[1] + far, points[2] + far].map(|p| p.to_array()));
-                tree.query(&swept, 0, |leaf| {
-                    for (&b, b_box) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
-                        if !b_box.meets(&swept) || mesh.triangles[b as usize].iter().any(|corner| own.contains(corner)) {
-                            continue;
-                        }
-                        if let Some((height, point)) = face.height(corners(b), &mut polygons)
-                            && best.is_none_or(|best| (height, [a, b]) < (best.0, best.1))
-                        {
-                            best = Some((height, [a, b], point));
-                        }
-                    }
-                    true
-                });
-            }
-            best
-        })
-        .collect();
+/// The thickness on one side over every face of a closed mesh that does not cross itself: [`thickness()`] is the least of it, and it costs as much for each face
+/// alone. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`Stopped`].
+pub fn thickness_map(mesh: &TriMesh, side: Side, budget: &Budget) -> Result<ThicknessMap, Stopped> {
+    let all = Faces::of(mesh);
+    let of = |polygons: &mut [Vec<DVec3>; 2], face: u32| match budget.cancel.reason() {
+        None => all.over(face, side, f64::INFINITY, polygons).map_or(f64::INFINITY, |over| over.0),
+        Some(_) => f64::INFINITY,
+    };
+    let faces: Vec<f64> = (0..mesh.triangles.len() as u32).into_par_iter().map_init(Default::default, of).collect();
     budget.cancel.check()?;
-    Ok(chunks.into_iter().flatten().reduce(|a, b| if b.0 < a.0 { b } else { a }))
+    let mut vertices = vec![f64::INFINITY; mesh.vertices.len()];
+    for (corners, thickness) in mesh.triangles.iter().zip(&faces) {
+        for &corner in corners {
+            let least = &mut vertices[corner as usize];
+            *least = least.min(*thickness);
+        }
+    }
+    Ok(ThicknessMap { faces, vertices })
 }

@@ -192,6 +192,41 @@ impl BoxTree {
             height += 2;
         }
     }
+
+    /// Calls `visit` with the leaves that lie on a way, of every node's children the nearer one first. `entry` says how far along the way a box is at least,
+    /// `None` for one beside it; that of a box is at most those of all boxes within it. What is farther than a bound is left out, and `visit` answers with the
+    /// bound from then on.
+    pub(crate) fn nearest(&self, mut bound: f64, entry: impl Fn(&Box32) -> Option<f64>, mut visit: impl FnMut(usize) -> f64) {
+        let Some(at) = entry(&self.nodes[1]) else { return };
+        // Depth-first: at most one node waits at every level.
+        let mut stack = [(0.0, 0); 33];
+        let mut height = 1;
+        stack[0] = (at, 1);
+        while height > 0 {
+            height -= 1;
+            let (at, node) = stack[height];
+            if at > bound {
+                continue;
+            }
+            if node >= self.leaves {
+                bound = visit(node - self.leaves);
+                continue;
+            }
+            let mut children = [2 * node + 1, 2 * node].map(|child| (entry(&self.nodes[child]), child));
+            // What is put on top is looked at first; of equal ones that is the first child.
+            if let [(Some(second), _), (Some(first), _)] = children
+                && second < first
+            {
+                children.swap(0, 1);
+            }
+            for (at, child) in children {
+                if let Some(at) = at {
+                    stack[height] = (at, child);
+                    height += 1;
+                }
+            }
+        }
+    }
 }
 
 #[inline]

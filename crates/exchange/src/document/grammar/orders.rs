@@ -51,7 +51,7 @@ pub(in super::super) const JOB: Object = Object {
         required("params", "How to do it.", || reference("JobParams")),
         optional(
             "outputs",
-            "Names of the formats wanted, for example 3mf and stl.",
+            "Names of the formats wanted, for example 3mf and stl. A measure makes none, but ply with thickness.",
             || json!({ "type": "array", "items": one_of_words(&FORMATS.map(|format| format.ending)), "uniqueItems": true }),
         ),
         optional("limits", "What the job may use; the service's defaults when absent.", || reference("JobLimits")),
@@ -204,7 +204,7 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         ),
         optional(
             "thickness",
-            "Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent.",
+            "Whether the least thickness of walls and gaps is found, along the normals of faces: for measure of a solid alone; false when absent. With the output ply its map is made too: the mesh that is measured, with the thickness over every face as the property wall_mm (inwards) and gap_mm (outwards), and at every vertex the least of the faces around it; inf where no face lies across.",
             flag,
         ),
         optional("density_g_cm3", "The density of the material, in g/cm3, above zero, for the mass: for measure alone.", positive),
