@@ -108,9 +108,9 @@ fn every_command_repairs_only_when_asked() {
     assert_eq!((&found["closed_manifold"], &found["volume_mm3"], &found["triangles"]), (&json!(true), &json!(56.0), &json!(24)));
 
     // Nobody asked.
-    refused(&run(words("slice FILE --tolerance 0.01 --at 2 -o FILE", &[&text, &drawing])), &["ask for a repair"]);
+    refused(&run(words("slice FILE --tolerance 0.01 --at 2 -o FILE", &[&text, &drawing])), &["face 13: vertex 0 occurs twice"]);
     let union = "intersect FILE FILE --operation union --tolerance 0.01 -o FILE";
-    refused(&run(words(union, &[&text, &other, &out])), &["ask for a repair"]);
+    refused(&run(words(union, &[&other, &other, &out])), &["ask for a repair"]);
 }
 
 #[test]
