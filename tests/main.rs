@@ -14,6 +14,7 @@
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
 //! | `regression` | do other repositories learn when their parts change? |
 //! | `remote` | does the command line at a service leave what it leaves here? |
+//! | `repairs` | are mesh files that are no solids refused, or repaired where that is asked for and told? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
 //! | `slices` | are plane sections the drawings that they should be? |
@@ -52,6 +53,7 @@ mod processes;
 mod properties;
 mod regression;
 mod remote;
+mod repairs;
 mod secure;
 mod service;
 mod session;

@@ -201,6 +201,7 @@ export interface Certificate {
   oriented_box?: OrientedBoxStatement | null;
   /** The solid is inside D(r + outer). */ outer_bound_mm?: number | null;
   /** Digests of the files, by format; filled in after writing. */ output_digests: Record<string, string>;
+  /** What was done to each input that is a mesh before anything else, when the job asks for a repair. */ repair?: Array<RepairStatement>;
   /** The Hausdorff bound that was asked. */ requested_tolerance_mm: number;
   sections?: SectionsStatement | null;
   self_intersections: "none" | "not_checked" | number;
@@ -541,6 +542,7 @@ export interface JobParams {
   /** Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent. */ oriented_box?: boolean;
   /** For trim: the normal of a plane, of any length, and its distance from the origin along that, in mm. What the normal points to is taken away. */ plane?: Array<number>;
   /** The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate and convert. */ radius_mm?: number;
+  /** Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved and no hole filled: open meshes are refused with the place. Absent for evaluate; false when absent. */ repair?: boolean;
   /** On which side of that surface the wall is: inward (the solid becomes hollow) or outward (what the surface bounds becomes the hollow); inward when absent. */ side?: "inward" | "outward";
   /** Whether triangles are saved within the bound: for solidify alone; true when absent. */ simplify?: boolean;
   /** Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent. */ stability?: boolean;
@@ -976,6 +978,22 @@ export interface Remark {
   /** What, in words, with the values. */ message: string;
   /** JSON pointer into the model document. */ pointer: string;
   /** How much it matters. */ severity: Severity;
+}
+
+/**
+ * What a repair did to an input that is a mesh. No point of the surface was moved and no hole filled. All counts
+ * but that of the crossings are 0 where the mesh was left as it is.
+ */
+export interface RepairStatement {
+  /** Whether anything was done; if not, the mesh is used as it came. */ changed: boolean;
+  /** Pairs of triangles that meet elsewhere than in common corners and edges. No repair changes them. */ crossings: number;
+  /** Vertices that were doubled, so that parts that meet there only are not joined. */ doubled_vertices: number;
+  /** Name of the input. */ input: string;
+  /** Vertices that became one with another at the same place. */ joined_vertices: number;
+  /** Edges of four triangles or more, around which those were joined that bound the same wedge of material. */ parted_edges: number;
+  /** Triangles with the corners of another that were taken away, and walls between pieces that fill the space on both sides. */ removed_copies: number;
+  /** Triangles without area that were taken away; those across their longest edge were cut where that was needed. */ removed_flat_triangles: number;
+  /** Triangles that were turned so that the material is behind them: a shell within another is a void. */ turned_triangles: number;
 }
 
 /** A cell that the shape starts from. */

@@ -273,6 +273,10 @@ pub(super) struct SolidifyArgs {
     /// Examine at which radii nearby the topology changes, and from which on the shape is one piece: takes longer.
     #[arg(long)]
     pub(super) stability: bool,
+    /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
+    /// no hole is filled, and an open mesh is refused.
+    #[arg(long)]
+    pub(super) repair: bool,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]
@@ -324,6 +328,10 @@ pub(super) struct MeasureArgs {
     /// Density of the material, in g/cm3: the mass is told too.
     #[arg(long, value_name = "G/CM3", value_parser = positive)]
     pub(super) density: Option<f64>,
+    /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
+    /// no hole is filled, and an open mesh is refused.
+    #[arg(long)]
+    pub(super) repair: bool,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
 }
@@ -391,6 +399,10 @@ pub(super) struct IntersectArgs {
     /// Write a picture.
     #[arg(long, value_name = "FILE.png", requires = "operation")]
     pub(super) preview: Option<PathBuf>,
+    /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
+    /// no hole is filled, and an open mesh is refused.
+    #[arg(long)]
+    pub(super) repair: bool,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
 }
@@ -421,6 +433,10 @@ pub(super) struct SliceArgs {
     /// Height of layers, in mm: planes in their middles, from the bottom of the solid to its top.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) step: Option<f64>,
+    /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
+    /// no hole is filled, and an open mesh is refused.
+    #[arg(long)]
+    pub(super) repair: bool,
     #[command(flatten)]
     pub(super) output: OutputArgs,
     #[command(flatten)]
@@ -488,6 +504,10 @@ pub(super) struct ConvertArgs {
     /// Format of what goes to stdout.
     #[arg(long, value_name = "FORMAT")]
     pub(super) format: Option<String>,
+    /// Make the mesh a solid first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. Polygons become triangles where anything is done, which is told;
+    /// no hole is filled, and an open mesh is refused.
+    #[arg(long)]
+    pub(super) repair: bool,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,10 @@ use std::path::Path;
 
 use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
 
+use lacuna_fabrication::repaired_mesh;
+use lacuna_kernel::budget::Budget;
+use lacuna_kernel::model::{Interior, PolygonMesh};
+
 use super::args::ConvertArgs;
 use super::inspect::mesh_file;
 use super::output::{Target, finish, start, target};
@@ -12,17 +16,20 @@ use crate::inspection;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{format_problem, guarded};
 
-/// Reads a mesh and writes it; nothing is repaired. All files are written before the first one takes its place.
+/// Reads a mesh and writes it, repaired only if that is asked for. All files are written before the first one takes its place.
 pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
     let named = |path: &Path| target(path, args.format.as_deref().filter(|_| path == Path::new("-")));
     let targets: Vec<Target> = args.outputs.iter().map(|path| named(path)).collect::<Result<_, _>>()?;
-    let (file, _) = mesh_file(&args.file)?;
+    let (mut file, _) = mesh_file(&args.file)?;
     for (word, count) in &file.facts.left_out {
         // With stderr gone there is nobody left to tell.
         let _ = writeln!(std::io::stderr(), "warning: {count} shapes of the kind {word} hold no polygons and were left out");
     }
-    let closed = inspection::topology(&file)?.is_closed_manifold();
     let title = title(&args.file, &file.facts.object_names);
+    if args.repair {
+        repair(&mut file, &title)?;
+    }
+    let closed = inspection::topology(&file)?.is_closed_manifold();
     let mut pending = Vec::with_capacity(targets.len());
     for target in &targets {
         let mut part = start(&target.path)?;
@@ -30,6 +37,20 @@ pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
         pending.push((part, &target.path));
     }
     pending.into_iter().try_for_each(|(part, path)| finish(part, path))
+}
+
+/// Makes the mesh a solid and says what was done to it.
+fn repair(file: &mut MeshFile, title: &str) -> Result<(), Problem> {
+    let mesh = PolygonMesh { vertices: file.mesh.vertices.clone(), faces: file.faces(), interior: Interior::Auto };
+    let (made, statement) = guarded(|| repaired_mesh(title, &mesh, &Budget::default()))??;
+    if let Some(PolygonMesh { vertices, faces, .. }) = made {
+        (file.mesh.triangles, file.fans) = format::fanned(&faces);
+        file.mesh.vertices = vertices;
+    }
+    for warning in statement.warnings() {
+        let _ = writeln!(std::io::stderr(), "warning: {warning}");
+    }
+    Ok(())
 }
 
 /// What a mesh is called: as its first object, else as its file.

@@ -46,6 +46,7 @@ pub(super) fn solidify(args: &SolidifyArgs, manner: Manner<'_>) -> Result<(), Pr
     };
     let params = Params {
         level: args.level,
+        repair: args.repair,
         radius_mm: args.radius,
         closing_mm: args.closing,
         wall: args.wall.map(|thickness_mm| WallOrder { thickness_mm, side }),
@@ -65,6 +66,7 @@ pub(super) fn evaluate(args: &EvaluateArgs, manner: Manner<'_>) -> Result<(), Pr
 /// `lacuna measure`.
 pub(super) fn measure(args: &MeasureArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let params = Params {
+        repair: args.repair,
         radius_mm: args.radius,
         direction: args.direction.map(Into::into),
         oriented_box: args.oriented_box,
@@ -131,7 +133,7 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner<'_>) -> Result<(), 
         }
     }
     let (plane, split) = cutting(args)?;
-    let params = Params { operation, with: args.with, plane, split, ..Params::new(args.tolerance) };
+    let params = Params { operation, repair: args.repair, with: args.with, plane, split, ..Params::new(args.tolerance) };
     if operation.is_none() {
         let wanted = if args.with.is_some() { 1 } else { 2 };
         if inputs.len() != wanted {
@@ -172,7 +174,7 @@ fn cutting(args: &IntersectArgs) -> Result<(Option<CutPlane>, Option<Split>), Pr
 /// `lacuna slice`.
 pub(super) fn slice(args: &SliceArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let planes = Planes { normal: args.normal.into(), offsets_mm: args.at.clone(), step_mm: args.step };
-    let params = Params { radius_mm: args.radius, planes: Some(planes), ..Params::new(args.tolerance) };
+    let params = Params { repair: args.repair, radius_mm: args.radius, planes: Some(planes), ..Params::new(args.tolerance) };
     make(JobKind::Slice, vec![input_of(&args.model, manner)?], params, &args.output, &args.limits, manner)
 }
 
@@ -188,7 +190,7 @@ pub(super) fn convert(args: &ConvertArgs, server: &Server, manner: Manner<'_>) -
     let output = OutputArgs { outputs: args.outputs.clone(), format: args.format.clone(), certificate: None, preview: None };
     let limits = LimitArgs { limit_triangles: None, limit_memory: None, limit_seconds: None, threads: None };
     // Two units in the last place: rounding takes less.
-    let params = Params::new(2.0 * f64::from(f32::EPSILON) * extent);
+    let params = Params { repair: args.repair, ..Params::new(2.0 * f64::from(f32::EPSILON) * extent) };
     make(JobKind::Convert, vec![given], params, &output, &limits, manner)
 }
 

@@ -14,6 +14,7 @@ use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 
 use crate::level::LevelStatement;
 use crate::operand::Operand;
+use crate::repair::RepairStatement;
 use crate::run::{JobError, not_carried};
 use crate::shape_measures::{EnclosedStatement, ExtentStatement, OrientedBoxStatement, ThicknessStatement};
 use crate::solidify::{ClosingStatement, WallStatement};
@@ -112,6 +113,9 @@ pub struct Certificate {
     /// `true`, `false` or `"not_checked"`: the same topology at radius r - bound and r + bound.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::flag_schema))]
     pub topology_stable: Checked<bool>,
+    /// What was done to each input that is a mesh before anything else, when the job asks for a repair.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Vec::is_empty", default))]
+    pub repair: Vec<RepairStatement>,
     /// How the result was combined, when it was: the bounds are then those of a sandwich.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub operation: Option<OperationStatement>,

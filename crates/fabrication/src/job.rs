@@ -119,6 +119,8 @@ pub struct Params {
     pub tolerance_mm: f64,
     /// The level of a `solidify` that joins copies of a system's primitive instead of dilating its attractor.
     pub level: Option<u32>,
+    /// Whether inputs that are meshes are repaired first, so that each is a solid; `evaluate` alone has no use for it.
+    pub repair: bool,
     /// Radius of the dilating ball, in mm: required by `solidify` unless there is a wall or a level, optional for `measure` (without
     /// it the shape itself is measured), for `intersect` and for `slice` (without it the inputs are solids themselves).
     pub radius_mm: Option<f64>,
@@ -159,6 +161,7 @@ impl Params {
         Self {
             tolerance_mm,
             level: None,
+            repair: false,
             radius_mm: None,
             closing_mm: None,
             wall: None,

@@ -13,6 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::operand::is_solid;
+use crate::repair::repaired;
 use crate::shape_measures::{MappedThickness, enclosed, extent, no_solid, smallest_box, walls_and_gaps};
 use crate::solve::freedom;
 use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, slice, solidify, split};
@@ -223,6 +224,14 @@ pub(crate) fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 /// # Errors
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
+    let (job, repairs) = repaired(job, budget)?;
+    let mut outcome = made(&job, budget)?;
+    outcome.certificate.state_repairs(repairs);
+    Ok(outcome)
+}
+
+/// Does a job whose meshes are as they shall be.
+fn made(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
         return level::solidify(job, level, budget);
     }
@@ -410,7 +419,8 @@ const BYTES_PER_CELL: f64 = 64.0;
 /// # Errors
 /// As [`run`], for what shows before the work.
 pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
-    let plan = planned(job, budget)?;
+    let (job, _) = repaired(job, budget)?;
+    let plan = planned(&job, budget)?;
     let memory_bytes = if plan.memory_bytes > 0.0 { PROCESS_BYTES + plan.memory_bytes } else { 0.0 };
     Ok(Plan { memory_bytes, ..plan })
 }

@@ -163,6 +163,7 @@ Certificate = TypedDict('Certificate', {
     'oriented_box': 'NotRequired[OrientedBoxStatement | None]',
     'outer_bound_mm': 'NotRequired[float | None]',
     'output_digests': 'dict[str, str]',
+    'repair': 'NotRequired[list[RepairStatement]]',
     'requested_tolerance_mm': 'float',
     'sections': 'NotRequired[SectionsStatement | None]',
     'self_intersections': "Literal['none', 'not_checked'] | int",
@@ -387,6 +388,7 @@ JobParams = TypedDict('JobParams', {
     'oriented_box': 'NotRequired[bool]',
     'plane': 'NotRequired[list[float]]',
     'radius_mm': 'NotRequired[float]',
+    'repair': 'NotRequired[bool]',
     'side': "NotRequired[Literal['inward', 'outward']]",
     'simplify': 'NotRequired[bool]',
     'stability': 'NotRequired[bool]',
@@ -698,6 +700,18 @@ Remark = TypedDict('Remark', {
     'message': 'str',
     'pointer': 'str',
     'severity': 'Severity',
+})
+
+RepairStatement = TypedDict('RepairStatement', {
+    'changed': 'bool',
+    'crossings': 'int',
+    'doubled_vertices': 'int',
+    'input': 'str',
+    'joined_vertices': 'int',
+    'parted_edges': 'int',
+    'removed_copies': 'int',
+    'removed_flat_triangles': 'int',
+    'turned_triangles': 'int',
 })
 
 RootCell = TypedDict('RootCell', {'control_points': 'list[ControlPoint | None]', 'state': 'str'})

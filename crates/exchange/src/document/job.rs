@@ -395,12 +395,14 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let normals = flag_of(walker, &members, kind, "normals", (JobKind::Evaluate, "evaluate"), false)?;
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
+    let repair = repair(walker, &members, kind)?;
     let tolerance_mm = tolerance?;
     let closing_mm = closing(walker, &members, kind, stability)?;
     let wall = wall(walker, &members, kind)?;
     Some(Params {
         tolerance_mm,
         level,
+        repair,
         radius_mm,
         closing_mm,
         wall,
@@ -417,6 +419,18 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         simplify,
         stability,
     })
+}
+
+/// Whether meshes are repaired, which an evaluation, taking a mesh as it is, does not.
+fn repair(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<bool> {
+    let Some(place) = members.get("repair") else { return Some(false) };
+    if kind == Some(JobKind::Evaluate) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "evaluate takes meshes as they are and no \"repair\"; remove it, or ask for the kind \"convert\"".into()
+        });
+        return None;
+    }
+    walker.flag(place)
 }
 
 /// The width of gaps that are filled, which a dilation alone takes, and not together with an examination of its topology.

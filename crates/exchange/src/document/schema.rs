@@ -170,7 +170,9 @@ fn job() -> Value {
         ),
         kind(
             "evaluate",
-            json!({ "properties": { "params": { "not": { "anyOf": [{ "required": ["radius_mm"] }, { "required": ["simplify"] }, { "required": ["stability"] }] } } } })
+            json!({ "properties": { "params": { "not": { "anyOf": [
+                { "required": ["radius_mm"] }, { "required": ["simplify"] }, { "required": ["stability"] }, { "required": ["repair"] }
+            ] } } } })
         ),
         kind(
             "measure",

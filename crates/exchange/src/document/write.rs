@@ -322,6 +322,7 @@ object! {
     lacuna_fabrication::job::Params: |params, members| members
         .put_if(params.level.is_none() || params.tolerance_mm > 0.0, "tolerance_mm", &Number(params.tolerance_mm))?
         .put_some("level", params.level.as_ref())?
+        .put_if(params.repair, "repair", &true)?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?
         .put_some("closing_mm", params.closing_mm.map(Number).as_ref())?
         .put_some("wall_mm", params.wall.map(|wall| Number(wall.thickness_mm)).as_ref())?

@@ -13,7 +13,6 @@
 //! Cost: linear in the faces of level n - 1 times the maps, which follows the surface of the result and not the number of copies.
 
 mod disjoint;
-mod fans;
 mod growth;
 mod lattice;
 
@@ -22,7 +21,7 @@ use crate::error::{Kind, LimitFacts};
 use crate::measure::mass::{area, volume};
 use crate::measure::{AxisBox, Interval};
 use crate::model::{Ifs, Primitive};
-use crate::solid::{Crossings, Solid, SolidError, TriMesh, rounding};
+use crate::solid::{Crossings, Solid, SolidError, TriMesh, fans, rounding};
 use disjoint::Body;
 use glam::DVec3;
 use growth::{Growth, Surface};
@@ -350,9 +349,12 @@ impl Start {
         let solid = match Solid::new(mesh, budget) {
             Ok(solid) => solid,
             Err(SolidError::NotManifold(topology)) if topology.degenerate_triangles == 0 => {
-                let apart = fans::part(&surface.points, &surface.triangles(), budget)?;
-                doubled_vertices = (apart.points.len() - surface.points.len()) as u64;
-                let vertices = narrow(&apart.points.iter().map(place).collect::<Vec<_>>());
+                // Coordinates are integers below 2^53.
+                let exact = |corner: u32| surface.points[corner as usize].map(|x| x as f64);
+                let apart = fans::part(&exact, &surface.triangles(), budget)?;
+                doubled_vertices = (apart.origins.len() - surface.points.len()) as u64;
+                let places: Vec<DVec3> = apart.origins.iter().map(|&corner| place(&surface.points[corner as usize])).collect();
+                let vertices = narrow(&places);
                 mesh = TriMesh { vertices, triangles: apart.triangles };
                 Solid::new(mesh, budget).map_err(|error| match error {
                     SolidError::Stopped(stopped) => LevelError::Stopped(stopped),

@@ -1,9 +1,10 @@
 //! Polygon meshes as shapes.
 
 use super::CellKind;
-use super::lower::Draft;
+use super::lower::{Draft, Finding};
 use crate::attractor::{Root, SolidSurface};
 use crate::automaton::{LeafPrimitive, State, StateId};
+use crate::solid::TriMesh;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -47,7 +48,7 @@ pub(super) fn elements(vertices: &[DVec3], faces: &[Vec<u32>], draft: &mut Draft
     let mut elements = Elements::default();
     let mut errors = 0;
     for (index, face) in faces.iter().enumerate() {
-        let fault = face_fault(vertices, face);
+        let fault = corner_fault(vertices, face).or_else(|| repetition(face)).or_else(|| concavity(vertices, face));
         if let Some((code, message)) = fault {
             errors += 1;
             if errors <= MOST_FINDINGS {
@@ -58,40 +59,73 @@ pub(super) fn elements(vertices: &[DVec3], faces: &[Vec<u32>], draft: &mut Draft
         match face.as_slice() {
             [point] => elements.points.push(*point),
             [start, end] => elements.segments.push([*start, *end]),
-            corners => elements.triangles.extend((1..corners.len() - 1).map(|k| [corners[0], corners[k], corners[k + 1]])),
+            corners => elements.triangles.extend(fan(corners)),
         }
     }
     (errors == 0).then_some(elements)
 }
 
-fn face_fault(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, String)> {
+/// A polygon as triangles about its first corner.
+fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    (1..corners.len() - 1).map(|k| [corners[0], corners[k], corners[k + 1]])
+}
+
+fn corner_fault(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, String)> {
     if face.is_empty() {
         return Some(("mesh.face-empty", "it has no corner, and needs at least one".into()));
     }
     if let Some(&corner) = face.iter().find(|&&corner| corner as usize >= vertices.len()) {
         return Some(("mesh.index", format!("vertex {corner} does not exist: there are {}", vertices.len())));
     }
-    if let Some(&corner) = face.iter().find(|&&corner| !vertices[corner as usize].is_finite()) {
-        return Some(("model.not-finite", format!("vertex {corner} is not finite")));
-    }
+    let endless = face.iter().find(|&&corner| !vertices[corner as usize].is_finite());
+    endless.map(|corner| ("model.not-finite", format!("vertex {corner} is not finite")))
+}
+
+fn repetition(face: &[u32]) -> Option<(&'static str, String)> {
     let mut sorted = face.to_vec();
     sorted.sort_unstable();
-    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Some(("mesh.repeated-vertex", format!("vertex {} occurs twice", pair[0])));
+    let pair = sorted.windows(2).find(|pair| pair[0] == pair[1]);
+    pair.map(|pair| ("mesh.repeated-vertex", format!("vertex {} occurs twice", pair[0])))
+}
+
+/// A fan is the polygon when no triangle of it turns against the whole.
+fn concavity(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, String)> {
+    if face.len() < 4 {
+        return None;
     }
-    if face.len() > 3 {
-        // A fan is the polygon when no triangle of it turns against the whole.
-        let corner = |k: usize| vertices[face[k] as usize];
-        let turns: Vec<DVec3> = (1..face.len() - 1).map(|k| (corner(k) - corner(0)).cross(corner(k + 1) - corner(0))).collect();
-        let whole: DVec3 = turns.iter().copied().sum();
-        if turns.iter().any(|turn| turn.dot(whole) < -1e-12 * whole.length_squared()) {
-            return Some(("mesh.concave-face", "it is not star-shaped from its first corner; split it into convex faces".into()));
-        }
-    }
-    None
+    let turns: Vec<DVec3> =
+        fan(face).map(|corners| corners.map(|corner| vertices[corner as usize])).map(|[a, b, c]| (b - a).cross(c - a)).collect();
+    let whole: DVec3 = turns.iter().copied().sum();
+    let turns_back = turns.iter().any(|turn| turn.dot(whole) < -1e-12 * whole.length_squared());
+    turns_back.then(|| ("mesh.concave-face", "it is not star-shaped from its first corner; split it into convex faces".into()))
 }
 
 impl PolygonMesh {
+    /// The polygons as triangles about their first corners, with the same vertices; a face may name a vertex twice. Cost: linear.
+    ///
+    /// # Errors
+    /// Findings of faces that are points or segments, name what is no place, or are not star-shaped from their first corner.
+    pub fn fanned(&self) -> Result<TriMesh, Vec<Finding>> {
+        let mut findings = Vec::new();
+        for (index, face) in self.faces.iter().enumerate() {
+            let fault = corner_fault(&self.vertices, face).or_else(|| {
+                let few = || ("mesh.no-polygon", format!("it has {} corners, and bounds nothing; leave it out", face.len()));
+                if face.len() < 3 { Some(few()) } else { concavity(&self.vertices, face) }
+            });
+            if let Some((code, message)) = fault {
+                let (pointer, message) = (format!("/faces/{index}"), format!("face {index}: {message}"));
+                findings.push(Finding { pointer, code, message, warning: false });
+                if findings.len() == MOST_FINDINGS {
+                    break;
+                }
+            }
+        }
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        Ok(TriMesh { vertices: self.vertices.clone(), triangles: self.faces.iter().flat_map(|face| fan(face)).collect() })
+    }
+
     pub(super) fn lower(&self, draft: &mut Draft) {
         if self.faces.is_empty() {
             return draft.error(

@@ -3,9 +3,11 @@
 pub(crate) mod box_tree;
 pub(crate) mod contact;
 mod crossings;
+pub(crate) mod fans;
 pub(crate) mod half_edges;
 pub(crate) mod inside;
 pub(crate) mod mend;
+mod repair;
 pub(crate) mod topology;
 
 use crate::budget::{Budget, Stopped};
@@ -13,6 +15,7 @@ use crate::measure::mass::volume;
 pub use crossings::Crossings;
 use glam::DVec3;
 pub use inside::Inside;
+pub use repair::{Repair, RepairError, Repaired, repair};
 pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.

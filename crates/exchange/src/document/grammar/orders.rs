@@ -129,6 +129,11 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             || json!({ "type": "integer", "minimum": 0, "maximum": MOST_LEVEL }),
         ),
         optional(
+            "repair",
+            "Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved and no hole filled: open meshes are refused with the place. Absent for evaluate; false when absent.",
+            flag,
+        ),
+        optional(
             "radius_mm",
             "The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate and convert.",
             positive,

@@ -1,17 +1,17 @@
 //! Doubling of corners where parts of a solid meet without being joined: along edges with four or more triangles, and at corners with several fans.
 
-use super::LevelError;
-use super::lattice::Point;
-use crate::budget::Budget;
+use super::contact::{side, turn, view};
+use crate::attractor::cell::Point;
+use crate::budget::{Budget, Stopped};
 use crate::groups::Groups;
-use crate::solid::contact::{side, turn, view};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// A surface whose corners are doubled.
-pub(super) struct Apart {
-    pub(super) points: Vec<Point>,
-    pub(super) triangles: Vec<[u32; 3]>,
+pub(crate) struct Apart {
+    /// Of every corner, which one it was before.
+    pub(crate) origins: Vec<u32>,
+    pub(crate) triangles: Vec<[u32; 3]>,
 }
 
 /// The next half-edge 3 t + k of a triangle.
@@ -20,8 +20,11 @@ fn next(half: u32) -> u32 {
 }
 
 /// Around an edge with 2 k triangles, those are joined that bound the same wedge of material; every fan of triangles that are joined around a corner then gets
-/// a corner of its own. The set of points that the surface bounds stays the same. Signs are exact: coordinates are integers below 2^53.
-pub(super) fn part(points: &[Point], triangles: &[[u32; 3]], budget: &Budget) -> Result<Apart, LevelError> {
+/// a corner of its own. The set of points that the surface bounds stays the same. Signs are exact. Cost: n log n.
+///
+/// # Errors
+/// [`Stopped`].
+pub(crate) fn part(position: &impl Fn(u32) -> Point, triangles: &[[u32; 3]], budget: &Budget) -> Result<Apart, Stopped> {
     let corner = |half: u32| triangles[half as usize / 3][half as usize % 3];
     let mut halves: Vec<([u32; 2], u32)> = (0..3 * triangles.len() as u32)
         .into_par_iter()
@@ -41,7 +44,7 @@ pub(super) fn part(points: &[Point], triangles: &[[u32; 3]], budget: &Budget) ->
         around.clear();
         around.extend(edge.iter().map(|(_, half)| *half));
         if around.len() > 2 {
-            sort_around(points, triangles, edge[0].0, &mut around);
+            sort_around(position, triangles, edge[0].0, &mut around);
         }
         let forward = |half: u32| corner(half) == edge[0].0[0];
         let count = around.len();
@@ -55,12 +58,12 @@ pub(super) fn part(points: &[Point], triangles: &[[u32; 3]], budget: &Budget) ->
         }
     }
     let mut numbers = vec![u32::MAX; 3 * triangles.len()];
-    let mut parted = Apart { points: Vec::with_capacity(points.len()), triangles: Vec::with_capacity(triangles.len()) };
+    let mut parted = Apart { origins: Vec::new(), triangles: Vec::with_capacity(triangles.len()) };
     for half in 0..3 * triangles.len() as u32 {
         let group = corners.of(half as usize) as usize;
         if numbers[group] == u32::MAX {
-            numbers[group] = parted.points.len() as u32;
-            parted.points.push(points[corner(half) as usize]);
+            numbers[group] = parted.origins.len() as u32;
+            parted.origins.push(corner(half));
         }
         numbers[half as usize] = numbers[group];
     }
@@ -69,10 +72,9 @@ pub(super) fn part(points: &[Point], triangles: &[[u32; 3]], budget: &Budget) ->
 }
 
 /// Sorts the triangles around an edge counter-clockwise as seen against its direction, from the first one on.
-fn sort_around(points: &[Point], triangles: &[[u32; 3]], [from, to]: [u32; 2], halves: &mut [u32]) {
-    let exact = |vertex: u32| points[vertex as usize].map(|x| x as f64);
-    let apex = |half: u32| exact(triangles[half as usize / 3][next(next(half)) as usize % 3]);
-    let (a, b) = (exact(from), exact(to));
+fn sort_around(position: &impl Fn(u32) -> Point, triangles: &[[u32; 3]], [from, to]: [u32; 2], halves: &mut [u32]) {
+    let apex = |half: u32| position(triangles[half as usize / 3][next(next(half)) as usize % 3]);
+    let (a, b) = (position(from), position(to));
     let first = apex(halves[0]);
     // Positive where d lies counter-clockwise from c: det(b - a, c - a, d - a) > 0.
     let turns = |c: &[f64; 3], d: &[f64; 3]| -side(&a, &b, c, d);
