@@ -84,6 +84,52 @@ fn how_far_solids_are_from_each_other() {
     assert_eq!(found["complete"], true);
 }
 
+/// Koch's curve as maps touches itself where its parts meet; as a curve whose parts share their ends it does not.
+#[test]
+fn a_shape_and_itself() {
+    let folder = Scratch::new();
+    let maps = folder.join("maps.json");
+    std::fs::write(&maps, library::find("koch_curve").unwrap().document).unwrap();
+    let itself = |path: &Path| told(&["intersect", "--tolerance", "0.5", "--with", "self"], &[path])["contact"].clone();
+    let found = itself(&maps);
+    let places = found["places"].as_array().unwrap();
+    // 100 mm long: cells of 100, 33 and 11 mm are cut in four.
+    assert_eq!((&found["verdict"], places.len(), &found["complete"]), (&json!("near"), 63, &json!(true)));
+    assert!(places.iter().all(|place| place["nearest"]["first"] != place["nearest"]["second"] && place["nearest"]["second"].is_string()));
+    let turned = |angle: f64, x: f64, y: f64| json!({ "scale": 1.0 / 3.0, "angle_deg": angle, "translation": [x, y, 0.0] });
+    let curve = write(
+        &folder,
+        "curve.json",
+        &json!({
+            "family": "interpolation",
+            "points": [[0, 0, 0], [30, 0, 0], [45, 25.98076211353316, 0], [60, 0, 0], [90, 0, 0]],
+            "maps": [turned(0.0, 0.0, 0.0), turned(60.0, 30.0, 0.0), turned(-60.0, 45.0, 25.98076211353316), turned(0.0, 60.0, 0.0)]
+        }),
+    );
+    let found = itself(&curve);
+    assert_eq!((&found["verdict"], &found["places"], &found["complete"]), (&json!("disjoint"), &json!([]), &json!(true)));
+    assert!(found["distance_mm"][0].as_f64().unwrap() > 0.5);
+    // The same as a job.
+    let model: Value = serde_json::from_slice(&std::fs::read(&curve).unwrap()).unwrap();
+    let job = |with: Value| json!({ "lacuna": 1, "kind": "intersect", "model": { "shape": model["shape"] }, "params": { "tolerance_mm": 0.5, "with": with } });
+    let path = folder.join("job.json");
+    std::fs::write(&path, job(json!({ "self": true })).to_string()).unwrap();
+    assert_eq!(told(&["run"], &[&path])["contact"], found);
+    for (with, place) in
+        [(json!({ "self": false }), "/params/with/self"), (json!({ "self": true, "point": [0, 0, 0] }), "/params/with/self")]
+    {
+        let faults = read_job(job(with).to_string().as_bytes(), &DocumentLimits::default()).unwrap_err();
+        assert!(faults.iter().any(|fault| fault.pointer == place), "{faults:?}");
+    }
+    // A triangle alone has nothing that could touch it.
+    let alone =
+        write(&folder, "alone.json", &json!({ "family": "mesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]] }));
+    let words = ["intersect", "--tolerance", "0.5", "--with", "self"];
+    let output = binary::run(words.iter().map(OsStr::new).chain([alone.as_os_str()]));
+    assert_eq!(output.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("a smaller tolerance looks closer"));
+}
+
 #[test]
 fn what_cannot_be_compared_is_refused() {
     let folder = Scratch::new();

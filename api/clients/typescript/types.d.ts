@@ -241,9 +241,9 @@ export interface Coefficients {
 }
 
 /**
- * How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for
- * a solid has its inside: what lies there is at the distance 0. Places and the nearest pair are those of
- * surfaces.
+ * How far two shapes are apart, and where they come within the tolerance of each other; or a shape and itself,
+ * but for what it joins. A model that stands for a solid has its inside: what lies there is at the distance 0.
+ * Places and the nearest pair are those of surfaces.
  */
 export interface ContactStatement {
   /** Whether there are no other places, and the distance is as narrow as the tolerance allows. */ complete: boolean;
@@ -1261,4 +1261,5 @@ export interface With {
   /** x, y, z: does it belong to the shape? */ point?: Array<number>;
   /** Where it begins, and its direction of any length. */ ray?: Array<number>;
   /** Its two ends. */ segment?: Array<number>;
+  /** true: the shape itself. Where does it come near itself although no boundary that the model declares joins it there? */ self?: true;
 }

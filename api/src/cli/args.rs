@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lacuna_exchange::document::MOST_CELLS_LISTED;
-use lacuna_exchange::document::with::{self, PRIMITIVES};
-use lacuna_kernel::measure::Primitive;
+use lacuna_exchange::document::with::{self, ITSELF, PRIMITIVES};
+use lacuna_fabrication::job::With;
 
 use crate::config::Role;
 
@@ -362,9 +362,9 @@ pub(super) struct IntersectArgs {
     #[arg(long, value_enum, requires = "outputs")]
     pub(super) operation: Option<OperationName>,
     /// What one model is held against: point:X,Y,Z, segment:, ray: or line: with six numbers, plane:NX,NY,NZ,OFFSET, box: with its two corners, or
-    /// ball:X,Y,Z,RADIUS, in mm.
-    #[arg(long, value_name = "WHAT:NUMBERS", value_parser = primitive, conflicts_with = "operation")]
-    pub(super) with: Option<Primitive>,
+    /// ball:X,Y,Z,RADIUS, in mm; or self: where it comes near itself although no boundary that the model declares joins it there.
+    #[arg(long, value_name = "WHAT:NUMBERS", value_parser = against, conflicts_with = "operation")]
+    pub(super) with: Option<With>,
     /// With `--operation trim`: the plane, by its normal and its offset along that in mm. What the normal points to is taken away.
     #[arg(long, value_name = "NX,NY,NZ,OFFSET", value_parser = cut_plane, allow_hyphen_values = true)]
     pub(super) plane: Option<[f64; 4]>,
@@ -612,16 +612,19 @@ fn named_value(text: &str) -> Result<(String, f64), String> {
     }
 }
 
-fn primitive(text: &str) -> Result<Primitive, String> {
-    let (word, numbers) = text.split_once(':').ok_or("WHAT:NUMBERS is expected, for example plane:0,0,1,5")?;
+fn against(text: &str) -> Result<With, String> {
+    if text == ITSELF {
+        return Ok(With::Itself);
+    }
+    let (word, numbers) = text.split_once(':').ok_or("WHAT:NUMBERS is expected, for example plane:0,0,1,5, or self")?;
     let numbers: Option<Vec<f64>> =
         numbers.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
     let Some((_, count)) = PRIMITIVES.iter().find(|(known, _)| *known == word) else {
-        let known = PRIMITIVES.map(|(word, _)| word).join(", ");
+        let known = with::words().join(", ");
         return Err(format!("'{word}' is none of {known}"));
     };
     let found = numbers.and_then(|numbers| with::primitive(word, &numbers));
-    found.ok_or_else(|| format!("a {word} takes {count} numbers with commas between"))
+    found.map(With::Primitive).ok_or_else(|| format!("a {word} takes {count} numbers with commas between"))
 }
 
 fn distance(text: &str) -> Result<f64, String> {

@@ -276,7 +276,7 @@ pub struct InsideStatement {
     pub surface_distance_mm: Interval,
 }
 
-/// How far two shapes are apart, and where they come within the tolerance of each other. A model that stands for a solid has its inside: what lies there is
+/// How far two shapes are apart, and where they come within the tolerance of each other; or a shape and itself, but for what it joins. A model that stands for a solid has its inside: what lies there is
 /// at the distance 0. Places and the nearest pair are those of surfaces.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]

@@ -4,7 +4,7 @@ use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::measure::contact::{
-    CellPair, Contact, ContactError, ContactQuery, Place, Primitive, Verdict, intersect, intersect_primitive,
+    CellPair, Contact, ContactError, ContactQuery, Place, Primitive, Verdict, intersect, intersect_primitive, intersect_self,
 };
 use lacuna_kernel::measure::hausdorff::{Directed, Hausdorff, hausdorff};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
@@ -15,6 +15,7 @@ use crate::certificate::{
     self, CellPairStatement, ContactStatement, ContactVerdict, DirectedStatement, HausdorffStatement, Holder, InsideStatement,
     PlaceStatement,
 };
+use crate::job::With;
 use crate::operand::is_solid;
 use crate::run::{JobError, Outcome, lower_all, wrong_inputs};
 use crate::{Geometry, Job};
@@ -36,14 +37,15 @@ fn shapes(job: &Job, budget: &Budget) -> Result<Vec<(Attractor, AxisBox)>, JobEr
     lower_all(job, budget)?.into_iter().map(|lowered| boxed(lowered.attractor)).collect()
 }
 
-/// Does a job of kind `intersect` without an operation: where two shapes, or a shape and a primitive, come together.
+/// Does a job of kind `intersect` without an operation: where two shapes, or a shape and a primitive or itself, come together.
 pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let shapes = shapes(job, budget)?;
     let query = ContactQuery { resolution: tolerance, most: MOST_PAIRS };
     budget.report("intersect", 0.0, 0);
     let found = match (shapes.as_slice(), &job.params.with) {
         ([(first, _), (second, _)], None) => intersect(first, second, &query, budget)?,
-        ([(shape, _)], Some(primitive)) => intersect_primitive(shape, primitive, &query, budget)?,
+        ([(shape, _)], Some(With::Primitive(primitive))) => intersect_primitive(shape, primitive, &query, budget)?,
+        ([(shape, _)], Some(With::Itself)) => intersect_self(shape, &query, budget)?,
         (_, None) => return Err(wrong_inputs(job, "two are held against each other; more need an operation")),
         (_, Some(_)) => return Err(wrong_inputs(job, "one is held against what \"with\" says")),
     };
@@ -64,7 +66,9 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
                 None => held(first, &samples(second, &found, budget)?, budget)?.map(|point| (Holder::First, point)),
                 Some(point) => Some((Holder::Second, point)),
             },
-            ([(shape, _)], Some(primitive)) => held(shape, &point_of(primitive), budget)?.map(|point| (Holder::First, point)),
+            ([(shape, _)], Some(With::Primitive(primitive))) => {
+                held(shape, &point_of(primitive), budget)?.map(|point| (Holder::First, point))
+            }
             _ => None,
         };
         if let Some((holder, point)) = held {

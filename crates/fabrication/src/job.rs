@@ -112,6 +112,15 @@ pub struct WallOrder {
     pub side: WallSide,
 }
 
+/// What one shape is held against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum With {
+    /// A point, a line and the like.
+    Primitive(Primitive),
+    /// The shape: where it comes near itself although nothing declares it.
+    Itself,
+}
+
 /// Settings of a job. What a kind does not use must be absent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Params {
@@ -131,7 +140,7 @@ pub struct Params {
     /// What an `intersect` leaves of its inputs.
     pub operation: Option<Operation>,
     /// What an `intersect` without an operation holds its one input against.
-    pub with: Option<Primitive>,
+    pub with: Option<With>,
     /// Where an `intersect` trims its input.
     pub plane: Option<CutPlane>,
     /// How an `intersect` splits its input.

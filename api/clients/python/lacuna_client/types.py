@@ -890,4 +890,5 @@ With = TypedDict('With', {
     'point': 'NotRequired[list[float]]',
     'ray': 'NotRequired[list[float]]',
     'segment': 'NotRequired[list[float]]',
+    'self': 'NotRequired[Literal[True]]',
 })

@@ -4,9 +4,8 @@ use std::collections::HashSet;
 
 use glam::DVec3;
 
-use lacuna_fabrication::job::{CutPlane, Input, Job, JobKind, Operation, Params, Planes, Split, SplitKey, WallOrder, WallSide};
+use lacuna_fabrication::job::{CutPlane, Input, Job, JobKind, Operation, Params, Planes, Split, SplitKey, WallOrder, WallSide, With};
 use lacuna_kernel::budget::Limits;
-use lacuna_kernel::measure::contact::Primitive;
 use lacuna_kernel::model::Model;
 
 use super::grammar::{JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, LATER_KINDS, MOST_LEVEL, OPERATIONS, WALL_SIDES};
@@ -578,9 +577,9 @@ fn split(walker: &mut Walker<'_>, members: &Members<'_>) -> Option<Split> {
     Some(Split { volume_mm: stated(volume)?, cuts_mm: cuts?, key: key? })
 }
 
-/// The operation and the primitive, which intersect alone takes, and of which one rules out the other.
+/// The operation, and what a shape is held against, which intersect alone takes, and of which one rules out the other.
 #[allow(clippy::type_complexity)]
-fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<(Option<Operation>, Option<Primitive>)> {
+fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<(Option<Operation>, Option<With>)> {
     let owner = (JobKind::Intersect, "intersect");
     let places = [owned(walker, members, kind, "operation", owner), owned(walker, members, kind, "with", owner)];
     let mut legal = places.iter().all(Option::is_some);
@@ -591,9 +590,9 @@ fn operation(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKin
         legal = false;
     }
     let operation = members.get("operation").map(|place| walker.word(place, "an operation", &OPERATIONS));
-    let primitive = members.get("with").map(|place| with(walker, place));
-    let (operation, primitive) = (stated(operation)?, stated(primitive)?);
-    legal.then_some((operation, primitive))
+    let against = members.get("with").map(|place| with(walker, place));
+    let (operation, against) = (stated(operation)?, stated(against)?);
+    legal.then_some((operation, against))
 }
 
 /// The planes, which slice needs and no other kind takes.

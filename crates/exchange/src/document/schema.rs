@@ -91,7 +91,7 @@ fn named_schemas() -> Vec<(String, Value)> {
     schemas.push(("Matrix".into(), matrix_schema()));
     schemas.push(("Primitive".into(), primitive()));
     schemas.push(("Border".into(), exactly_one(object(&BORDER, &[]), &["side", "vertices", "boundaries"])));
-    schemas.push(("With".into(), exactly_one(object(&WITH, &[]), &super::with::PRIMITIVES.map(|(word, _)| word))));
+    schemas.push(("With".into(), exactly_one(object(&WITH, &[]), &super::with::words())));
     schemas.push(("JobInput".into(), exactly_one(object(&JOB_INPUT, &[]), &["model", "model_ref"])));
     schemas.push(("SolveRequest".into(), exactly_one(object(&SOLVE, &[]), &["model", "model_ref"])));
     schemas.push(("AddressQuestion".into(), address_question()));

@@ -1,5 +1,6 @@
 //! What a shape may be held against, as a word and numbers.
 
+use lacuna_fabrication::job::With;
 use lacuna_kernel::measure::contact::Primitive;
 
 use super::grammar::WITH;
@@ -8,8 +9,17 @@ use super::node::Place;
 use super::walk::Walker;
 use crate::diagnostic::code;
 
-/// The words, with how many numbers each takes.
+/// The words that take numbers, with how many.
 pub const PRIMITIVES: [(&str, usize); 7] = [("point", 3), ("segment", 6), ("ray", 6), ("line", 6), ("plane", 4), ("box", 6), ("ball", 4)];
+
+/// The word of the shape itself.
+pub const ITSELF: &str = "self";
+
+/// All words.
+#[must_use]
+pub fn words() -> Vec<&'static str> {
+    PRIMITIVES.iter().map(|(word, _)| *word).chain([ITSELF]).collect()
+}
 
 /// The primitive of a word and its numbers, in mm; `None` for another word or another count.
 #[must_use]
@@ -41,10 +51,17 @@ pub(super) fn numbers(primitive: &Primitive) -> (&'static str, Vec<f64>) {
     }
 }
 
-/// Reads a primitive.
-pub(super) fn with(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Primitive> {
+/// Reads what a shape is held against.
+pub(super) fn with(walker: &mut Walker<'_>, place: Place<'_>) -> Option<With> {
     let members = walker.object(place, &WITH)?;
-    one_of(walker, &members, &PRIMITIVES.map(|(word, _)| word), "what a shape is held against")?;
+    one_of(walker, &members, &words(), "what a shape is held against")?;
+    if let Some(place) = members.get(ITSELF) {
+        if walker.flag(place)? {
+            return Some(With::Itself);
+        }
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || "is false; write true, or leave \"with\" out".into());
+        return None;
+    }
     let (word, count) = PRIMITIVES.into_iter().find(|(word, _)| members.has(word))?;
     let place = members.get(word)?;
     let numbers = walker.each(place, "an array of numbers in mm", |walker, place| walker.number(place))?;
@@ -53,5 +70,5 @@ pub(super) fn with(walker: &mut Walker<'_>, place: Place<'_>) -> Option<Primitiv
         let given = numbers.len();
         walker.fault(&place, code::WRONG_LENGTH, || format!("has {given} numbers; a {word} takes {count}"));
     }
-    found
+    found.map(With::Primitive)
 }

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use super::join::SIDES;
 use glam::{DMat3, DVec2, DVec3, DVec4};
-use lacuna_fabrication::job::{Input, Job};
+use lacuna_fabrication::job::{Input, Job, With};
 use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{
     Adjacency, AffineMap, Bcifs, BcifsState, BezierCurve, Border, BorderPath, BoundaryRule, CellKind, Coefficients, ControlNet, Corner,
@@ -328,7 +328,7 @@ object! {
         .put_some("wall_mm", params.wall.map(|wall| Number(wall.thickness_mm)).as_ref())?
         .put_some("side", params.wall.map(|wall| wall.side).as_ref())?
         .put_some("operation", params.operation.as_ref())?
-        .put_some("with", params.with.as_ref().map(with).as_ref())?
+        .put_some("with", params.with.as_ref().map(Wire).as_ref())?
         .put_some("plane", params.plane.map(|plane| plane.normal.extend(plane.offset_mm).to_array().map(Number)).as_ref())?
         .put_some("volume_mm", params.split.as_ref().and_then(|split| split.volume_mm).map(|volume| volume.map(Number)).as_ref())?
         .put_some("cuts_mm", params.split.as_ref().filter(|split| split.cuts_mm.iter().any(|cuts| !cuts.is_empty())).map(|split| split.cuts_mm.each_ref().map(|cuts| cuts.iter().copied().map(Number).collect::<Vec<_>>())).as_ref())?
@@ -563,8 +563,16 @@ impl Serialize for Wire<'_, Entry> {
     }
 }
 
-/// A primitive as its one member.
-fn with(primitive: &lacuna_kernel::measure::Primitive) -> std::collections::BTreeMap<&'static str, Vec<Number>> {
-    let (word, numbers) = super::with::numbers(primitive);
-    std::collections::BTreeMap::from([(word, numbers.into_iter().map(Number).collect())])
+impl Serialize for Wire<'_, With> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut members = serializer.serialize_map(Some(1))?;
+        match self.0 {
+            With::Itself => members.serialize_entry(super::with::ITSELF, &true)?,
+            With::Primitive(primitive) => {
+                let (word, numbers) = super::with::numbers(primitive);
+                members.serialize_entry(word, &numbers.into_iter().map(Number).collect::<Vec<_>>())?;
+            }
+        }
+        members.end()
+    }
 }

@@ -12,7 +12,7 @@ pub mod thickness;
 pub mod triangle;
 
 pub use bounds::{AxisBox, bounding_box, extent_along};
-pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive};
+pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive, intersect_self};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use enclosed::{NotEnclosed, enclosed_volume};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};

@@ -111,6 +111,11 @@ pub(in super::super) const WITH: Object = Object {
         optional("plane", "Its normal of any length, and its distance from the origin along that.", numbers!(4)),
         optional("box", "Its lower and its upper corner: with all points within.", numbers!(6)),
         optional("ball", "Its centre and its radius: with all points within.", numbers!(4)),
+        optional(
+            "self",
+            "true: the shape itself. Where does it come near itself although no boundary that the model declares joins it there?",
+            || json!({ "const": true }),
+        ),
     ],
 };
 

@@ -112,6 +112,11 @@ impl Start {
         self.drawn[state.index()]
     }
 
+    /// How many cells the roots' boundaries are.
+    pub(crate) fn count(&self) -> usize {
+        self.cells.len()
+    }
+
     /// Which cell of the complex a root shows at a position of its closure, and how it views it.
     pub(crate) fn cell_of(&self, root: usize, cell: usize) -> (u32, View) {
         let seen = self.roots[root][cell];

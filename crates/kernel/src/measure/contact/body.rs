@@ -105,6 +105,21 @@ impl Body {
         Gap { low: (low - slack).max(0.0), high: if meets { 0.0 } else { high + slack }, direction, within }
     }
 
+    /// The middle of the closest points of the sites of both, up to rounding.
+    pub(super) fn middle(&self, other: &Self) -> Point {
+        let pairs = self.sites.iter().flat_map(|mine| other.sites.iter().map(move |its| closest_pair(mine, its)));
+        let closest = pairs.min_by(|a, b| distance_squared(&a.0, &a.1).total_cmp(&distance_squared(&b.0, &b.1)));
+        closest.map_or(self.ball.centre, |(x, y)| along(&x, &y, 0.5))
+    }
+
+    /// The corners of the triangle that it is exactly; `None` for anything else, and for a triangle without area.
+    pub(super) fn exact_triangle(&self) -> Option<&[Point; 3]> {
+        match (self.nature, self.sites.as_slice()) {
+            (Nature::Exact, [Site::Triangle(corners)]) if !is_flat(corners) => Some(corners),
+            _ => None,
+        }
+    }
+
     /// The distance of a point in the box from its nearest side; negative outside.
     fn depth(&self, x: &Point) -> f64 {
         (0..3).map(|axis| (x[axis] - self.low[axis]).min(self.high[axis] - x[axis])).fold(f64::INFINITY, f64::min)

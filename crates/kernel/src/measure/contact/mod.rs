@@ -5,6 +5,7 @@
 //! simplices, which are exact. A shape is its points: a model that stands for a solid is the solid's surface.
 
 mod body;
+mod pieces;
 mod place;
 mod primitive;
 mod search;
@@ -135,6 +136,22 @@ pub enum ContactError {
     /// Cells of trimmed surfaces are not searched.
     #[error("a model has a trimmed surface, whose cells cannot be searched; remove \"trim\" to compare the whole surface")]
     Trimmed,
+    /// Nothing of a shape can touch anything of it at this resolution.
+    #[error(
+        "at a tolerance of {resolution_mm} mm the shape is one piece, or pieces that declared boundaries join near each other: there are no two that could touch; a smaller tolerance looks closer"
+    )]
+    Whole {
+        /// The resolution, in mm.
+        resolution_mm: f64,
+    },
+    /// A limit ended the search before there was anything to tell.
+    #[error(
+        "a limit ended the search at a tolerance of {resolution_mm} mm before two pieces were found that nothing joins; give a larger tolerance"
+    )]
+    Unsettled {
+        /// The resolution, in mm.
+        resolution_mm: f64,
+    },
     /// Somebody stopped the search.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -146,6 +163,7 @@ impl ContactError {
     pub fn kind(&self) -> Kind {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
+            Self::Unsettled { .. } => Kind::Limit,
             _ => Kind::Invalid,
         }
     }
@@ -157,6 +175,8 @@ impl ContactError {
             Self::Query { .. } => "contact.query",
             Self::Resolution(_) => "params.not-a-length",
             Self::Trimmed => "contact.trimmed",
+            Self::Whole { .. } => "contact.whole",
+            Self::Unsettled { .. } => "contact.unsettled",
             Self::Stopped(stopped) => stopped.code(),
         }
     }
@@ -193,4 +213,33 @@ pub fn intersect_primitive(
     let tree = tree(shape, budget)?;
     let (body, size) = primitive.body(&tree.node(0).body.ball)?;
     search::search(tree, Tree::of_primitive(body, size), query, budget)
+}
+
+/// Where a shape comes within the resolution of itself although nothing declares it, and the distance of its pieces that
+/// nothing joins.
+///
+/// Let t be the resolution. The shape is cut into *pieces*: the first cells, from the roots on, whose balls have a radius of
+/// at most 4 t, and simplices of any size. Two different pieces are *joined*
+///
+/// * when they share a cell of their boundaries: the B-rep of the model says so, whose incidences, adjacencies and gluings
+///   are followed exactly; corners of given simplices are shared when their coordinates are the same numbers. Of two
+///   triangles it must be all that they have in common, which exact signs decide;
+/// * or when they have no proven common point, and a chain of pieces leads from one to the other, each of which shares such a
+///   cell with the next, and all but the two lie in the ball of radius 16 t around the middle of the closest points of what
+///   stands for the two: simplices, chords, polygons, or the centres of their balls.
+///
+/// All other pairs of pieces count, and the answer is that of [`intersect`] for them: places where two of them come within t,
+/// and the least of their distances, which lies in the interval that is told. [`Verdict::Disjoint`] is the proof that none of
+/// them meet. A model that declares no boundaries, as plain iterated function systems do, has no joined pieces: all of its
+/// contacts count. Folds and loops smaller than pieces are not seen. Arms of an angle below about 1 / 16 count as near, as the
+/// way around by their tip is long. Where a shape hangs together, pieces farther along it than the chains reach are not joined,
+/// so that their least distance is at most about 32 t; a model that declares boundaries is searched beyond t only as far as
+/// some thousand pairs take, which may leave the interval wide.
+///
+/// Cost: proportional to the pieces, and to the pairs of cells that are as near as the nearest or as the resolution.
+///
+/// # Errors
+/// As [`intersect`], and when no two pieces are apart, or a limit ended the search before two were found.
+pub fn intersect_self(shape: &Attractor, query: &ContactQuery, budget: &Budget) -> Result<Contact, ContactError> {
+    search::search_self(tree(shape, budget)?, query, budget)
 }

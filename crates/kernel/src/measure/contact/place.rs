@@ -56,7 +56,7 @@ impl Gathered {
 /// # Errors
 /// [`Stopped`] when the budget's token was fired.
 pub(super) fn places(
-    trees: &[Tree<'_>; 2],
+    trees: [&Tree<'_>; 2],
     found: &[Found],
     resolution_mm: f64,
     slack: f64,

@@ -7,8 +7,14 @@
 //!
 //! Besides the bounds of [`super::body`], the slab along the line between the closest sites is used: the least n.y over one
 //! cell less the largest n.x over the other. It knows that cells are flat or thin where balls do not.
+//!
+//! A shape against itself is one tree, and begins with the pair of the whole with itself. The pair of a node with itself
+//! stands for the pairs of different pieces below it, and is refined into those of its children; see `pieces` for which pairs
+//! of pieces are left out. Pairs of cells above the pieces may hold such that are, so they are no upper bounds where a shape
+//! declares boundaries.
 
 use super::body::Gap;
+use super::pieces::{Pieces, Relation};
 use super::place::{Found, places};
 use super::tree::{NodeId, Tree};
 use super::{CellPair, Contact, ContactError, ContactQuery};
@@ -49,6 +55,10 @@ impl Ord for Pair {
 const MOST_PAIRS: u64 = 4_000_000;
 const MOST_BYTES: u64 = 512 << 20;
 
+/// Pairs beyond the resolution to look at, at most, where pieces may be joined: most of those that are nearer than the nearest
+/// are, and are found to be one by one.
+const MOST_FAR: u64 = 20_000;
+
 /// What to do with a pair.
 enum Step {
     /// It is as small as it has to be.
@@ -60,7 +70,10 @@ enum Step {
 }
 
 struct Search<'a> {
-    trees: [Tree<'a>; 2],
+    /// The tree of the first cells and that of the second, or one of both.
+    trees: Vec<Tree<'a>>,
+    /// What a shape is cut into that is held against itself.
+    pieces: Option<Pieces>,
     resolution_mm: f64,
     slack: f64,
     /// Pairs within the resolution, the next one last.
@@ -74,54 +87,121 @@ struct Search<'a> {
 
 /// The places and the distance of two trees.
 pub(super) fn search(first: Tree<'_>, second: Tree<'_>, query: &ContactQuery, budget: &Budget) -> Result<Contact, ContactError> {
-    if query.most == 0 {
-        return Err(ContactError::Query { name: "most", value: 0.0, expected: "one pair of cells or more" });
-    }
-    let nodes = [first.some_cell(0), second.some_cell(0)];
-    let mut search = Search {
-        slack: first.slack + second.slack,
-        trees: [first, second],
-        resolution_mm: query.resolution.mm(),
-        near: Vec::new(),
-        queue: BinaryHeap::new(),
-        looked: 0,
-        nearest: Found { nodes, distance_mm: Interval { low: 0.0, high: f64::INFINITY } },
-    };
+    let mut search = Search::new(vec![first, second], query)?;
     // Before the groups of roots: so there is an upper bound, whatever ends the search.
-    search.look(nodes, 0.0);
+    search.look(search.nearest.nodes, 0.0);
     search.near.clear();
     search.queue.clear();
-    search.look([0, 0], 0.0);
-    let mut found = Vec::new();
-    let (low, complete) = search.run(query, budget, &mut found)?;
-    let distance_mm = Interval { low: low.min(search.nearest.distance_mm.high), high: search.nearest.distance_mm.high };
-    let mut places = places(&search.trees, &found, search.resolution_mm, search.slack, budget, |pair| search.described(pair))?;
-    if let (true, [only]) = (complete, places.as_mut_slice()) {
-        // The closest points are nowhere else, even if what proves their distance is a larger pair.
-        only.distance_mm.high = only.distance_mm.high.min(distance_mm.high);
-    }
-    Ok(Contact { distance_mm, nearest: search.described(&search.nearest), places, complete })
+    search.contact(query, budget)
 }
 
-impl Search<'_> {
+/// The places and the distance of different pieces of one tree that nothing joins nearby.
+pub(super) fn search_self(mut tree: Tree<'_>, query: &ContactQuery, budget: &Budget) -> Result<Contact, ContactError> {
+    let pieces = Pieces::new(&mut tree, query.resolution.mm(), most_pairs(budget), most_bytes(budget), budget)?;
+    let mut search = Search::new(vec![tree], query)?;
+    // Some pieces that nothing joins, so that there is an upper bound.
+    let (first, others) = pieces.some_against_all();
+    search.pieces = Some(pieces);
+    for other in others {
+        budget.cancel.check()?;
+        search.look([first, other], 0.0);
+    }
+    search.near.clear();
+    search.queue.clear();
+    search.looked = 0;
+    search.contact(query, budget)
+}
+
+fn most_pairs(budget: &Budget) -> u64 {
+    budget.limits.cells.min(MOST_PAIRS)
+}
+
+fn most_bytes(budget: &Budget) -> u64 {
+    budget.limits.memory_bytes.min(MOST_BYTES)
+}
+
+impl<'a> Search<'a> {
+    fn new(trees: Vec<Tree<'a>>, query: &ContactQuery) -> Result<Self, ContactError> {
+        if query.most == 0 {
+            return Err(ContactError::Query { name: "most", value: 0.0, expected: "one pair of cells or more" });
+        }
+        let mut search = Self {
+            slack: 0.0,
+            trees,
+            pieces: None,
+            resolution_mm: query.resolution.mm(),
+            near: Vec::new(),
+            queue: BinaryHeap::new(),
+            looked: 0,
+            nearest: Found { nodes: [0; 2], distance_mm: Interval { low: 0.0, high: f64::INFINITY } },
+        };
+        search.slack = search.tree(0).slack + search.tree(1).slack;
+        search.nearest.nodes = [0, 1].map(|side| search.tree(side).some_cell(0));
+        Ok(search)
+    }
+
+    /// The tree of the first or of the second cells.
+    fn tree(&self, side: usize) -> &Tree<'a> {
+        &self.trees[side.min(self.trees.len() - 1)]
+    }
+
+    fn contact(mut self, query: &ContactQuery, budget: &Budget) -> Result<Contact, ContactError> {
+        self.look([0, 0], 0.0);
+        let mut found = Vec::new();
+        let (low, complete) = self.run(query, budget, &mut found)?;
+        let complete = complete && self.pieces.as_ref().is_none_or(Pieces::complete);
+        let high = self.nearest.distance_mm.high;
+        if high == f64::INFINITY {
+            let resolution_mm = self.resolution_mm;
+            return Err(if complete && self.queue.is_empty() {
+                ContactError::Whole { resolution_mm }
+            } else {
+                ContactError::Unsettled { resolution_mm }
+            });
+        }
+        let distance_mm = Interval { low: low.min(high), high };
+        let trees = [self.tree(0), self.tree(1)];
+        let mut places = places(trees, &found, self.resolution_mm, self.slack, budget, |pair| self.described(pair))?;
+        if let (true, [only]) = (complete, places.as_mut_slice()) {
+            // The closest points are nowhere else, even if what proves their distance is a larger pair.
+            only.distance_mm.high = only.distance_mm.high.min(distance_mm.high);
+        }
+        Ok(Contact { distance_mm, nearest: self.described(&self.nearest), places, complete })
+    }
+
     /// Finds the pairs that remain. The lower end of the distance, and whether all were found.
     fn run(&mut self, query: &ContactQuery, budget: &Budget, found: &mut Vec<Found>) -> Result<(f64, bool), ContactError> {
-        let most_pairs = budget.limits.cells.min(MOST_PAIRS);
-        let most_bytes = budget.limits.memory_bytes.min(MOST_BYTES);
-        let (mut lower, mut complete) = (None, true);
+        let (most_pairs, most_bytes) = (most_pairs(budget), most_bytes(budget));
+        let (mut lower, mut complete, mut far) = (None, true, None);
         while let Some(pair) = self.near.pop().or_else(|| self.queue.pop().map(|entry| entry.0)) {
             if lower.is_some() && pair.low > self.resolution_mm {
                 break;
             }
-            let bytes =
-                self.trees[0].bytes + self.trees[1].bytes + ((self.near.len() + self.queue.len()) * std::mem::size_of::<Pair>()) as u64;
+            let pairs = ((self.near.len() + self.queue.len()) * std::mem::size_of::<Pair>()) as u64;
+            let bytes = self.trees.iter().map(|tree| tree.bytes).sum::<u64>() + pairs;
             if self.looked > most_pairs || bytes > most_bytes {
                 return Ok((self.least(lower, &pair), false));
             }
+            if pair.low > self.resolution_mm && self.pieces.as_ref().is_some_and(Pieces::may_be_joined) {
+                let since = *far.get_or_insert(self.looked);
+                if self.looked > since + MOST_FAR {
+                    let low = pair.low;
+                    self.queue.push(Reverse(pair));
+                    return Ok((low, complete));
+                }
+            }
             budget.cancel.check()?;
+            if self.pieces.is_some() && pair.nodes[0] == pair.nodes[1] {
+                let children = self.trees[0].children(pair.nodes[0]);
+                for first in children.clone().rev() {
+                    (first..children.end).rev().for_each(|second| self.look([first, second], 0.0));
+                }
+                continue;
+            }
             let step = self.step(&pair);
             if let Step::Split(side) = step {
-                for child in self.trees[side].children(pair.nodes[side]).rev() {
+                let tree = side.min(self.trees.len() - 1);
+                for child in self.trees[tree].children(pair.nodes[side]).rev() {
                     let mut nodes = pair.nodes;
                     nodes[side] = child;
                     self.look(nodes, pair.low);
@@ -137,8 +217,8 @@ impl Search<'_> {
             }
             lower = Some(lower.map_or(pair.low, |low: f64| low.min(pair.low)));
         }
-        // A pair that holds the closest points is never dropped, so one was kept.
-        Ok((lower.unwrap_or(0.0), complete && lower.is_some()))
+        // A pair that holds the closest points is never dropped, so one was kept, if there are any.
+        Ok((lower.unwrap_or(0.0), complete))
     }
 
     /// The lower end of the distance when the search ends at a pair: the others in the queue are no nearer than one of
@@ -148,19 +228,19 @@ impl Search<'_> {
     }
 
     /// Where the two may be a place, both cells are refined until their radii are as small as the resolution; elsewhere
-    /// it is enough that their sites are as near to them.
+    /// it is enough that their sites are as near to them, of cells of which no pieces may be joined.
     fn step(&self, pair: &Pair) -> Step {
         if pair.within && !self.nodes(pair).iter().any(|&(tree, id)| tree.node(id).is_group()) {
             return Step::Keep;
         }
-        let far = pair.low > self.resolution_mm;
+        let far = pair.low > self.resolution_mm && self.pieces.as_ref().is_none_or(|pieces| pieces.are_all_apart(pair.nodes));
         let size = |side: usize| {
             let (tree, id) = self.nodes(pair)[side];
             let body = &tree.node(id).body;
             let size = if far { body.error.min(body.ball.radius) } else { body.ball.radius };
             (tree.node(id).is_group() || (tree.subdivides(id) && size > self.resolution_mm)).then_some(body.ball.radius)
         };
-        let splittable = |side: usize| size(side).filter(|_| self.trees[side].is_splittable(pair.nodes[side]));
+        let splittable = |side: usize| size(side).filter(|_| self.tree(side).is_splittable(pair.nodes[side]));
         match (splittable(0), splittable(1)) {
             (Some(first), Some(second)) => Step::Split(usize::from(second > first)),
             (Some(_), None) => Step::Split(0),
@@ -170,39 +250,63 @@ impl Search<'_> {
         }
     }
 
-    fn nodes(&self, pair: &Pair) -> [(&Tree<'_>, NodeId); 2] {
-        [(&self.trees[0], pair.nodes[0]), (&self.trees[1], pair.nodes[1])]
+    fn nodes(&self, pair: &Pair) -> [(&Tree<'a>, NodeId); 2] {
+        [0, 1].map(|side| (self.tree(side), pair.nodes[side]))
     }
 
     /// Bounds a pair's distance, no lower than `least`, and puts it into the queue if it matters.
     fn look(&mut self, nodes: [NodeId; 2], least: f64) {
         self.looked += 1;
-        let [a, b] = [self.trees[0].node(nodes[0]), self.trees[1].node(nodes[1])];
-        let Gap { mut low, high, direction, within } = a.body.gap(&b.body, self.slack);
-        if !a.is_group() && !b.is_group() && high < self.nearest.distance_mm.high {
+        if self.pieces.is_some() && nodes[0] == nodes[1] {
+            self.look_into(nodes[0]);
+            return;
+        }
+        let [a, b] = [self.tree(0).node(nodes[0]), self.tree(1).node(nodes[1])];
+        let Gap { mut low, mut high, direction, within } = a.body.gap(&b.body, self.slack);
+        let size = a.body.ball.radius.max(b.body.ball.radius);
+        let mut bounds = !a.is_group() && !b.is_group();
+        if let Some(pieces) = &mut self.pieces {
+            if low.max(least) > self.resolution_mm.max(self.nearest.distance_mm.high) {
+                return;
+            }
+            bounds &= pieces.are_all_apart(nodes);
+            match pieces.relation(&self.trees[0], nodes, low, high) {
+                Relation::Joined => return,
+                Relation::Crossing => (low, high) = (0.0, 0.0),
+                Relation::Apart => {}
+            }
+        }
+        if bounds && high < self.nearest.distance_mm.high {
             self.nearest = Found { nodes, distance_mm: Interval { low: low.max(least).min(high), high } };
         }
         let farthest = self.resolution_mm.max(self.nearest.distance_mm.high);
         if let Some(direction) = direction.filter(|_| high > 0.0 && low <= farthest) {
-            let slab = -self.trees[1].reach(nodes[1], &direction.map(|x| -x)) - self.trees[0].reach(nodes[0], &direction);
+            let slab = -self.tree(1).reach(nodes[1], &direction.map(|x| -x)) - self.tree(0).reach(nodes[0], &direction);
             low = low.max(slab - self.slack);
         }
         low = low.max(least).min(high);
         if low <= farthest {
-            let size = a.body.ball.radius.max(b.body.ball.radius);
             let pair = Pair { low, high, size, nodes, within };
             if low <= self.resolution_mm { self.near.push(pair) } else { self.queue.push(Reverse(pair)) }
         }
     }
 
+    /// Puts the pair of a node with itself into the queue, if it is more than one piece.
+    fn look_into(&mut self, node: NodeId) {
+        if self.pieces.as_ref().is_some_and(|pieces| pieces.is_above(node)) {
+            let size = self.trees[0].node(node).body.ball.radius;
+            self.near.push(Pair { low: 0.0, high: f64::INFINITY, size, nodes: [node; 2], within: false });
+        }
+    }
+
     fn described(&self, pair: &Found) -> CellPair {
         let ball = |side: usize| {
-            let ball = self.trees[side].node(pair.nodes[side]).body.ball;
+            let ball = self.tree(side).node(pair.nodes[side]).body.ball;
             Ball { radius: ball.radius + self.slack, ..ball }
         };
         CellPair {
-            first: self.trees[0].address(pair.nodes[0]).unwrap_or_default(),
-            second: self.trees[1].address(pair.nodes[1]),
+            first: self.tree(0).address(pair.nodes[0]).unwrap_or_default(),
+            second: self.tree(1).address(pair.nodes[1]),
             first_cell: ball(0),
             second_cell: ball(1),
             distance_mm: pair.distance_mm,

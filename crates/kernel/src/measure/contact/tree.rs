@@ -125,6 +125,16 @@ impl<'a> Tree<'a> {
         &self.nodes[id as usize]
     }
 
+    /// The shape; none of a primitive.
+    pub(super) fn attractor(&self) -> Option<&'a Attractor> {
+        self.attractor
+    }
+
+    /// The cell of a node; none of a group or a primitive.
+    pub(super) fn cell(&self, id: NodeId) -> Option<&Cell> {
+        if let Content::Cell(cell, _) = &self.node(id).content { Some(cell) } else { None }
+    }
+
     /// Whether it has children: groups and cells that are no simplices, unless their address is as long as allowed.
     pub(crate) fn is_splittable(&self, id: NodeId) -> bool {
         self.node(id).is_group() || (self.node(id).depth < self.most_letters && self.subdivides(id))
