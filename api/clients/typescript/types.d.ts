@@ -871,7 +871,7 @@ export interface PlaceStatement {
 export interface Plan {
   /** Edge of the lattice's cubes. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
-  /** Peak memory in bytes, as it is on the fixtures as a rule; models whose cells overlap much take several times as much. */ memory_bytes: number;
+  /** Peak memory of the process that does the job, in bytes: what simplification of models whose cells overlap much takes besides is not in it. 0 where nothing is predicted. */ memory_bytes: number;
   /** Bytes of the lattice's mesh as binary STL. */ output_bytes: number;
   /** Triangles of the lattice's mesh, against which the limit of triangles is held; simplification leaves a tenth to a hundredth of them. */ triangles: number;
 }
