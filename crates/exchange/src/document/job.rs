@@ -186,6 +186,10 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
     Some(document)
 }
 
+/// What a measure delivers.
+const MEASURED: &str =
+    "measure delivers numbers, and with \"thickness\" the output \"ply\", its map on the surface; remove all other \"outputs\"";
+
 /// What depends on several members: an operation takes two inputs or more; two shapes, or one and a primitive, are held against each other as they are,
 /// and make no file.
 fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument) -> Option<()> {
@@ -212,11 +216,9 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
         _ => false,
     };
     if !compares {
-        let mapped = document.params.thickness && document.outputs.iter().all(|name| name == Format::Ply.facts().ending);
-        if let (JobKind::Measure, Some(place), false) = (document.kind, members.get("outputs"), mapped || document.outputs.is_empty()) {
-            walker.fault(&place, code::CONFLICTING_MEMBERS, || {
-                "measure delivers numbers, and with \"thickness\" the output \"ply\", its map on the surface; remove all other \"outputs\"".into()
-            });
+        let mapped = document.params.thickness || document.outputs.is_empty();
+        if let (JobKind::Measure, Some(place), false) = (document.kind, members.get("outputs"), mapped) {
+            walker.fault(&place, code::CONFLICTING_MEMBERS, || MEASURED.into());
             return None;
         }
         return Some(());
@@ -667,6 +669,10 @@ fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> 
         seen.push(name);
         Some(name.to_owned())
     })?;
+    if kind == Some(JobKind::Measure) && outputs.iter().any(|name| name != Format::Ply.facts().ending) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || MEASURED.into());
+        return None;
+    }
     for (index, name) in outputs.iter().enumerate() {
         let drawing = Format::from_name(name).is_some_and(Format::is_drawing);
         if kind.is_some_and(|kind| (kind == JobKind::Slice) != drawing) {
