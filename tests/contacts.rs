@@ -88,22 +88,22 @@ fn how_far_solids_are_from_each_other() {
 #[test]
 fn a_shape_and_itself() {
     let folder = Scratch::new();
-    let maps = folder.join("maps.json");
-    std::fs::write(&maps, library::find("koch_curve").unwrap().document).unwrap();
+    let turned = |angle: f64, x: f64, y: f64| json!({ "scale": 1.0 / 3.0, "angle_deg": angle, "translation": [x, y, 0.0] });
+    let four = [turned(0.0, 0.0, 0.0), turned(60.0, 30.0, 0.0), turned(-60.0, 45.0, 25.98076211353316), turned(0.0, 60.0, 0.0)];
+    let maps = write(&folder, "maps.json", &json!({ "family": "ifs", "maps": four }));
     let itself = |path: &Path| told(&["intersect", "--tolerance", "0.5", "--with", "self"], &[path])["contact"].clone();
     let found = itself(&maps);
     let places = found["places"].as_array().unwrap();
-    // 100 mm long: cells of 100, 33 and 11 mm are cut in four.
+    // 90 mm long: cells of 90, 30 and 10 mm are cut in four, and nothing is declared to join the 64 pieces.
     assert_eq!((&found["verdict"], places.len(), &found["complete"]), (&json!("near"), 63, &json!(true)));
     assert!(places.iter().all(|place| place["nearest"]["first"] != place["nearest"]["second"] && place["nearest"]["second"].is_string()));
-    let turned = |angle: f64, x: f64, y: f64| json!({ "scale": 1.0 / 3.0, "angle_deg": angle, "translation": [x, y, 0.0] });
     let curve = write(
         &folder,
         "curve.json",
         &json!({
             "family": "interpolation",
             "points": [[0, 0, 0], [30, 0, 0], [45, 25.98076211353316, 0], [60, 0, 0], [90, 0, 0]],
-            "maps": [turned(0.0, 0.0, 0.0), turned(60.0, 30.0, 0.0), turned(-60.0, 45.0, 25.98076211353316), turned(0.0, 60.0, 0.0)]
+            "maps": four
         }),
     );
     let found = itself(&curve);
