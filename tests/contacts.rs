@@ -114,7 +114,7 @@ fn a_shape_and_itself() {
     let job = |with: Value| json!({ "lacuna": 1, "kind": "intersect", "model": { "shape": model["shape"] }, "params": { "tolerance_mm": 0.5, "with": with } });
     let path = folder.join("job.json");
     std::fs::write(&path, job(json!({ "self": true })).to_string()).unwrap();
-    assert_eq!(told(&["run"], &[&path])["contact"], found);
+    assert_eq!(told(&["run", "--output"], &[&folder.join("made"), &path])["certificate"]["contact"], found);
     for (with, place) in
         [(json!({ "self": false }), "/params/with/self"), (json!({ "self": true, "point": [0, 0, 0] }), "/params/with/self")]
     {
