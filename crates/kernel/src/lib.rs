@@ -10,6 +10,7 @@ mod groups;
 pub mod levels;
 pub mod measure;
 pub mod model;
+mod order;
 pub mod solid;
 pub mod tessellation;
 pub mod tolerance;

@@ -14,7 +14,7 @@
 //! 1 + 2 m = (1 + 2 m_A)(1 + 2 m_B), exactly; with products of the factors' centres as centres, these too.
 
 use crate::automaton::{Automaton, Contraction, LeafPrimitive, State, StateId};
-use std::cmp::Ordering;
+use crate::order::ordered_by;
 use std::collections::BinaryHeap;
 
 /// Bound of a state's attractor in its barycentric space.
@@ -334,22 +334,7 @@ struct Branch {
     depth: i32,
 }
 
-impl PartialEq for Branch {
-    fn eq(&self, other: &Self) -> bool {
-        self.bound == other.bound
-    }
-}
-impl Eq for Branch {}
-impl PartialOrd for Branch {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Branch {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.bound.total_cmp(&other.bound)
-    }
-}
+ordered_by!(Branch, |this, other| this.bound.total_cmp(&other.bound));
 
 /// Work allowed to tighten the margin of one state, in multiplications.
 const MARGIN_WORK: f64 = 3e6;

@@ -5,8 +5,9 @@ use super::address::{Address, AddressError, point_at, rounding};
 use super::cell::{Ball, Cell, ControlPoint, Point, child_points, distance_squared};
 use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::Budget;
+use crate::order::ordered_by;
 use crate::tolerance::Tolerance;
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// What is sought near a point.
@@ -70,22 +71,7 @@ struct Candidate {
     points: Vec<ControlPoint>,
 }
 
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Candidate {}
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.lower.total_cmp(&other.lower).then(self.number.cmp(&other.number))
-    }
-}
+ordered_by!(Candidate, |this, other| this.lower.total_cmp(&other.lower).then(this.number.cmp(&other.number)));
 
 /// Cells to look at, at most, and the memory that they may take: a search is asked inside of a request.
 const MOST_CELLS: u64 = 2_000_000;

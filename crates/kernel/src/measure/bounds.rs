@@ -7,8 +7,8 @@ use crate::attractor::{Attractor, OwnRadius, StateBound};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
+use crate::order::ordered_by;
 use glam::DVec3;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// The box of a shape: lower and upper ends per axis, each an interval that contains the exact one, in mm.
@@ -68,23 +68,8 @@ struct Branch {
     window: Option<Window>,
 }
 
-impl PartialEq for Branch {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Branch {}
-impl PartialOrd for Branch {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Branch {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // Among equal bounds the smaller cell first: it ends the search sooner.
-        self.bound.total_cmp(&other.bound).then(other.cell.ball.radius.total_cmp(&self.cell.ball.radius))
-    }
-}
+// Among equal bounds the smaller cell first: it ends the search sooner.
+ordered_by!(Branch, |this, other| this.bound.total_cmp(&other.bound).then(other.cell.ball.radius.total_cmp(&this.cell.ball.radius)));
 
 /// Expansions allowed per direction: the interval is wider when they do not suffice.
 const EXPANSIONS: usize = 20_000;

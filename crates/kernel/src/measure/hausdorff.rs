@@ -18,10 +18,11 @@ use super::contact::{Body, ContactError, Nature, NodeId, Tree, corners, tree};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Ball, Point, Site, distance_squared};
 use crate::budget::Budget;
+use crate::order::ordered_by;
 use crate::solid::{Inside, TriMesh};
 use crate::tolerance::Tolerance;
 use glam::DVec3;
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// How far the points of a shape are from another, at most.
@@ -106,22 +107,7 @@ struct Piece {
     own: Vec<NodeId>,
 }
 
-impl PartialEq for Piece {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Piece {}
-impl PartialOrd for Piece {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Piece {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.high.total_cmp(&other.high).then(other.number.cmp(&self.number))
-    }
-}
+ordered_by!(Piece, |this, other| this.high.total_cmp(&other.high).then(other.number.cmp(&this.number)));
 
 struct Search<'a> {
     first: Tree<'a>,
@@ -344,22 +330,7 @@ struct Near {
     id: NodeId,
 }
 
-impl PartialEq for Near {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Near {}
-impl PartialOrd for Near {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Near {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.low.total_cmp(&other.low).then(self.id.cmp(&other.id))
-    }
-}
+ordered_by!(Near, |this, other| this.low.total_cmp(&other.low).then(this.id.cmp(&other.id)));
 
 /// The mean of the corners.
 fn middle(site: &Site) -> Point {

@@ -10,8 +10,8 @@
 
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
+use crate::order::ordered_by;
 use glam::{DMat3, DVec3};
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::rc::Rc;
 
@@ -51,23 +51,8 @@ struct Cube {
     points: Rc<Vec<u32>>,
 }
 
-impl PartialEq for Cube {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Cube {}
-impl PartialOrd for Cube {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Cube {
-    /// The least bound first, then the earliest.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.bound.total_cmp(&self.bound).then(other.index.cmp(&self.index))
-    }
-}
+// The least bound first, then the earliest.
+ordered_by!(Cube, |this, other| other.bound.total_cmp(&this.bound).then(other.index.cmp(&this.index)));
 
 /// The rotation by a vector's length about its direction.
 fn rotation(vector: DVec3) -> DMat3 {

@@ -7,8 +7,8 @@
 //! proven u. Closed paths met on the way give the lower bound.
 
 use super::super::matrix::Dense;
+use crate::order::ordered_by;
 use std::borrow::Cow;
-use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
 
 /// The norm that a search works in.
@@ -103,22 +103,7 @@ struct Path<'a> {
     serial: usize,
 }
 
-impl PartialEq for Path<'_> {
-    fn eq(&self, other: &Self) -> bool {
-        self.serial == other.serial
-    }
-}
-impl Eq for Path<'_> {}
-impl PartialOrd for Path<'_> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Path<'_> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.rate.total_cmp(&other.rate).then(other.serial.cmp(&self.serial))
-    }
-}
+ordered_by!(Path<'_>, |this, other| this.rate.total_cmp(&other.rate).then(other.serial.cmp(&this.serial)));
 
 struct Search<'a> {
     steps: &'a [Vec<Step>],

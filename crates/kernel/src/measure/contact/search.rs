@@ -21,7 +21,8 @@ use super::{CellPair, Contact, ContactError, ContactQuery};
 use crate::attractor::cell::Ball;
 use crate::budget::Budget;
 use crate::measure::Interval;
-use std::cmp::{Ordering, Reverse};
+use crate::order::ordered_by;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// A pair in the queue.
@@ -34,22 +35,7 @@ struct Pair {
     within: bool,
 }
 
-impl PartialEq for Pair {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Pair {}
-impl PartialOrd for Pair {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Pair {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.low.total_cmp(&other.low).then(self.size.total_cmp(&other.size)).then(self.nodes.cmp(&other.nodes))
-    }
-}
+ordered_by!(Pair, |this, other| this.low.total_cmp(&other.low).then(this.size.total_cmp(&other.size)).then(this.nodes.cmp(&other.nodes)));
 
 /// Pairs to look at, at most, and the memory that cells and pairs may take: a search is asked inside of a request.
 const MOST_PAIRS: u64 = 4_000_000;

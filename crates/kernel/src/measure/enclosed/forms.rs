@@ -9,7 +9,7 @@
 use super::double::{Double, Number, UNIT};
 use crate::automaton::SubdivisionOperator;
 use crate::budget::{Budget, Stopped};
-use std::cmp::Ordering;
+use crate::order::ordered_by;
 use std::collections::BinaryHeap;
 
 /// An operator on differences from one control point of the parent, its base, to those from one of the child.
@@ -308,22 +308,7 @@ struct Word {
     matrix: Dense,
 }
 
-impl PartialEq for Word {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Word {}
-impl PartialOrd for Word {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Word {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.factor.total_cmp(&other.factor).then(other.number.cmp(&self.number))
-    }
-}
+ordered_by!(Word, |this, other| this.factor.total_cmp(&other.factor).then(other.number.cmp(&this.number)));
 
 /// Entries of the matrices of all words that one search may form.
 const MOST_ENTRIES: usize = 1 << 25;

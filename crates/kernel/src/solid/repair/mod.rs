@@ -124,7 +124,7 @@ impl RepairError {
 
 /// Repairs a mesh: vertices at the same place are joined, triangles without area and copies are taken away, triangles are turned so that material lies behind them,
 /// and corners are doubled where parts meet in edges or corners only. A mesh that is a solid already and whose shells look where they should is left as it is.
-/// Cost: n log n, about 3 us a triangle.
+/// Cost: n log n.
 ///
 /// # Errors
 /// [`RepairError`] with the first place, and a corner that names no vertex as [`RepairError::NoSolid`].
