@@ -29,6 +29,11 @@ fn build() -> PathBuf {
     // The whole workspace, so that features are those that the tests were built with, and little is built twice.
     let mut command = Command::new(cargo);
     command.args(["build", "--quiet", "--locked", "--workspace", "--bin", "lacuna", "--profile", profile, "--target-dir"]);
+    // What cargo says of the package under test is nothing to this build; build scripts that ask for such variables, as ring's does, would run anew, and all that depends on them be built again.
+    let of_package = |name: &str| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_");
+    env::vars_os().map(|(name, _)| name).filter(|name| name.to_str().is_some_and(of_package)).for_each(|name| {
+        command.env_remove(name);
+    });
     let built = command.arg(folder.parent().unwrap()).current_dir(root()).output().unwrap();
     assert!(built.status.success(), "the command could not be built:\n{}", String::from_utf8_lossy(&built.stderr));
     folder.join(format!("lacuna{EXE_SUFFIX}"))
