@@ -13,6 +13,7 @@
 
 use super::critical::Critical;
 use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored};
+use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
@@ -204,8 +205,13 @@ pub(super) struct Workshop<'a> {
     corners: Vec<u32>,
     numbers: Vec<u32>,
     critical: Critical,
+    /// Whether critical points are looked for, and the surface is made.
+    searches: bool,
+    emits: bool,
     /// Middle of the sub-block, and how far around it all sites are known.
     known: (Point, f64),
+    /// The cubes of the sub-block that are looked at, by their offset from its first.
+    cubes: Vec<[i64; 3]>,
     leaves: Vec<Cube>,
     names: NameMap<VertexName, u32>,
 }
@@ -246,7 +252,10 @@ impl<'a> Workshop<'a> {
             corners: Vec::new(),
             numbers: Vec::new(),
             critical: Critical::default(),
+            searches: true,
+            emits: true,
             known: ([0.0; 3], 0.0),
+            cubes: Vec::new(),
             leaves: Vec::new(),
             names: NameMap::default(),
         }
@@ -257,6 +266,7 @@ impl<'a> Workshop<'a> {
         &mut self,
         setting: &Setting,
         grading: &Grading,
+        task: Task<'_>,
         first_cube: [i64; 3],
         candidates: &Candidates,
         open: &[u32],
@@ -265,12 +275,18 @@ impl<'a> Workshop<'a> {
         self.fine.clear();
         self.names.clear();
         self.seed = None;
+        (self.searches, self.emits) = (task.searches(), task.emits());
         let starts = self.tree.reset(candidates);
         let mut surface = BlockSurface { first_cube, ..BlockSurface::default() };
         for k in (0..SIDE).step_by(SUB) {
             for j in (0..SIDE).step_by(SUB) {
                 for i in (0..SIDE).step_by(SUB) {
-                    self.sub_block(setting, grading, &starts, open, [i, j, k], &mut surface);
+                    let first = std::array::from_fn(|axis| first_cube[axis] + [i, j, k][axis] as i64);
+                    self.cubes.clear();
+                    self.cubes.extend(cubes(SUB).filter(|&local| task.is_about(&moved(first, local))));
+                    if !self.cubes.is_empty() {
+                        self.sub_block(setting, grading, &starts, open, first, &mut surface);
+                    }
                 }
             }
         }
@@ -289,19 +305,18 @@ impl<'a> Workshop<'a> {
         self.tree.exhausted
     }
 
-    /// A sub-block: skipped when its middle is too far from the surface for any of its tetrahedra.
+    /// The chosen cubes of a sub-block: skipped when its middle is too far from the surface for any of its tetrahedra.
     fn sub_block(
         &mut self,
         setting: &Setting,
         grading: &Grading,
         starts: &[NodeId],
         open: &[u32],
-        first: [usize; 3],
+        first: [i64; 3],
         surface: &mut BlockSurface,
     ) {
         // Its vertices span the corners 0 to SUB and centres -1/2 to SUB + 1/2.
         let half = 0.5 * SUB as f64;
-        let first: [i64; 3] = std::array::from_fn(|axis| surface.first_cube[axis] + first[axis] as i64);
         let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
         let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
         // Farther away no vertex is covered, and no critical point has a value below r.
@@ -317,25 +332,21 @@ impl<'a> Workshop<'a> {
         self.near = near;
         self.known = (middle, setting.sight + half);
         self.gather_solids(starts, open, &middle, half);
-        let mut leaves = std::mem::take(&mut self.leaves);
+        let (chosen, mut leaves) = (std::mem::take(&mut self.cubes), std::mem::take(&mut self.leaves));
         let plain = if setting.dense { grading.plain(first, SUB) } else { Plain::default() };
-        for k in 0..SUB as i64 {
-            for j in 0..SUB as i64 {
-                for i in 0..SUB as i64 {
-                    let cube = Cube { level: 0, index: [first[0] + i, first[1] + j, first[2] + k] };
-                    if plain.contains([i, j, k]) {
-                        self.plain_cube(setting, cube, surface);
-                        continue;
-                    }
-                    leaves.clear();
-                    grading.leaves(cube, &mut leaves);
-                    for &leaf in &leaves {
-                        grading.tetrahedra(leaf, &mut |numbers| self.tetrahedron(setting, numbers, leaf.level, surface));
-                    }
-                }
+        for &local in &chosen {
+            let cube = Cube { level: 0, index: moved(first, local) };
+            if plain.contains(local) {
+                self.plain_cube(setting, cube, surface);
+                continue;
+            }
+            leaves.clear();
+            grading.leaves(cube, &mut leaves);
+            for &leaf in &leaves {
+                grading.tetrahedra(leaf, &mut |numbers| self.tetrahedron(setting, numbers, leaf.level, surface));
             }
         }
-        self.leaves = leaves;
+        (self.cubes, self.leaves) = (chosen, leaves);
     }
 
     /// The tetrahedra of a cube among others of its size where points stand for cells, in the order of [`Grading::tetrahedra`]: most have all vertices
@@ -528,18 +539,22 @@ impl<'a> Workshop<'a> {
         let whole = smooth >> WHOLE & 1 == 1;
         if whole && frame.covered != 0 {
             // What one site leaves has no critical point: see `is_steep`.
-            self.march(&frame, surface);
+            if self.emits {
+                self.march(&frame, surface);
+            }
             return;
         }
         if self.cut_sites(setting, &frame) == Cut::Empty {
             // The solid's other parts lie in what sites cover.
             return;
         }
-        let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
-        if !self.has_witness(setting, &frame, &rest) {
-            self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
+        if self.searches {
+            let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
+            if !self.has_witness(setting, &frame, &rest) {
+                self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
+            }
         }
-        if frame.covered == 0 {
+        if frame.covered == 0 || !self.emits {
             return;
         }
         for simplex in smooth::largest(smooth, frame.covered) {
@@ -600,8 +615,10 @@ impl<'a> Workshop<'a> {
         if frame.covered == 0 {
             return;
         }
-        if frame.is_close(setting, &self.tree) || self.is_served(setting, frame) {
-            self.march(frame, surface);
+        if !self.searches || frame.is_close(setting, &self.tree) || self.is_served(setting, frame) {
+            if self.emits {
+                self.march(frame, surface);
+            }
         } else {
             surface.critical.extend(frame.cubes());
         }
@@ -885,6 +902,15 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     let mut ends = (0..4).filter(|k| (faces | first ^ second) >> k & 1 == 0);
     let [p, q] = [ends.next()?, ends.next()?].map(|k| (k, values[k]));
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
+}
+
+/// The places of a cube of cubes.
+fn cubes(side: usize) -> impl Iterator<Item = [i64; 3]> {
+    (0..side.pow(3)).map(move |code| [code % side, code / side % side, code / side / side].map(|x| x as i64))
+}
+
+fn moved(at: [i64; 3], by: [i64; 3]) -> [i64; 3] {
+    std::array::from_fn(|axis| at[axis] + by[axis])
 }
 
 /// Steps of a walk away from nearest sites.

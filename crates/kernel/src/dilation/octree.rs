@@ -2,8 +2,8 @@
 //! their cells, cells are expanded only as far as the cube's size asks.
 
 use super::DilationError;
-use super::block::{BlockSurface, SIDE, Workshop, signed_side};
-use super::lattice::Grading;
+use super::block::{BlockSurface, NameHasher, SIDE, Workshop, signed_side};
+use super::lattice::{Cube, Grading, around};
 use super::plan::Setting;
 use super::tree::{Candidate, Candidates, with_deficit};
 use crate::attractor::Attractor;
@@ -11,9 +11,66 @@ use crate::attractor::cell::{Point, child_points, distance_squared};
 use crate::attractor::sites::SiteRule;
 use crate::budget::Budget;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
+use std::hash::BuildHasherDefault;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Where the lattice has changed.
+#[derive(Debug, Default)]
+pub(super) struct Changed {
+    /// The cubes of level 0 whose tetrahedra are others now.
+    pub(super) cubes: HashSet<[i64; 3], BuildHasherDefault<NameHasher>>,
+    /// The blocks that hold them, by their place in units of blocks.
+    pub(super) blocks: BTreeSet<[i64; 3]>,
+}
+
+impl Changed {
+    /// Those that hold one of the cubes that were subdivided, or touch it.
+    pub(super) fn around(subdivided: &[Cube]) -> Self {
+        let cubes: HashSet<_, _> = subdivided.iter().flat_map(|cube| around(cube.base())).collect();
+        let blocks = cubes.iter().map(|cube: &[i64; 3]| cube.map(|x| x.div_euclid(SIDE as i64))).collect();
+        Self { cubes, blocks }
+    }
+}
+
+/// What a pass asks of the blocks.
+#[derive(Clone, Copy)]
+pub(super) enum Task<'a> {
+    /// The surface, and the search for critical points in all tetrahedra.
+    Whole,
+    /// The search where the lattice has changed, and no surface.
+    Search(&'a Changed),
+    /// The surface in these blocks, all of whose tetrahedra were searched.
+    Surface(&'a BTreeSet<[i64; 3]>),
+}
+
+impl Task<'_> {
+    /// The blocks that it is about, unless it is about all.
+    fn blocks(&self) -> Option<&BTreeSet<[i64; 3]>> {
+        match self {
+            Self::Whole => None,
+            Self::Search(changed) => Some(&changed.blocks),
+            Self::Surface(blocks) => Some(blocks),
+        }
+    }
+
+    /// Whether the tetrahedra of a cube of level 0 are to be looked at.
+    pub(super) fn is_about(&self, cube: &[i64; 3]) -> bool {
+        match self {
+            Self::Search(changed) => changed.cubes.contains(cube),
+            Self::Whole | Self::Surface(_) => true,
+        }
+    }
+
+    pub(super) fn searches(&self) -> bool {
+        !matches!(self, Self::Surface(_))
+    }
+
+    pub(super) fn emits(&self) -> bool {
+        !matches!(self, Self::Search(_))
+    }
+}
 
 /// What all tasks of one pass share.
 pub(super) struct Pass<'a> {
@@ -21,8 +78,7 @@ pub(super) struct Pass<'a> {
     pub(super) rule: &'a SiteRule<'a>,
     pub(super) setting: &'a Setting,
     pub(super) grading: &'a Grading,
-    /// The blocks to make, by their place in units of blocks: all when nothing is said.
-    pub(super) only: Option<&'a BTreeSet<[i64; 3]>>,
+    pub(super) task: Task<'a>,
     pub(super) budget: &'a Budget,
     pub(super) triangles: AtomicU64,
     /// Whether a limit was hit: what is left need not be done.
@@ -94,7 +150,7 @@ impl<'a> Pass<'a> {
         // The first axis orders the set.
         let first = [node.first_block[0], i64::MIN, i64::MIN];
         let end = [node.first_block[0] + node.blocks, i64::MIN, i64::MIN];
-        self.only.is_none_or(|blocks| blocks.range(first..end).any(inside))
+        self.task.blocks().is_none_or(|blocks| blocks.range(first..end).any(inside))
     }
 
     fn finish(&self, node: Node) {
@@ -252,7 +308,7 @@ impl<'a> Pass<'a> {
         open: &[u32],
     ) -> Result<Option<BlockSurface>, DilationError> {
         let first_cube = node.first_block.map(|block| block * SIDE as i64);
-        let surface = workshop.surface(self.setting, self.grading, first_cube, candidates, open);
+        let surface = workshop.surface(self.setting, self.grading, self.task, first_cube, candidates, open);
         if workshop.is_exhausted() {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }

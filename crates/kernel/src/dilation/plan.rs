@@ -3,8 +3,8 @@
 use super::assemble::{Assembly, Blocks};
 use super::block::{self, BlockSurface, WITNESS};
 use super::dust;
-use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice, around};
-use super::octree::{Node, Pass};
+use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
+use super::octree::{Changed, Node, Pass, Task};
 use super::outside::MOST;
 use super::smooth::MOST_NOISE;
 use super::tree::Candidates;
@@ -326,7 +326,7 @@ impl<'a> Plan<'a> {
         let mut pitch = coarsest;
         loop {
             let setting = self.setting(pitch, &unlimited);
-            let surfaces = self.surfaces(&setting, &self.space(&setting), &Grading::default(), None, &unlimited)?;
+            let surfaces = self.surfaces(&setting, &self.space(&setting), &Grading::default(), Task::Whole, &unlimited)?;
             let made = surfaces.iter().map(|surface| surface.triangles.len() as f64).sum::<f64>();
             let expected = |finer: f64| made * (pitch / finer).powi(2);
             if pitch <= self.pitch || expected((0.5 * pitch).max(self.pitch)) > PREDICTION_WORK {
@@ -342,26 +342,27 @@ impl<'a> Plan<'a> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
         let mut grading = Grading::default();
-        let made = self.surfaces(&setting, &space, &grading, None, budget)?;
+        let mut made = self.surfaces(&setting, &space, &grading, Task::Whole, budget)?;
         let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
+        let (mut refined, mut affected, mut uncertain) = (0, BTreeSet::new(), BTreeSet::new());
+        let mut critical = noted(&mut made, &mut uncertain);
         let mut blocks: BTreeMap<[i64; 3], BlockSurface> = made.into_iter().map(|surface| (surface.first_cube, surface)).collect();
-        let mut refined = 0;
-        let mut uncertain;
-        loop {
-            let critical: BTreeSet<Cube> = blocks.values_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect();
-            uncertain = blocks.values().flat_map(|surface| &surface.uncertain).collect::<BTreeSet<_>>().len();
-            let mut new = Vec::new();
-            critical.iter().for_each(|&cube| grading.subdivide(cube, &mut new));
+        while !critical.is_empty() {
+            let (mut finer, mut new) = (grading.clone(), Vec::new());
+            critical.iter().for_each(|&cube| finer.subdivide(cube, &mut new));
             refined += new.len();
             if new.is_empty() || (refined > allowed && !setting.dense) {
-                uncertain += critical.len();
                 break;
             }
-            let affected = blocks_around(&new);
-            affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
-            let remade = self.surfaces(&setting, &space, &grading, Some(&affected), budget)?;
-            blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
+            grading = finer;
+            let changed = Changed::around(&new);
+            critical = noted(&mut self.surfaces(&setting, &space, &grading, Task::Search(&changed), budget)?, &mut uncertain);
+            affected.extend(changed.blocks);
         }
+        affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
+        let remade = self.surfaces(&setting, &space, &grading, Task::Surface(&affected), budget)?;
+        blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
+        let uncertain = uncertain.len() + critical.len();
         let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
         dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
         let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
@@ -375,26 +376,19 @@ impl<'a> Plan<'a> {
         setting: &Setting,
         space: &Space,
         grading: &Grading,
-        only: Option<&BTreeSet<[i64; 3]>>,
+        task: Task<'_>,
         budget: &Budget,
     ) -> Result<Vec<BlockSurface>, DilationError> {
-        self.pass(setting, grading, only, budget, space.blocks).run([0; 3], space.blocks, &space.candidates)
+        self.pass(setting, grading, task, budget, space.blocks).run([0; 3], space.blocks, &space.candidates)
     }
 
-    fn pass<'b>(
-        &'b self,
-        setting: &'b Setting,
-        grading: &'b Grading,
-        only: Option<&'b BTreeSet<[i64; 3]>>,
-        budget: &'b Budget,
-        blocks: i64,
-    ) -> Pass<'b> {
+    fn pass<'b>(&'b self, setting: &'b Setting, grading: &'b Grading, task: Task<'b>, budget: &'b Budget, blocks: i64) -> Pass<'b> {
         Pass {
             attractor: self.rule.attractor(),
             rule: &self.rule,
             setting,
             grading,
-            only,
+            task,
             budget,
             triangles: AtomicU64::new(0),
             failed: AtomicBool::new(false),
@@ -413,7 +407,7 @@ impl<'a> Plan<'a> {
         made: BTreeMap<[i64; 3], BlockSurface>,
         budget: &Budget,
     ) -> Result<BlockSurface, DilationError> {
-        let pass = self.pass(setting, grading, None, budget, space.blocks);
+        let pass = self.pass(setting, grading, Task::Whole, budget, space.blocks);
         let site_error = made.values().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
         let leaves = made.values().map(|surface| surface.leaves).sum();
         let block = |(cube, surface): ([i64; 3], BlockSurface)| (cube.map(|x| x / block::SIDE as i64), Mutex::new(surface));
@@ -487,8 +481,8 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// The blocks whose tetrahedra change with these cubes: those that hold one or a neighbour.
-fn blocks_around(cubes: &[Cube]) -> BTreeSet<[i64; 3]> {
-    let side = block::SIDE as i64;
-    cubes.iter().flat_map(|cube| around(cube.base())).map(|base| base.map(|x| x.div_euclid(side))).collect()
+/// What blocks have noted: the cubes to subdivide, and those where no level tells it, which are added to `uncertain`.
+fn noted(made: &mut [BlockSurface], uncertain: &mut BTreeSet<Cube>) -> BTreeSet<Cube> {
+    uncertain.extend(made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.uncertain)));
+    made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect()
 }
