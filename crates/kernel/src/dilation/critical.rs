@@ -18,7 +18,7 @@ use crate::measure::triangle::{Feature, closest_feature};
 /// Boxes that the search in a tetrahedron may look at.
 const MOST_WORK: usize = 4000;
 /// Steps of the searches for a plane.
-const STEPS: usize = 32;
+const STEPS: usize = 6;
 /// Boxes are halved along axes across which distances hardly vary, too, when they are so many times as long.
 const LEAST_SLOPE: f64 = 0.15;
 
