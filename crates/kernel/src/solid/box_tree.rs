@@ -105,13 +105,13 @@ impl BoxTree {
         for (place, &item) in order.iter().enumerate() {
             places[item as usize] = place as u32;
         }
-        *leaves = order.len().div_ceil(LEAF).next_power_of_two();
+        *leaves = order.len().div_ceil(LEAF).max(1).next_power_of_two();
         nodes.clear();
         nodes.resize(2 * *leaves, Box32::EMPTY);
         boxes.clear();
         boxes.extend(order.iter().filter_map(|&item| given[item as usize]));
         for (place, own) in boxes.iter().enumerate() {
-            let leaf = *leaves + leaf_of(place, order.len(), *leaves);
+            let leaf = *leaves + place / LEAF;
             nodes[leaf] = nodes[leaf].union(own);
         }
         for node in (1..*leaves).rev() {
@@ -138,7 +138,7 @@ impl BoxTree {
 
     #[inline]
     fn range(&self, leaf: usize) -> std::ops::Range<usize> {
-        let start = |leaf: usize| (leaf * self.order.len()).div_ceil(self.leaves);
+        let start = |leaf: usize| (leaf * LEAF).min(self.order.len());
         start(leaf)..start(leaf + 1)
     }
 
@@ -152,7 +152,7 @@ impl BoxTree {
     pub(crate) fn set(&mut self, item: u32, to: &Box32) {
         let place = self.places[item as usize] as usize;
         self.boxes[place] = *to;
-        let mut node = self.leaves + leaf_of(place, self.order.len(), self.leaves);
+        let mut node = self.leaves + place / LEAF;
         while node > 0 {
             let grown = self.nodes[node].union(to);
             if grown == self.nodes[node] {
@@ -227,11 +227,6 @@ impl BoxTree {
             }
         }
     }
-}
-
-#[inline]
-fn leaf_of(place: usize, count: usize, leaves: usize) -> usize {
-    place * leaves / count
 }
 
 /// The lower ten bits, two zeros between each.
