@@ -461,4 +461,26 @@ mod tests {
         }
         assert!(folded > 150, "{folded} of the meshes had folds");
     }
+
+    /// From the dilation of a Hilbert curve: two corners at one place cannot become one while a third, one step away, is joined to both.
+    #[test]
+    fn corners_at_one_place_are_parted_by_joining_what_is_between() {
+        let points = [
+            [82.304_603_576_660_16, 73.996_109_008_789_06, 98.451_995_849_609_38],
+            [82.401_863_098_144_53, 72.867_607_116_699_22, 98.354_736_328_125],
+            [81.546_058_654_785_16, 72.867_607_116_699_22, 98.354_736_328_125],
+            [82.401_855_468_75, 72.867_607_116_699_22, 98.354_736_328_125],
+            [82.401_863_098_144_53, 72.867_607_116_699_22, 98.354_736_328_125],
+            [82.271_751_403_808_6, 72.613_159_179_687_5, 98.484_848_022_460_94],
+            [82.526_199_340_820_31, 72.867_607_116_699_22, 98.354_736_328_125],
+            // Closes it from far away.
+            [82.25, 73.25, 103.0],
+        ];
+        let around = [[0, 1, 2], [0, 3, 1], [0, 4, 3], [1, 3, 4], [5, 1, 6], [2, 1, 5], [4, 0, 6], [1, 4, 6]];
+        let closing = [[6, 0, 7], [5, 6, 7], [2, 5, 7], [0, 2, 7]];
+        let triangles: Vec<[u32; 3]> = around.into_iter().chain(closing).collect();
+        let mended = mend(points.to_vec(), &triangles, super::super::rounding(103.0), &Budget::default()).unwrap();
+        assert_eq!(mended.crossings, 0);
+        assert!(mended.points.len() < points.len(), "a corner is joined");
+    }
 }
