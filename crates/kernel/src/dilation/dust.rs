@@ -3,6 +3,9 @@
 //! Where two creases come close the lattice may cut off a piece of the solid, or close a void, of which the dilation knows nothing. Let s be the solid's inner bound: D(s) is in the
 //! solid. A piece of the solid that holds a point of D(s) holds a whole ball of radius s, and its box is no narrower than 2 s. So a narrower piece lies outside D(s), and
 //! without it the solid still contains D(s). A void that lies in D(r) is not one of the dilation's: it is filled.
+//!
+//! A shell whose corners have become one point bounds nothing: it goes. As a void of D(r) it would have held a critical point of the distance, which has two
+//! sites at one distance at least; where there is one site alone at the point, there was none.
 
 use super::block::BlockSurface;
 use super::plan::Setting;
@@ -22,7 +25,16 @@ struct Shell {
 
 const EMPTY: Shell = Shell { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3], volume: 0.0 };
 
-/// Removes such shells; how many there were.
+/// What is done with a shell.
+#[derive(Clone, Copy, PartialEq)]
+enum Fate {
+    Stays,
+    Goes,
+    /// It may have been a void of the dilation, smaller than rounding.
+    GoesInDoubt,
+}
+
+/// Removes such shells; how many of them may have been the dilation's.
 pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, surface: &mut BlockSurface) -> usize {
     let (numbers, mut shells) = shells(surface);
     for (triangle, &number) in surface.triangles.iter().zip(&numbers) {
@@ -40,29 +52,28 @@ pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candid
         shell.volume += dot(&a, &cross(&b, &c));
     }
     let mut tree = None;
-    let gone: Vec<bool> = shells.iter().map(|shell| is_dust(setting, rule, candidates, shell, &mut tree)).collect();
-    let count = gone.iter().filter(|&&gone| gone).count();
-    if count > 0 {
-        let mut kept = numbers.iter().map(|&number| !gone[number as usize]);
+    let fates: Vec<Fate> = shells.iter().map(|shell| fate(setting, rule, candidates, shell, &mut tree)).collect();
+    if fates.iter().any(|&fate| fate != Fate::Stays) {
+        let mut kept = numbers.iter().map(|&number| fates[number as usize] == Fate::Stays);
         surface.triangles.retain(|_| kept.next().unwrap_or(true));
         drop_unused(surface);
     }
-    count
+    fates.iter().filter(|&&fate| fate == Fate::GoesInDoubt).count()
 }
 
-fn is_dust<'a>(
+fn fate<'a>(
     setting: &Setting,
     rule: &'a SiteRule<'a>,
     candidates: &Candidates,
     shell: &Shell,
     tree: &mut Option<(Tree<'a>, Vec<u32>)>,
-) -> bool {
+) -> Fate {
     let width = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(f64::INFINITY, f64::min);
     if width >= 2.0 * (setting.thinnest - 2.0 * setting.rounding) {
-        return false;
+        return Fate::Stays;
     }
     if shell.volume > 0.0 {
-        return true;
+        return Fate::Goes;
     }
     let (tree, starts) = tree.get_or_insert_with(|| {
         let mut tree = Tree::new(rule, setting.slack, 4 * setting.cells);
@@ -71,8 +82,20 @@ fn is_dust<'a>(
     });
     let middle: Point = std::array::from_fn(|axis| 0.5 * (shell.low[axis] + shell.high[axis]));
     let around = distance_squared(&middle, &shell.high).sqrt() + 2.0 * setting.rounding;
-    let hit = tree.nearest(&middle, starts, None, setting.reach, 0.0);
-    !tree.exhausted && hit.is_some_and(|hit| hit.distance_squared.sqrt() + around <= setting.reach)
+    let hit = tree.nearest(&middle, starts, None, setting.outer + around, 0.0);
+    if tree.exhausted {
+        return Fate::Stays;
+    }
+    let distance = hit.map_or(f64::INFINITY, |hit| hit.distance_squared.sqrt());
+    if distance + around <= setting.reach {
+        return Fate::Goes;
+    }
+    if shell.low != shell.high {
+        return Fate::Stays;
+    }
+    let mut near = Vec::new();
+    tree.collect(&middle, starts, distance + 2.0 * around + setting.slack, &mut near);
+    if near.len() == 1 { Fate::Goes } else { Fate::GoesInDoubt }
 }
 
 /// The number of every triangle's shell, and room for the shells.

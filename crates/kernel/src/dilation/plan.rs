@@ -364,7 +364,7 @@ impl<'a> Plan<'a> {
         blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
         let uncertain = uncertain.len() + critical.len();
         let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
-        dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
+        let uncertain = uncertain + dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
         let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
         budget.report("dilate", 1.0, mended.triangles.len() as u64);
         surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
