@@ -140,6 +140,20 @@ fn a_process_that_dies_between_two_jobs_is_replaced() {
 }
 
 #[test]
+fn every_job_of_a_process_tells_of_its_progress() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_WORKERS", "1")]);
+    // One after the other without a pause: each begins in the phase in which the one before was a moment ago.
+    let ids: Vec<String> = (0..24).map(|number| submit(&service, &small(number))).collect();
+    for id in ids {
+        assert_eq!(service.ended(&id)["state"], "succeeded");
+        let events = String::from_utf8(service.get(&format!("/v1/jobs/{id}/events")).body).unwrap();
+        assert!(events.contains("event: progress"), "{events}");
+    }
+    assert_eq!(service.children().len(), 1, "one process did them all");
+}
+
+#[test]
 fn stopping_a_job_frees_its_process_at_once() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
