@@ -86,8 +86,7 @@ fn services(name: &str) -> (BTreeMap<String, Value>, BTreeMap<String, Value>) {
 /// What the last stage of the Dockerfile says with a keyword.
 fn image(keyword: &str) -> String {
     let text = fs::read_to_string(root().join("docker/Dockerfile")).unwrap().replace("\\\n", " ");
-    let last = text[text.rfind("\nFROM ").unwrap()..].lines().find_map(|line| line.strip_prefix(keyword)).unwrap().trim().to_owned();
-    last
+    text[text.rfind("\nFROM ").unwrap()..].lines().find_map(|line| line.strip_prefix(keyword)).unwrap().trim().to_owned()
 }
 
 /// The environment of a service: what the image sets, and what the composition does.
