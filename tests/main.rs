@@ -22,6 +22,7 @@
 //! | `thickness_maps` | are maps of thickness what closed forms and rays say, in files that others read? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
+//! | `plans` | is what is predicted near what is made? |
 //! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
 //! | `rolling` | are they restarted, traced and asked to stop without a loss? |
@@ -52,6 +53,7 @@ mod hostile;
 mod independent;
 mod levels;
 mod measures;
+mod plans;
 mod processes;
 mod properties;
 mod regression;
