@@ -79,6 +79,8 @@ enum Failure {
     Refused(Problem),
     /// It is at an end, or must be brought to one.
     Over(Problem),
+    /// It had come to its end before it said a word of this.
+    Silent(Problem),
 }
 
 impl Process {
@@ -119,7 +121,7 @@ impl Process {
     fn perform(&mut self, task: &Task, job: &LiveJob, store: &Store) -> Result<Files, Failure> {
         let most = task.most.into();
         self.tell(&Told::Job { bytes: task.document.len() as u64, most, input_digest: task.input_digest.clone() }, &task.document);
-        let mut files = Vec::new();
+        let (mut files, mut silent) = (Vec::new(), true);
         let (mut seconds, mut memory_bytes, mut deadline) = (task.most.seconds, task.most.memory_bytes, None);
         loop {
             if let Some(reason) = job.cancel.reason() {
@@ -129,9 +131,11 @@ impl Process {
                 job.cancel.fire(StopReason::Deadline);
                 continue;
             }
-            match self.heard.recv_timeout(LOOK_EVERY) {
+            let heard = self.heard.recv_timeout(LOOK_EVERY);
+            silent &= !matches!(heard, Ok(Heard::Said(_)));
+            match heard {
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Err(Failure::Over(self.post_mortem(memory_bytes, ALLOW_MORE))),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.dead(memory_bytes, ALLOW_MORE, silent)),
                 Ok(Heard::Words(line)) => self.remember(line),
                 Ok(Heard::Garbled(error)) => return Err(garbled(&error)),
                 Ok(Heard::Said(Said::Progress(step))) => job.progress(step, self.id),
@@ -160,13 +164,15 @@ impl Process {
     /// The answer to a question.
     fn ask(&mut self, told: &Told, document: &[u8], memory_bytes: u64, find: ModelFinder<'_>) -> Result<String, Failure> {
         self.tell(told, document);
-        let deadline = Instant::now() + questions::TIME + GRACE;
+        let (deadline, mut silent) = (Instant::now() + questions::TIME + GRACE, true);
         loop {
-            match self.heard.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            let heard = self.heard.recv_timeout(deadline.saturating_duration_since(Instant::now()));
+            silent &= !matches!(heard, Ok(Heard::Said(_)));
+            match heard {
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(Failure::Over(production::stopped(StopReason::Deadline, questions::TIME.as_secs_f64())));
                 }
-                Err(RecvTimeoutError::Disconnected) => return Err(Failure::Over(self.post_mortem(memory_bytes, ASK_FOR_LESS))),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.dead(memory_bytes, ASK_FOR_LESS, silent)),
                 Ok(Heard::Words(line)) => self.remember(line),
                 Ok(Heard::Garbled(error)) => return Err(garbled(&error)),
                 Ok(Heard::Said(Said::NeedsStored(word))) => self.lend(find(&word)),
@@ -195,6 +201,11 @@ impl Process {
         if self.words.len() > WORDS_KEPT {
             self.words.pop_front();
         }
+    }
+
+    fn dead(&mut self, memory_bytes: u64, advice: &str, silent: bool) -> Failure {
+        let problem = self.post_mortem(memory_bytes, advice);
+        if silent { Failure::Silent(problem) } else { Failure::Over(problem) }
     }
 
     /// Why the process has ended in the middle of what had so many bytes of memory.
@@ -271,17 +282,22 @@ impl Place {
         &mut self,
         store: &Store,
         threads: usize,
-        work: impl FnOnce(&mut Process) -> Result<T, Failure>,
+        mut work: impl FnMut(&mut Process) -> Result<T, Failure>,
     ) -> Result<T, Problem> {
+        let start = || Process::start(self.purpose, store, threads).map_err(|error| Problem::io("no process to do the work", &error));
         let kept = self.process.take().and_then(Process::still_there);
-        let started = kept.map_or_else(|| Process::start(self.purpose, store, threads), Ok);
-        let mut process = started.map_err(|error| Problem::io("no process to do the work", &error))?;
-        let made = work(&mut process);
-        if !matches!(made, Err(Failure::Over(_))) && process.is_small() {
+        let (was_kept, mut process) = (kept.is_some(), kept.map_or_else(start, Ok)?);
+        let mut made = work(&mut process);
+        if was_kept && matches!(made, Err(Failure::Silent(_))) {
+            // Killed while it waited, and not quite gone when it was looked at: what was to be done it never saw.
+            process = start()?;
+            made = work(&mut process);
+        }
+        if matches!(made, Ok(_) | Err(Failure::Refused(_))) && process.is_small() {
             self.process = Some(process);
         }
         made.map_err(|failure| match failure {
-            Failure::Refused(problem) | Failure::Over(problem) => problem,
+            Failure::Refused(problem) | Failure::Over(problem) | Failure::Silent(problem) => problem,
         })
     }
 }
