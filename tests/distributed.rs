@@ -6,14 +6,9 @@ use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::lacuna;
 use lacuna_tests::support::cases;
-use lacuna_tests::support::objects::Objects;
-use lacuna_tests::support::postgres::Postgres;
-use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::Service;
+use lacuna_tests::support::stage::{LEASE, Stage};
 use serde_json::{Value, json};
-
-/// Seconds of a worker's lease: short, so that tests need not wait long for a dead one.
-const LEASE: &str = "2";
 
 /// How long anything may take that takes a moment on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -33,37 +28,6 @@ fn long_order(number: u32) -> Value {
     let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
     json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
-}
-
-/// A database, an object store and a folder for scratch files.
-struct Stage {
-    database: Postgres,
-    objects: Objects,
-    scratch: Scratch,
-}
-
-impl Stage {
-    fn set() -> Option<Self> {
-        Some(Self { database: Postgres::start()?, objects: Objects::start()?, scratch: Scratch::new() })
-    }
-
-    fn start(&self, role: &str, name: &str) -> Service {
-        let (database, endpoint) = (self.database.url(), self.objects.endpoint());
-        let environment = [
-            ("LACUNA_ROLE", role),
-            ("LACUNA_DATABASE_URL", database.as_str()),
-            ("LACUNA_OBJECTS_URL", "s3://parts/lacuna"),
-            ("AWS_ENDPOINT_URL", endpoint.as_str()),
-            ("AWS_REGION", "us-east-1"),
-            ("AWS_ACCESS_KEY_ID", "tests"),
-            ("AWS_SECRET_ACCESS_KEY", "hidden-from-everybody"),
-            ("LACUNA_LEASE_SECONDS", LEASE),
-            ("LACUNA_WORKERS", "1"),
-            ("LACUNA_DRAIN_SECONDS", "1"),
-            ("LACUNA_SUBMISSIONS_PER_MINUTE", "100000"),
-        ];
-        Service::start_with(&self.scratch.join(name), &environment)
-    }
 }
 
 /// Submits and gives the id.

@@ -22,8 +22,10 @@
 //! | `thickness_maps` | are maps of thickness what closed forms and rays say, in files that others read? |
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
+//! | `plans` | is what is predicted near what is made? |
 //! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
+//! | `rolling` | are they restarted, traced and asked to stop without a loss? |
 //! | `secure` | does the command line speak TLS, have metrics an address of their own, do traces arrive? |
 //! | `service` | does the running service keep them? |
 //! | `session` | does the page's session by curl run as it stands there? |
@@ -31,12 +33,14 @@
 //! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |
+//! | `composition` | and those that start several containers? |
 
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod architecture;
 mod booleans;
 mod clients;
+mod composition;
 mod contacts;
 mod container;
 mod contract;
@@ -49,11 +53,13 @@ mod hostile;
 mod independent;
 mod levels;
 mod measures;
+mod plans;
 mod processes;
 mod properties;
 mod regression;
 mod remote;
 mod repairs;
+mod rolling;
 mod secure;
 mod service;
 mod session;

@@ -98,6 +98,60 @@ fn memory_is_given_back_after_a_large_result() {
 }
 
 #[test]
+fn a_question_that_exceeds_its_memory_is_refused_alone() {
+    const ALLOWED: u64 = 16 << 20;
+    let scratch = Scratch::new();
+    let allowed = ALLOWED.to_string();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_LIMIT_MEMORY_BYTES", &allowed)]);
+    let order =
+        |name: &str| json!({ "lacuna": 1, "kind": "solidify", "model": model(name), "params": { "tolerance_mm": 0.1, "radius_mm": 2.0 } });
+    let small = || assert_eq!(service.post("/v1/plan", &order("meshes/segment")).status, 200);
+    small();
+    let processes = service.answering();
+    assert_eq!(processes.len(), 1, "a process of its own");
+    let before = service.resident_bytes();
+    // Its maps overlap: every vertex of a block has a thousand sites nearby.
+    let large = order("ifs/segment");
+    for _ in 0..3 {
+        let answer = service.post("/v1/plan", &large);
+        let problem = answer.json();
+        assert_eq!(
+            (answer.status, &problem["code"], &problem["limit"]),
+            (422, &json!("limit.memory"), &json!("memory_bytes")),
+            "{problem}"
+        );
+        assert_eq!(problem["allowed"].as_f64(), Some(16_777_216.0), "{problem}");
+        assert!(problem["detail"].as_str().unwrap().contains("ask about a smaller model"), "{problem}");
+        small();
+    }
+    let grown = service.resident_bytes().saturating_sub(before);
+    assert!(grown < 16 << 20, "the service itself has {grown} bytes more");
+    until("the process that had no memory is gone", || !processes.iter().any(|&process| is_alive(process)));
+    // What an answer may not take a job may try, and fail.
+    let job = service.done(&large);
+    assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("limit.memory")), "{job}");
+}
+
+#[test]
+fn a_small_question_takes_a_moment_beside_a_large_job() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let _ = running(&service, 0, &[]);
+    let mut times: Vec<Duration> = (0..40)
+        .map(|number| {
+            let start = Instant::now();
+            assert_eq!(service.post("/v1/plan", &small(number)).status, 200);
+            start.elapsed()
+        })
+        .collect();
+    times.sort();
+    eprintln!("a small plan beside a large job: median {:?}, longest {:?} of {}", times[20], times[39], times.len());
+    assert_eq!(service.answering().len(), 1, "one process answers what comes one after the other");
+    // Milliseconds on a machine that is not overloaded; this one may be.
+    assert!(times[20] < Duration::from_millis(250), "{times:?}");
+}
+
+#[test]
 fn a_crash_ends_one_job_and_nothing_else() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
@@ -140,6 +194,20 @@ fn a_process_that_dies_between_two_jobs_is_replaced() {
 }
 
 #[test]
+fn every_job_of_a_process_tells_of_its_progress() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_WORKERS", "1")]);
+    // One after the other without a pause: each begins in the phase in which the one before was a moment ago.
+    let ids: Vec<String> = (0..24).map(|number| submit(&service, &small(number))).collect();
+    for id in ids {
+        assert_eq!(service.ended(&id)["state"], "succeeded");
+        let events = String::from_utf8(service.get(&format!("/v1/jobs/{id}/events")).body).unwrap();
+        assert!(events.contains("event: progress"), "{events}");
+    }
+    assert_eq!(service.children().len(), 1, "one process did them all");
+}
+
+#[test]
 fn stopping_a_job_frees_its_process_at_once() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
@@ -167,7 +235,7 @@ fn a_time_limit_ends_the_process_too() {
     let job = service.done(&order);
     assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("limit.seconds")), "{job}");
     assert_eq!((&job["problem"]["limit"], &job["problem"]["allowed"]), (&json!("seconds"), &json!(0.5)));
-    assert!(service.children().is_empty(), "{:?}", service.children());
+    until("gone", || service.children().is_empty());
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! What is seen from beyond the service: the command line over TLS, the second address for whoever looks after it, and traces at a collector.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 
 use lacuna_tests::support::binary::lacuna;
 use lacuna_tests::support::cases;
+use lacuna_tests::support::collector::Collector;
 use lacuna_tests::support::python::system_python;
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::Service;
@@ -93,58 +94,19 @@ fn the_command_line_speaks_tls_to_whom_the_machine_trusts() {
     assert_eq!(service.get("/v1/jobs").json()["items"].as_array().unwrap().len(), 1);
 }
 
-/// A collector: takes what is posted to it and gives the spans.
-fn collector() -> (String, std::sync::mpsc::Receiver<Value>) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = format!("http://{}", listener.local_addr().unwrap());
-    let (sender, spans) = std::sync::mpsc::channel();
-    std::thread::spawn(move || {
-        for stream in listener.incoming() {
-            let mut stream = BufReader::new(stream.unwrap());
-            // One connection may bring several documents.
-            loop {
-                let (mut head, mut length) = (String::new(), 0);
-                while stream.read_line(&mut head).unwrap_or(0) > 2 {
-                    let line = head.lines().last().unwrap().to_ascii_lowercase();
-                    length = line.strip_prefix("content-length:").map_or(length, |value| value.trim().parse().unwrap());
-                }
-                if length == 0 {
-                    break;
-                }
-                assert!(head.starts_with("POST /v1/traces "), "{head}");
-                let mut body = vec![0; length];
-                stream.read_exact(&mut body).unwrap();
-                stream.get_mut().write_all(b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: 2\r\n\r\n{}").unwrap();
-                let document: Value = serde_json::from_slice(&body).unwrap();
-                let resource = &document["resourceSpans"][0];
-                assert!(resource["resource"]["attributes"].to_string().contains("\"lacuna\""), "{resource}");
-                for span in resource["scopeSpans"][0]["spans"].as_array().unwrap() {
-                    sender.send(span.clone()).unwrap();
-                }
-            }
-        }
-    });
-    (address, spans)
-}
-
 #[test]
 fn a_trace_leads_from_the_caller_to_the_phases_of_a_job() {
-    let (url, spans) = collector();
+    let collector = Collector::start();
     let scratch = Scratch::new();
-    let service = Service::start_with(scratch.path(), &[("LACUNA_TRACES_URL", &url)]);
+    let service = Service::start_with(scratch.path(), &[("LACUNA_TRACES_URL", &collector.url)]);
     let model: Value = serde_json::from_slice(&std::fs::read(cases::named("meshes/segment").model()).unwrap()).unwrap();
     let order = json!({ "lacuna": 1, "kind": "solidify", "model": model, "params": { "tolerance_mm": 0.05, "radius_mm": 1.0 } });
     let parent = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
     let answer = service.post_with("/v1/jobs", &[("traceparent", parent), ("prefer", "wait=30")], order.to_string().as_bytes());
     assert_eq!(answer.json()["state"], "succeeded", "{}", answer.json());
-    let mut found: Vec<Value> = Vec::new();
-    let all = |found: &[Value]| {
-        ["POST /v1/jobs", "job solidify", "dilate", "write"].iter().all(|name| found.iter().any(|span| span["name"] == *name))
-    };
-    while !all(&found) {
-        found.push(spans.recv_timeout(std::time::Duration::from_secs(30)).unwrap_or_else(|_| panic!("not all spans came: {found:?}")));
-    }
-    let named = |name: &str| found.iter().find(|span| span["name"] == name).unwrap();
+    let names = ["POST /v1/jobs", "job solidify", "dilate", "write"];
+    let found = collector.until(|found| names.iter().all(|name| found.iter().any(|(_, span)| span["name"] == *name)));
+    let named = |name: &str| &found.iter().find(|(_, span)| span["name"] == name).unwrap().1;
     let (request, job, phase) = (named("POST /v1/jobs"), named("job solidify"), named("dilate"));
     for span in [request, job, phase] {
         assert_eq!(span["traceId"], "4bf92f3577b34da6a3ce929d0e0e4736", "{span}");

@@ -21,6 +21,7 @@ pub mod metrics;
 pub mod openapi;
 pub mod problem;
 pub mod production;
+pub mod questions;
 pub mod routes;
 pub mod store;
 pub mod traces;

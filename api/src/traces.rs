@@ -7,7 +7,7 @@
 
 use std::sync::OnceLock;
 use std::sync::mpsc::{self, Receiver, SyncSender};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -22,7 +22,14 @@ const EVERY: Duration = Duration::from_secs(1);
 /// How long the collector may take for a batch.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-static EXPORTER: OnceLock<SyncSender<Span>> = OnceLock::new();
+static EXPORTER: OnceLock<SyncSender<Told>> = OnceLock::new();
+
+/// What the exporter is told.
+enum Told {
+    Span(Box<Span>),
+    /// Whoever has the other end waits until what came before has been sent.
+    Finish(SyncSender<()>),
+}
 
 /// Where a span stands: its trace and its own id, as `traceparent` has them (W3C Trace Context).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -169,30 +176,59 @@ pub fn wanted() -> bool {
 /// Tells of a span, if anybody wants to know.
 pub fn tell(span: Span) {
     if let Some(exporter) = EXPORTER.get()
-        && exporter.try_send(span).is_err()
+        && exporter.try_send(Told::Span(Box::new(span))).is_err()
     {
         tracing::debug!("a span is dropped: the collector is slow or away");
     }
 }
 
-fn export(place: &str, spans: &Receiver<Span>) {
+/// Waits until the collector has what was told, but not for longer than it may take for a batch: a process that goes leaves no trace
+/// without its end.
+pub fn finish() {
+    let (done, waiting) = mpsc::sync_channel(1);
+    if let Some(exporter) = EXPORTER.get()
+        && exporter.try_send(Told::Finish(done)).is_ok()
+    {
+        let _ = waiting.recv_timeout(PATIENCE);
+    }
+}
+
+fn export(place: &str, heard: &Receiver<Told>) {
     let config = ureq::Agent::config_builder().timeout_global(Some(PATIENCE)).tls_config(crate::trust::tls()).build();
     let agent = ureq::Agent::new_with_config(config);
-    while let Ok(first) = spans.recv() {
-        let mut batch = vec![first];
-        std::thread::sleep(EVERY);
-        batch.extend(spans.try_iter().take(BATCH - 1));
-        let document = json!({ "resourceSpans": [{
-            "resource": { "attributes": [
-                attribute("service.name", &json!("lacuna")),
-                attribute("service.version", &json!(env!("CARGO_PKG_VERSION"))),
-                attribute("process.pid", &json!(std::process::id())),
-            ] },
-            "scopeSpans": [{ "scope": { "name": "lacuna" }, "spans": batch.iter().map(Span::told).collect::<Vec<_>>() }],
-        }] });
-        if let Err(error) = agent.post(place).header("content-type", "application/json").send(document.to_string().as_bytes()) {
-            tracing::warn!(%error, spans = batch.len(), "the collector of traces did not take spans; they are dropped");
+    while let Ok(first) = heard.recv() {
+        let (mut batch, mut finished) = (Vec::new(), Vec::new());
+        let (mut next, until) = (Some(first), Instant::now() + EVERY);
+        while let Some(told) = next {
+            match told {
+                Told::Span(span) => batch.push(*span),
+                Told::Finish(done) => finished.push(done),
+            }
+            let full = batch.len() == BATCH || !finished.is_empty();
+            next = if full { None } else { heard.recv_timeout(until.saturating_duration_since(Instant::now())).ok() };
         }
+        send(&agent, place, &batch);
+        for done in finished {
+            // Whoever waited may have gone.
+            let _ = done.try_send(());
+        }
+    }
+}
+
+fn send(agent: &ureq::Agent, place: &str, batch: &[Span]) {
+    if batch.is_empty() {
+        return;
+    }
+    let document = json!({ "resourceSpans": [{
+        "resource": { "attributes": [
+            attribute("service.name", &json!("lacuna")),
+            attribute("service.version", &json!(env!("CARGO_PKG_VERSION"))),
+            attribute("process.pid", &json!(std::process::id())),
+        ] },
+        "scopeSpans": [{ "scope": { "name": "lacuna" }, "spans": batch.iter().map(Span::told).collect::<Vec<_>>() }],
+    }] });
+    if let Err(error) = agent.post(place).header("content-type", "application/json").send(document.to_string().as_bytes()) {
+        tracing::warn!(%error, spans = batch.len(), "the collector of traces did not take spans; they are dropped");
     }
 }
 

@@ -4,6 +4,7 @@
 
 pub mod binary;
 pub mod cases;
+pub mod collector;
 pub mod inside;
 pub mod objects;
 pub mod postgres;
@@ -11,6 +12,7 @@ pub mod python;
 pub mod random;
 pub mod scratch;
 pub mod service;
+pub mod stage;
 
 use std::path::{Path, PathBuf};
 

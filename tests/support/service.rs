@@ -115,6 +115,12 @@ impl Service {
         self.said.lock().unwrap().iter().any(|line| words.iter().all(|word| line.contains(word)))
     }
 
+    /// How many lines of the log have all of these words.
+    #[must_use]
+    pub fn count(&self, words: &[&str]) -> usize {
+        self.said.lock().unwrap().iter().filter(|line| words.iter().all(|word| line.contains(word))).count()
+    }
+
     /// Sends the process a signal by its name, as `kill` knows it.
     ///
     /// # Panics
@@ -144,11 +150,24 @@ impl Service {
         self.process.id()
     }
 
-    /// The processes that it has started and that still run.
+    /// The processes that it has started for jobs and that still run.
     #[must_use]
     pub fn children(&self) -> Vec<u32> {
+        self.processes(false)
+    }
+
+    /// The processes that it has started for questions and that still run.
+    #[must_use]
+    pub fn answering(&self) -> Vec<u32> {
+        self.processes(true)
+    }
+
+    fn processes(&self, for_questions: bool) -> Vec<u32> {
         let entries = std::fs::read_dir("/proc").unwrap().filter_map(|entry| entry.ok()?.file_name().to_str()?.parse::<u32>().ok());
-        entries.filter(|&process| parent_of(process) == Some(self.id())).collect()
+        let own = entries.filter(|&process| parent_of(process) == Some(self.id()));
+        // Its command line is there from the moment it is another program than its parent.
+        let asked = |process: u32| std::fs::read(format!("/proc/{process}/cmdline")).is_ok_and(|line| line.ends_with(b"\0questions\0"));
+        own.filter(|&process| asked(process) == for_questions).collect()
     }
 
     /// Ends it at once, as a power failure would.

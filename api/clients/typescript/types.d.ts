@@ -869,11 +869,12 @@ export interface PlaceStatement {
 
 /** What a job is predicted to cost. */
 export interface Plan {
+  /** Triangles against which the limit of triangles is held: those of the lattices as they are first made. */ counted_triangles?: number;
   /** Edge of the lattice's cubes. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
-  /** Peak memory of the process that does the job, in bytes: what simplification of models whose cells overlap much takes besides is not in it. 0 where nothing is predicted. */ memory_bytes: number;
-  /** Bytes of the lattice's mesh as binary STL. */ output_bytes: number;
-  /** Triangles of the lattice's mesh, against which the limit of triangles is held; simplification leaves a tenth to a hundredth of them. */ triangles: number;
+  /** Peak memory of the process that does the job, in bytes. 0 where nothing is predicted. */ memory_bytes: number;
+  /** Bytes of a binary STL file with so many `triangles`. */ output_bytes: number;
+  /** Triangles of the result without simplification, which leaves a tenth to a hundredth of them. Of an operation on solids: those of its result. */ triangles: number;
 }
 
 /** One section. */

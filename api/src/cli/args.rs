@@ -133,6 +133,9 @@ pub(super) enum Command {
         /// Threads that a job may use.
         #[arg(long, value_name = "COUNT")]
         threads: usize,
+        /// What it is for.
+        #[arg(long, value_enum, default_value_t)]
+        purpose: crate::jobs::process::Purpose,
     },
     /// Print the OpenAPI description of the service.
     Openapi,

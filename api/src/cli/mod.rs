@@ -70,9 +70,9 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
             None => remote::jobs::jobs(&Server::at(&operate::local_url()?)?, &command, manner),
         },
         Command::Serve(args) => operate::serve(args),
-        Command::DoJobs { threads } => {
+        Command::DoJobs { threads, purpose } => {
             work::use_threads(Some(threads))?;
-            crate::jobs::apart::serve()
+            crate::jobs::apart::serve(purpose)
         }
         Command::Healthcheck { url } => operate::healthcheck(url.as_deref()),
         Command::Openapi => print(crate::openapi::text().as_bytes()),

@@ -18,7 +18,6 @@ use crate::documents::{self, Remark, Severity, SolveReport, ValidationReport};
 use crate::files;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Engine, SolveProblem};
-use crate::routes::studies;
 
 /// Longest time for a prediction on the command line, where nobody else waits for it.
 const PLAN_TIME: Duration = Duration::from_secs(300);
@@ -32,7 +31,7 @@ pub(super) fn validate(model: &Path, draw: Option<&Path>, server: Option<&Server
             let document = remote::self_contained(bytes.clone(), |bytes| remote::whole_model(bytes, folder_of(model)));
             remote::validate(server, &document)
         }
-        None => studies::watched(PLAN_TIME, |budget| documents::validate_in(&bytes, folder_of(model), budget)),
+        None => crate::questions::watched(PLAN_TIME, |budget| documents::validate_in(&bytes, folder_of(model), budget)),
     };
     let report = match examined {
         // What is no JSON is an invalid model as well, to whoever reads the report.
@@ -150,7 +149,7 @@ pub(super) fn solve(args: &SolveArgs, quiet: bool, server: Option<&Server>) -> R
 
 fn solve_here(model: &Model, values: &BTreeMap<String, f64>, seconds: f64) -> Result<SolveReport, Problem> {
     let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-    let solved = studies::watched(time, |budget| {
+    let solved = crate::questions::watched(time, |budget| {
         stop::on_signals(&budget.cancel)?;
         production::solve(model, values, budget)
     });
@@ -180,5 +179,5 @@ pub(super) fn plan(job: &Path, server: Option<&Server>) -> Result<(), Problem> {
     }
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let job = documents::read_job_in(&bytes, &most, folder_of(job))?;
-    print_json(&studies::predict(Engine::KERNEL, &job, PLAN_TIME)?)
+    print_json(&crate::questions::predict(Engine::KERNEL, &job, PLAN_TIME)?)
 }

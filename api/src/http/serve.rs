@@ -19,6 +19,7 @@ use super::state::{AppState, Shared};
 use crate::config::Config;
 use crate::jobs::worker;
 use crate::problem::Problem;
+use crate::traces;
 
 /// Between two sweeps of what is too old to keep.
 const SWEEP_EVERY: Duration = Duration::from_secs(3600);
@@ -71,6 +72,7 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
     drop(listener);
     let _ = tokio::time::timeout(drain, connections.shutdown()).await;
     let _ = drained.await;
+    let _ = tokio::task::spawn_blocking(traces::finish).await;
     tracing::info!("down");
     Ok(())
 }

@@ -9,10 +9,12 @@ use tokio::sync::{Semaphore, watch};
 use super::auth::{Owner, RateLimiter};
 use crate::config::Config;
 use crate::documents::Stored;
+use crate::jobs::asked::Asked;
 use crate::jobs::desk::{Desk, DeskLimits};
 use crate::metrics::Metrics;
 use crate::problem::Problem;
 use crate::production::Engine;
+use crate::questions::Question;
 use crate::store::Store;
 
 /// The state of the service, shared by all requests.
@@ -29,6 +31,8 @@ pub struct AppState {
     pub closing: watch::Sender<bool>,
     /// Who does the jobs.
     pub engine: Engine,
+    /// Who answers questions.
+    asked: Asked,
     /// Who submitted how often.
     pub submissions: RateLimiter,
     /// Who called otherwise how often.
@@ -85,6 +89,7 @@ impl AppState {
             metrics,
             closing: watch::Sender::new(false),
             engine,
+            asked: Asked::new(engine),
             submissions,
             calls,
             blocking,
@@ -102,7 +107,15 @@ impl AppState {
         }
     }
 
-    /// Does what blocks (parsing, disk, planning) beside the event loop.
+    /// The answer to an owner's question about a document: in another process, with a limit of its memory. It blocks.
+    ///
+    /// # Errors
+    /// The answer's own.
+    pub fn ask(&self, owner: &Owner, question: Question, document: &[u8]) -> Result<String, Problem> {
+        self.asked.ask(question, document, &self.config.job_limits, &self.store, &self.models_of(owner))
+    }
+
+    /// Does what blocks (parsing, disk, waiting for another process) beside the event loop.
     ///
     /// # Errors
     /// The work's own, or our defect when it panicked.
@@ -111,12 +124,25 @@ impl AppState {
         work: impl FnOnce(&AppState) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let place = Arc::clone(&self.blocking).acquire_owned().await.map_err(|error| Problem::internal(error.to_string()))?;
-        let state = Arc::clone(self);
-        let task = tokio::task::spawn_blocking(move || {
-            let result = work(&state);
+        self.at_once(move |state| {
+            let result = work(state);
             drop(place);
             result
-        });
+        })
+        .await
+    }
+
+    /// Does what blocks for a moment only, and has no memory to speak of, beside the event loop and without waiting for a place: who wants to stop a
+    /// job, or to know how the service is, does not stand behind documents that are being read.
+    ///
+    /// # Errors
+    /// As [`AppState::beside`].
+    pub async fn at_once<T: Send + 'static>(
+        self: &Arc<Self>,
+        work: impl FnOnce(&AppState) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let state = Arc::clone(self);
+        let task = tokio::task::spawn_blocking(move || work(&state));
         task.await.unwrap_or_else(|error| Err(Problem::internal(format!("a request's work failed: {error}"))))
     }
 }

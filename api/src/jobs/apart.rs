@@ -1,4 +1,4 @@
-//! A process that does jobs for a worker of the service, one after the other: the other end of `process.rs`.
+//! A process that does jobs or answers questions for the service, one after the other: the other end of `process.rs`.
 //!
 //! It is asked on stdin, answers on stdout, and knows neither the store nor the network. When stdin closes, because the
 //! service has gone, however it went, this process ends at once.
@@ -15,11 +15,13 @@ use lacuna_kernel::budget::{Budget, CancelToken, Limits, Progress};
 use super::making::{self, Task, Workshop};
 use super::memory;
 use super::messages::{self, Said, Told};
+use super::process::Purpose;
 use super::record::Step;
 use crate::documents::{Stored, StoredMesh};
 use crate::files::PendingFile;
 use crate::problem::Problem;
-use crate::production;
+use crate::production::{self, Engine};
+use crate::questions::{self, Question};
 
 /// Shortest time between two words on the progress of a phase; the service tells its listeners less often.
 const PROGRESS_EVERY: Duration = Duration::from_millis(50);
@@ -28,18 +30,22 @@ const PROGRESS_EVERY: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// When stdin or stdout fails, or what comes in is not understood.
-pub fn serve() -> Result<(), Problem> {
-    memory::give_way();
+pub fn serve(purpose: Purpose) -> Result<(), Problem> {
+    if purpose == Purpose::Jobs {
+        memory::give_way();
+    }
     memory::go_first();
     let (sender, heard) = mpsc::sync_channel(1);
     let listener = std::thread::Builder::new().name("listener".into()).spawn(move || listen(&sender));
     listener.map_err(|error| Problem::io("no thread to listen", &error))?;
     let desk = Desk { heard, said: Arc::default() };
     while let Some(heard) = desk.next() {
-        let Heard::Job(task) = heard else { return Err(Problem::internal("an answer without a question")) };
-        let said =
-            production::guarded(|| desk.perform(&task)).and_then(|said| said).unwrap_or_else(|problem| Said::Failed(Box::new(problem)));
-        drop(task);
+        let said = match heard {
+            Heard::Job(task) => production::guarded(|| desk.perform(&task)),
+            Heard::Question(asked) => production::guarded(|| desk.answer(&asked)),
+            _ => return Err(Problem::internal("an answer without a question")),
+        };
+        let said = said.and_then(|said| said).unwrap_or_else(|problem| Said::Failed(Box::new(problem)));
         desk.say(&said).map_err(|error| Problem::io("stdout", &error))?;
     }
     Ok(())
@@ -48,8 +54,17 @@ pub fn serve() -> Result<(), Problem> {
 /// What came in, with its bytes.
 enum Heard {
     Job(Box<Task>),
-    Mesh(Option<StoredMesh>),
+    Question(Box<Asked>),
+    Stored(Option<Stored>),
     File(String),
+}
+
+/// A question.
+struct Asked {
+    question: Question,
+    document: Vec<u8>,
+    most: Limits,
+    memory_bytes: u64,
 }
 
 /// Listens for the whole life of the process, whatever it computes.
@@ -71,12 +86,17 @@ fn hear(stdin: &mut BufReader<io::Stdin>) -> io::Result<Option<Heard>> {
             let document = messages::announced(stdin, bytes)?;
             Heard::Job(Box::new(Task { document, most: most.into(), input_digest }))
         }
-        Told::Mesh(None) => Heard::Mesh(None),
+        Told::Question { question, bytes, most, memory_bytes } => {
+            let document = messages::announced(stdin, bytes)?;
+            Heard::Question(Box::new(Asked { question, document, most: most.into(), memory_bytes }))
+        }
+        Told::Mesh(None) => Heard::Stored(None),
+        Told::Model(bytes) => Heard::Stored(Some(Stored::Document(messages::announced(stdin, bytes)?))),
         Told::Mesh(Some(head)) => {
             let bytes = messages::announced(stdin, head.bytes)?;
             let format = Format::from_name(&head.format).ok_or(io::ErrorKind::InvalidData)?;
             // By which word it is found again is the service's business.
-            Heard::Mesh(Some(StoredMesh { name: head.name, format, bytes, reference: String::new() }))
+            Heard::Stored(Some(Stored::Mesh(StoredMesh { name: head.name, format, bytes, reference: String::new() })))
         }
         Told::File(name) => Heard::File(name),
     }))
@@ -96,10 +116,18 @@ impl Desk {
 
     fn perform(&self, task: &Task) -> Result<Said, Problem> {
         memory::limit(task.most.memory_bytes)?;
+        // Every job tells of its first step, however shortly before the last one told of a step in a phase of the same name.
+        *crate::locked(&self.said) = None;
         let made = making::make(task, production::compute, self)?;
         // The files stay: they are the service's.
         let outputs = made.files.into_iter().map(|(_, output)| output).collect();
         Ok(Said::Done { outputs, certificate: Box::new(made.certificate) })
+    }
+
+    fn answer(&self, asked: &Asked) -> Result<Said, Problem> {
+        memory::limit(asked.memory_bytes)?;
+        let find = |word: &str| self.stored(word);
+        questions::answer(asked.question, &asked.document, &asked.most, &find, Engine::KERNEL).map(Said::Answer)
     }
 
     fn say(&self, said: &Said) -> io::Result<()> {
@@ -110,9 +138,9 @@ impl Desk {
 
 impl Workshop for Desk {
     fn stored(&self, reference: &str) -> Option<Stored> {
-        self.say(&Said::NeedsMesh(reference.to_owned())).ok()?;
+        self.say(&Said::NeedsStored(reference.to_owned())).ok()?;
         match self.next() {
-            Some(Heard::Mesh(mesh)) => mesh.map(Stored::Mesh),
+            Some(Heard::Stored(stored)) => stored,
             _ => None,
         }
     }

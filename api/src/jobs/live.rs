@@ -11,13 +11,24 @@ use super::record::{JobRecord, JobState, JobView, Step};
 /// Shortest time between two progress events of a phase: enough for a smooth bar.
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 
+/// A phase of an attempt.
+#[derive(Debug)]
+pub struct Phase {
+    /// Its name.
+    pub name: String,
+    /// When it began.
+    pub since: SystemTime,
+    /// The number of the process that computes.
+    pub process: u32,
+}
+
 /// A job of the desk.
 #[derive(Debug)]
 pub struct LiveJob {
     record: Mutex<JobRecord>,
     last_progress: Mutex<Option<Instant>>,
-    /// When each phase of the attempt that is done here began.
-    phases: Mutex<Vec<(String, SystemTime)>>,
+    /// The phases of the attempt that is done here.
+    phases: Mutex<Vec<Phase>>,
     /// Held by whoever makes a lasting change, from reading the record to telling of the change.
     changing: Mutex<()>,
     stopped: Mutex<Option<Instant>>,
@@ -119,8 +130,8 @@ impl LiveJob {
         look(&crate::locked(&self.record))
     }
 
-    /// Takes what the kernel tells of its progress.
-    pub fn progress(&self, step: Step) {
+    /// Takes what the kernel tells of its progress, in a process with this number.
+    pub fn progress(&self, step: Step, process: u32) {
         let now = Instant::now();
         let mut last = crate::locked(&self.last_progress);
         let mut record = crate::locked(&self.record);
@@ -130,15 +141,15 @@ impl LiveJob {
         }
         *last = Some(now);
         if !same_phase {
-            crate::locked(&self.phases).push((step.phase.clone(), SystemTime::now()));
+            crate::locked(&self.phases).push(Phase { name: step.phase.clone(), since: SystemTime::now(), process });
         }
         record.view.progress = Some(step.clone());
         drop(record);
         self.events.push("progress", &step);
     }
 
-    /// When each phase began since this was last asked.
-    pub fn take_phases(&self) -> Vec<(String, SystemTime)> {
+    /// The phases that began since this was last asked.
+    pub fn take_phases(&self) -> Vec<Phase> {
         std::mem::take(&mut *crate::locked(&self.phases))
     }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::{Output, Step};
 use crate::problem::Problem;
+use crate::questions::Question;
 
 /// What the worker tells its process.
 #[derive(Debug, Serialize, Deserialize)]
@@ -22,8 +23,21 @@ pub(super) enum Told {
         /// The digest of what was meant.
         input_digest: String,
     },
-    /// The mesh file that was asked for, which follows; without a head it is not there.
+    /// A question about a document, which follows.
+    Question {
+        /// What is asked.
+        question: Question,
+        /// Bytes of the document.
+        bytes: u64,
+        /// The most that a job may ask for.
+        most: Most,
+        /// The memory that the answer may take, in bytes.
+        memory_bytes: u64,
+    },
+    /// The mesh file that was asked for, which follows; without a head there is none.
     Mesh(Option<MeshHead>),
+    /// The model document that was asked for, which follows, with so many bytes.
+    Model(u64),
     /// The name of an empty file in the process's folder.
     File(String),
 }
@@ -51,8 +65,8 @@ pub(super) enum Said {
     },
     /// How far it has come.
     Progress(Step),
-    /// It needs the mesh file with this reference.
-    NeedsMesh(String),
+    /// It needs what is stored under this word.
+    NeedsStored(String),
     /// It needs an empty file.
     NeedsFile,
     /// It is done: what is told of each file, in the order in which they were asked for.
@@ -62,6 +76,8 @@ pub(super) enum Said {
         /// What is proven of them.
         certificate: Box<Certificate>,
     },
+    /// The answer to a question.
+    Answer(String),
     /// There is no result.
     Failed(Box<Problem>),
 }

@@ -1,10 +1,11 @@
 //! The machine room: jobs are accepted by the desk, kept in a ledger, and done by workers, each a thread with a process
-//! of its own.
+//! of its own. Questions are answered in such processes, too.
 //!
 //! The ledger is the one seam between one process and many: `embedded.rs` keeps everything in memory and in the data
 //! folder, `shared/` in a database that several processes use. What a change does to a job stands in [`record`], once.
 
 pub mod apart;
+pub mod asked;
 pub mod desk;
 mod embedded;
 pub mod events;

@@ -42,7 +42,11 @@ pub fn start(desk: &Arc<Desk>, count: usize, most: Limits, engine: Engine) -> io
         threads.push(std::thread::Builder::new().name(format!("worker-{number}")).spawn(move || {
             let mut place = Place::default();
             while let Some(job) = desk.take() {
-                if made.send(work(&desk, job, &most, engine, &mut place)).is_err() {
+                let done = work(&desk, job, &most, engine, &mut place);
+                if done.job.cancel.reason() == Some(StopReason::Cancelled) {
+                    // Nothing is to be kept of it, and it does not stand behind what is.
+                    record(&desk, done);
+                } else if made.send(done).is_err() {
                     return;
                 }
             }
@@ -122,9 +126,10 @@ fn trace(job: &LiveJob, kind: &str, state: JobState, time: Duration) {
     let span = |name: String, kind, context, parent, start, end, attributes| {
         traces::tell(Span { name, kind, context, parent, start, end, attributes, failed: state == JobState::Failed });
     };
-    let ends: Vec<SystemTime> = phases.iter().skip(1).map(|(_, begun)| *begun).chain([end]).collect();
-    for ((phase, begun), ended) in phases.into_iter().zip(ends) {
-        span(phase, SpanKind::Internal, context.child(), Some(context), begun, ended, Vec::new());
+    let ends: Vec<SystemTime> = phases.iter().skip(1).map(|phase| phase.since).chain([end]).collect();
+    for (phase, ended) in phases.into_iter().zip(ends) {
+        let computed = vec![("lacuna.process.pid", phase.process.into())];
+        span(phase.name, SpanKind::Internal, context.child(), Some(context), phase.since, ended, computed);
     }
     let (id, attempt) = job.with(|record| (record.view.id.clone(), record.view.attempt));
     let attributes = vec![
@@ -166,7 +171,7 @@ impl Workshop for Here<'_> {
         let failed = |error| Problem::io("no thread to watch the time", &error);
         *self.watchdog.borrow_mut() = Some(Watchdog::start(&self.job.cancel, limits.seconds).map_err(failed)?);
         let listener = Arc::clone(self.job);
-        let sink = move |progress: &Progress| listener.progress(Step::from(progress));
+        let sink = move |progress: &Progress| listener.progress(Step::from(progress), std::process::id());
         Ok(Budget { limits, cancel: self.job.cancel.clone(), progress: Some(Arc::new(sink)) })
     }
 

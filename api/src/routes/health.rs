@@ -44,7 +44,7 @@ pub async fn readyz(State(state): State<Shared>) -> Result<Json<Health>, Problem
     if state.desk.is_stopping() {
         return Err(Problem::new(ProblemKind::ShuttingDown, "the service is going down").retry_after(10));
     }
-    state.beside(|state| state.desk.probe()).await.map_err(|problem| {
+    state.at_once(|state| state.desk.probe()).await.map_err(|problem| {
         tracing::error!(code = %problem.code, detail = %problem.detail, "not ready");
         let detail = "what the service keeps its jobs in cannot be used; the log has the cause";
         Problem::new(ProblemKind::Unavailable, detail).code("not-ready").retry_after(10)

@@ -11,7 +11,6 @@ use lacuna_fabrication::JobKind;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use super::studies::{PLAN_TIME, predict};
 use crate::digest::Digest;
 use crate::documents;
 use crate::http::auth::Owner;
@@ -23,6 +22,7 @@ use crate::jobs::live::LiveJob;
 use crate::jobs::record::{Idempotency, JobState, JobView};
 use crate::openapi::Job;
 use crate::problem::{Problem, ProblemKind};
+use crate::questions::Question;
 use crate::traces::Context;
 
 /// Seconds after which to look at a job again.
@@ -124,9 +124,9 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
         found.ok_or_else(|| documents::unknown_job(id))
     });
     let replaced = replaced.transpose()?;
-    match predict(state.engine, job, PLAN_TIME) {
-        // A prediction that takes too long is no reason to refuse what may be done in time.
-        Err(problem) if problem.code != "limit.seconds" => return Err(problem),
+    match state.ask(owner, Question::Plan, body) {
+        // A prediction that takes too long, or more memory than an answer may have, is no reason to refuse what may be done.
+        Err(problem) if !["limit.seconds", "limit.memory"].contains(&problem.code.as_ref()) => return Err(problem),
         _ => {}
     }
     let submission = Submission {
@@ -198,7 +198,7 @@ pub async fn show(State(state): State<Shared>, Extension(owner): Extension<Owner
 )]
 pub async fn cancel(State(state): State<Shared>, Extension(owner): Extension<Owner>, Path(id): Path<String>) -> Result<Response, Problem> {
     let job = find(&state, &owner, &id).await?;
-    state.beside(move |state| state.desk.cancel(&job)).await.map(answer)
+    state.at_once(move |state| state.desk.cancel(&job)).await.map(answer)
 }
 
 /// Stops a job if needed and forgets it.
@@ -212,7 +212,7 @@ pub async fn forget(
     Path(id): Path<String>,
 ) -> Result<StatusCode, Problem> {
     let job = find(&state, &owner, &id).await?;
-    state.beside(move |state| state.desk.forget(&job)).await.map(|()| StatusCode::NO_CONTENT)
+    state.at_once(move |state| state.desk.forget(&job)).await.map(|()| StatusCode::NO_CONTENT)
 }
 
 /// The caller's job with an id; another's is as absent as one that never was.

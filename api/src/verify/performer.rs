@@ -14,7 +14,7 @@ use crate::documents::{self, SolveReport};
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, SolveProblem};
-use crate::routes::studies::{PLAN_TIME, watched};
+use crate::questions::{TIME, watched};
 
 /// Time for the points of a case.
 const POINTS_TIME: Duration = Duration::from_secs(60);
@@ -61,7 +61,7 @@ impl Performer for Here {
     }
 
     fn solution(&self, model: &Model, values: &BTreeMap<String, f64>) -> Result<Solution, Problem> {
-        let solved = watched(PLAN_TIME, |budget| production::solve(model, values, budget)).map_err(|problem| match problem {
+        let solved = watched(TIME, |budget| production::solve(model, values, budget)).map_err(|problem| match problem {
             SolveProblem::Model(problem) => problem,
             SolveProblem::Value { code, message, .. } => Problem::new(ProblemKind::InvalidModel, message).code(code),
         })?;

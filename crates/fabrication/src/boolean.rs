@@ -11,7 +11,7 @@ use lacuna_kernel::solid::TriMesh;
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::operand::{Operand, at_fault, operand, predicted, rounded, share, sources};
-use crate::run::{JobError, Outcome, Plan, wrong_inputs};
+use crate::run::{JobError, Outcome, Plan, stl_bytes, wrong_inputs};
 use crate::{Geometry, Job, Operation, certificate};
 
 /// Does a job of kind `intersect` with an operation.
@@ -90,11 +90,40 @@ fn evaluate(operation: Operation, operands: &mut [Operand], budget: &Budget) -> 
     combined.map_err(|error| at_fault(error, |operand| owners.get(operand).copied().unwrap_or_default()))
 }
 
-/// Predicts the cost of a job of kind `intersect`: that of its inputs, and of what the engine holds beside them.
-pub(crate) fn plan(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
+/// Predicts the cost of a job of kind `intersect`: that of its inputs, and of what the engine holds beside them. What remains of the inputs is known when the
+/// operation is done; so it is done, as `rehearse` does, with a tolerance at which that is soon.
+pub(crate) fn plan(
+    job: &Job,
+    tolerance: Tolerance,
+    budget: &Budget,
+    rehearse: impl Fn(Tolerance, &Budget) -> Result<Outcome, JobError>,
+) -> Result<Plan, JobError> {
     let plan = predicted(&sources(job, budget)?, tolerance, budget)?;
-    Ok(Plan { memory_bytes: plan.memory_bytes + ENGINE_BYTES_PER_TRIANGLE * plan.triangles, ..plan })
+    let memory_bytes = plan.memory_bytes + ENGINE_BYTES_PER_TRIANGLE * plan.triangles;
+    let quiet = Budget { progress: None, ..budget.clone() };
+    let at = |factor: f64| -> Result<Option<f64>, JobError> {
+        match rehearse(Tolerance::new(factor * tolerance.mm())?, &quiet) {
+            Ok(outcome) => Ok(Some(outcome.certificate.triangles as f64)),
+            // Whoever is to stop does not go on; any other refusal may be that of the larger tolerance.
+            Err(error) => budget.cancel.check().map(|()| None).map_err(|_| error),
+        }
+    };
+    // The number of triangles goes with the inverse of the tolerance, or less.
+    let halvings = (plan.counted_triangles.max(plan.triangles) / REHEARSED).log2().ceil().max(0.0);
+    let found = if halvings == 0.0 {
+        at(1.0)?
+    } else if plan.counted_triangles > 0.0 {
+        let (near, far) = (at(halvings.exp2())?, at((halvings + 1.0).exp2())?);
+        near.zip(far).map(|(near, far)| near * (near / far).clamp(1.0, 2.0).powf(halvings))
+    } else {
+        None
+    };
+    let triangles = found.unwrap_or(plan.triangles);
+    Ok(Plan { triangles, output_bytes: stl_bytes(triangles), memory_bytes, ..plan })
 }
+
+/// Triangles of the operands that an operation is done with in some tens of milliseconds.
+const REHEARSED: f64 = 4_000.0;
 
 /// Bytes that the engine holds for each triangle of its operands.
 const ENGINE_BYTES_PER_TRIANGLE: f64 = 500.0;

@@ -62,5 +62,5 @@ pub(crate) fn plan(mesh: &PolygonMesh) -> Plan {
     let (count, vertices) = (triangles(mesh) as f64, mesh.vertices.len() as f64);
     // Coordinates twice, triangles, and the edges that are counted.
     let memory_bytes = 48.0 * vertices + 36.0 * count;
-    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: stl_bytes(count), lattice_pitch_mm: None }
+    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: stl_bytes(count), ..Plan::default() }
 }

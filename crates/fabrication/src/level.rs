@@ -82,5 +82,5 @@ pub(crate) fn plan(job: &Job, level: u32, budget: &Budget) -> Result<Plan, JobEr
     let bounds = bounding_box(&lower(job, budget)?.attractor, budget)?;
     let predicted = predict(ifs, &bounds, level, budget)?;
     let (triangles, memory_bytes) = (predicted.triangles, predicted.memory_bytes);
-    Ok(Plan { triangles, memory_bytes, output_bytes: stl_bytes(triangles), ..Plan::default() })
+    Ok(Plan { triangles, counted_triangles: triangles, memory_bytes, output_bytes: stl_bytes(triangles), ..Plan::default() })
 }

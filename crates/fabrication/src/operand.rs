@@ -210,18 +210,17 @@ pub(crate) fn rounded(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, JobErr
 /// Predicts the cost of making solids of the inputs.
 pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
     let share = share(sources, tolerance)?;
-    let (mut plan, mut accounted) = (Plan::default(), 0.0);
+    let mut plan = Plan::default();
     for source in sources {
         if source.radius_mm > 0.0 {
-            let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, budget)?;
+            let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, true, budget)?;
             plan.triangles += prediction.triangles;
-            accounted += prediction.memory_bytes;
+            plan.counted_triangles += prediction.counted_triangles;
+            // One is made after the other.
+            plan.memory_bytes = plan.memory_bytes.max(held_bytes(&prediction, true));
         } else {
             plan.triangles += source.attractor.roots().len() as f64;
         }
-    }
-    if accounted > 0.0 {
-        plan.memory_bytes = held_bytes(accounted);
     }
     plan.output_bytes = stl_bytes(plan.triangles);
     Ok(plan)

@@ -2,7 +2,7 @@
 
 use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refine_with_normals, stream};
 use lacuna_kernel::budget::{Budget, Limits, Stopped};
-use lacuna_kernel::dilation::{DilationError, dilate_unsimplified, predict};
+use lacuna_kernel::dilation::{DilationError, Prediction, dilate_unsimplified, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
@@ -67,11 +67,14 @@ pub struct Plan {
     /// Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that
     /// the boundary of the result needs.
     pub leaf_cells: f64,
-    /// Triangles of the lattice's mesh, against which the limit of triangles is held; simplification leaves a tenth to a hundredth of them.
+    /// Triangles of the result without simplification, which leaves a tenth to a hundredth of them. Of an operation on solids: those of its result.
     pub triangles: f64,
-    /// Peak memory of the process that does the job, in bytes: what simplification of models whose cells overlap much takes besides is not in it. 0 where nothing is predicted.
+    /// Triangles against which the limit of triangles is held: those of the lattices as they are first made.
+    #[cfg_attr(feature = "wire", serde(default))]
+    pub counted_triangles: f64,
+    /// Peak memory of the process that does the job, in bytes. 0 where nothing is predicted.
     pub memory_bytes: f64,
-    /// Bytes of the lattice's mesh as binary STL.
+    /// Bytes of a binary STL file with so many `triangles`.
     pub output_bytes: f64,
     /// Edge of the lattice's cubes.
     pub lattice_pitch_mm: Option<f64>,
@@ -401,14 +404,17 @@ pub(crate) fn stl_bytes(triangles: f64) -> f64 {
     84.0 + 50.0 * triangles
 }
 
-/// What a process holds for each byte that a lattice is accounted for: found on the fixtures, on two cores, as is the next. `fixtures/ESTIMATES.md` shows how well they do.
+/// What a process holds for each byte that a lattice is accounted for where its mesh is left as it is: found on the fixtures, as is the next.
+/// `fixtures/ESTIMATES.md` shows how well they do.
 const HELD_PER_BYTE: f64 = 2.0;
+/// Threads that simplify at a time, each with memory of its own. The machine of the process that does the job may have more.
+const THREADS: f64 = 2.0;
 /// What a process holds that does next to nothing, in bytes: the program, its threads and their stacks.
 const PROCESS_BYTES: f64 = 18e6;
 
-/// Peak memory of making a lattice that is accounted for so many bytes.
-pub(crate) fn held_bytes(accounted: f64) -> f64 {
-    HELD_PER_BYTE * accounted
+/// Peak memory of a dilation. Blocks that are simplified shrink before they are joined: then what is held is the lattice once, and what simplification takes.
+pub(crate) fn held_bytes(prediction: &Prediction, simplify: bool) -> f64 {
+    if simplify { prediction.memory_bytes + THREADS * prediction.simplifying_bytes } else { HELD_PER_BYTE * prediction.memory_bytes }
 }
 
 /// Bytes that an evaluation holds for each leaf cell.
@@ -431,8 +437,14 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
-        JobKind::Intersect if job.params.operation == Some(Operation::Split) => return split::plan(job, tolerance, budget),
-        JobKind::Intersect if job.params.operation.is_some() => return boolean::plan(job, tolerance, budget),
+        JobKind::Intersect if job.params.operation == Some(Operation::Split) => {
+            let how = split_of(job)?;
+            return boolean::plan(job, tolerance, budget, |tolerance, budget| split::split(job, &how, tolerance, budget));
+        }
+        JobKind::Intersect if job.params.operation.is_some() => {
+            let operation = job.params.operation.unwrap_or(Operation::Union);
+            return boolean::plan(job, tolerance, budget, |tolerance, budget| boolean::combine(job, operation, tolerance, budget));
+        }
         JobKind::Slice => return slice::plan(job, tolerance, budget),
         // Nothing is made, and what a search costs shows in the search.
         JobKind::Intersect => return Ok(Plan::default()),
@@ -457,11 +469,13 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         return Ok(Plan { leaf_cells, memory_bytes: counted * BYTES_PER_CELL, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
-    let prediction = predict(&lowered.attractor, radius, tolerance, budget)?;
+    let simplify = job.kind == JobKind::Solidify && job.params.simplify;
+    let prediction = predict(&lowered.attractor, radius, tolerance, simplify, budget)?;
     Ok(Plan {
         leaf_cells,
         triangles: prediction.triangles,
-        memory_bytes: held_bytes(prediction.memory_bytes),
+        counted_triangles: prediction.counted_triangles,
+        memory_bytes: held_bytes(&prediction, simplify),
         output_bytes: stl_bytes(prediction.triangles),
         lattice_pitch_mm: Some(prediction.pitch_mm),
     })

@@ -630,6 +630,7 @@ PlaceStatement = TypedDict('PlaceStatement', {
 })
 
 Plan = TypedDict('Plan', {
+    'counted_triangles': 'NotRequired[float]',
     'lattice_pitch_mm': 'NotRequired[float | None]',
     'leaf_cells': 'float',
     'memory_bytes': 'float',

@@ -298,6 +298,10 @@ impl Shared {
                     Ok(Some(job)) => {
                         crate::locked(&self.held).insert(job.id(), Arc::clone(&job));
                         upkeep::keep_alive(self, &job);
+                        if self.closed.load(Ordering::SeqCst) {
+                            // Taken while this process began to go: who stops what runs may have looked before.
+                            job.cancel.fire(lacuna_kernel::budget::StopReason::Cancelled);
+                        }
                         return Some(job);
                     }
                     Ok(None) => {}

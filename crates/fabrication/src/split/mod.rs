@@ -273,12 +273,6 @@ fn join(
     Ok(placed)
 }
 
-/// Predicts the cost: that of the solid, and of what the engine holds beside it.
-pub(crate) fn plan(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<crate::Plan, JobError> {
-    let source = Source::only(job, budget)?;
-    crate::operand::predicted(std::slice::from_ref(&source), tolerance, budget)
-}
-
 /// What rounding takes from a build volume on both sides.
 fn margin(ends: [DVec3; 2]) -> f64 {
     4.0 * carried(ends[0].abs().max(ends[1].abs()).max_element() * 2.0)

@@ -49,7 +49,7 @@ impl Assembly<'_, '_> {
         if surface.triangles.is_empty() {
             return Ok(None);
         }
-        let core = self.core(node);
+        let core = self.pass.core(node);
         let idle = self.idle.lock().map(|mut idle| idle.pop()).unwrap_or_default();
         let mut simplifier = idle.unwrap_or_else(|| Simplifier::new(self.pass.rule, self.pass.setting));
         simplifier.run(self.pass.setting, &core, &kept, &mut surface);
@@ -68,10 +68,12 @@ impl Assembly<'_, '_> {
         // The first axis orders the map.
         self.blocks.range([node.first_block[0], i64::MIN, i64::MIN]..[end(0), i64::MIN, i64::MIN]).any(|(block, _)| inside(block))
     }
+}
 
+impl Pass<'_> {
     /// The box that only tetrahedra of the node meet: those of its lower neighbours reach half a pitch into it.
-    fn core(&self, node: Node) -> Core {
-        let lattice = &self.pass.setting.lattice;
+    pub(super) fn core(&self, node: Node) -> Core {
+        let lattice = &self.setting.lattice;
         let corner = |blocks: i64| lattice.corner(node.first_block.map(|block| (block + blocks) * SIDE as i64));
         Core { low: corner(0).map(|x| x + (0.5 + MARGIN) * lattice.pitch), high: corner(node.blocks).map(|x| x - MARGIN * lattice.pitch) }
     }

@@ -188,6 +188,11 @@ pub(super) struct Nearby {
 }
 
 impl Nearby {
+    /// Bytes of its views: one for each vertex and each site near it.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.views)
+    }
+
     /// Forgets all; sites cover within `reach` and are looked for up to the root of `first_square` at first.
     pub(super) fn reset(&mut self, vertices: usize, reach: f64, first_square: f64) {
         self.ranges.clear();

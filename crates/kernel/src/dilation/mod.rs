@@ -26,6 +26,7 @@ mod lattice;
 mod octree;
 mod outside;
 mod plan;
+mod sample;
 mod simplify;
 mod smooth;
 mod stability;
@@ -163,22 +164,32 @@ fn drawn(error: RefineError, share: f64) -> DilationError {
 /// What a dilation is predicted to cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// Triangles of the result.
+    /// Triangles that the limit of triangles is held against: those of the lattice as it is first.
+    pub counted_triangles: f64,
+    /// Triangles of the result without simplification: what is refined for the topology is in it, what is no more than rounding is not.
     pub triangles: f64,
-    /// Peak memory in bytes.
+    /// Memory that the surface takes at its peak, in bytes.
     pub memory_bytes: f64,
+    /// Memory that the simplification takes for each thread, in bytes; 0 without it.
+    pub simplifying_bytes: f64,
     /// a, in mm.
     pub pitch_mm: f64,
 }
 
-/// Predicts what [`dilate`] will make, from a coarse lattice.
+/// Predicts what [`dilate`] will make, or without `simplify` [`dilate_unsimplified`], from a sample of the lattice.
 ///
 /// # Errors
 /// As [`dilate`], for what shows before the work.
-pub fn predict(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Prediction, DilationError> {
+pub fn predict(
+    attractor: &Attractor,
+    radius: Radius,
+    tolerance: Tolerance,
+    simplify: bool,
+    budget: &Budget,
+) -> Result<Prediction, DilationError> {
     let resolved = resolve(attractor, radius, tolerance, budget)?;
     let one = Balls { least: radius.mm(), most: radius.mm() };
     let (attractor, balls, tolerance) =
         resolved.as_ref().map_or((attractor, one, tolerance), |resolved| (&resolved.attractor, resolved.balls, resolved.rest));
-    Plan::new(attractor, balls, tolerance, true, budget)?.predict(budget)
+    Plan::new(attractor, balls, tolerance, simplify, budget)?.predict(budget)
 }

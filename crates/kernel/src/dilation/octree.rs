@@ -290,7 +290,7 @@ impl<'a> Pass<'a> {
         Some(keep)
     }
 
-    fn block(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<BlockSurface>, DilationError> {
+    pub(super) fn block(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<BlockSurface>, DilationError> {
         let idle = self.workshops.lock().map(|mut idle| idle.pop()).unwrap_or_default();
         let mut workshop = idle.unwrap_or_else(|| Workshop::new(self.rule, self.setting));
         let surface = self.surface(&mut workshop, node, candidates, open);

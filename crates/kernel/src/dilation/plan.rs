@@ -96,8 +96,6 @@ const MOST_REFINED: usize = 2_000;
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
 const BYTES_PER_TRIANGLE: f64 = 120.0;
-/// Triangles that a prediction may make to be surer.
-const PREDICTION_WORK: f64 = 300_000.0;
 
 impl Setting {
     fn new(radius: f64, outer: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
@@ -314,26 +312,25 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Predicts from a lattice of twice the pitch or more, as many triangles to an area in units of the pitch.
+    /// Predicts from a sample of the lattice's blocks.
     pub(super) fn predict(&self, budget: &Budget) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
             limits: crate::budget::Limits { triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
             progress: None,
             ..budget.clone()
         };
-        let prediction = |triangles: f64| Prediction { triangles, memory_bytes: triangles * BYTES_PER_TRIANGLE, pitch_mm: self.pitch };
-        let coarsest = (COARSEST * self.balls.least).max(self.pitch);
-        let mut pitch = coarsest;
-        loop {
-            let setting = self.setting(pitch, &unlimited);
-            let surfaces = self.surfaces(&setting, &self.space(&setting), &Grading::default(), Task::Whole, &unlimited)?;
-            let made = surfaces.iter().map(|surface| surface.triangles.len() as f64).sum::<f64>();
-            let expected = |finer: f64| made * (pitch / finer).powi(2);
-            if pitch <= self.pitch || expected((0.5 * pitch).max(self.pitch)) > PREDICTION_WORK {
-                return Ok(prediction(expected(self.pitch)));
-            }
-            pitch = (0.5 * pitch).max(self.pitch);
-        }
+        let setting = self.setting(self.pitch, &unlimited);
+        let (space, grading) = (self.space(&setting), Grading::default());
+        let pass = self.pass(&setting, &grading, Task::Whole, &unlimited, space.blocks);
+        let expected = pass.expected(space.blocks, &space.candidates, !self.clean_only)?;
+        let memory_bytes = expected.made.max(expected.triangles) * BYTES_PER_TRIANGLE;
+        Ok(Prediction {
+            counted_triangles: expected.made,
+            triangles: expected.triangles,
+            memory_bytes,
+            simplifying_bytes: expected.simplifying,
+            pitch_mm: self.pitch,
+        })
     }
 
     /// The dilation. Where the distance may have critical points with values that the lattice does not tell from r, it is

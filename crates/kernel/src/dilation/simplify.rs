@@ -84,6 +84,11 @@ impl<'a> Simplifier<'a> {
         }
     }
 
+    /// Bytes of what it has beside the surface since it was last run: what grows with the sites near a vertex.
+    pub(super) fn bytes(&self) -> usize {
+        self.tree.bytes() + self.nearby.bytes()
+    }
+
     /// Simplifies a node's surface. Vertices that are `settled` are tried again only when something around them changes; all that could be
     /// tried become so.
     pub(super) fn run(&mut self, setting: &Setting, core: &Core, candidates: &Candidates, surface: &mut BlockSurface) {

@@ -162,6 +162,15 @@ impl<'a> Tree<'a> {
         }
     }
 
+    /// Bytes of what its lists hold.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes)
+            + size_of_val(&*self.cells)
+            + size_of_val(&*self.points)
+            + size_of_val(&*self.sites)
+            + size_of_val(&*self.point_sites)
+    }
+
     /// Empties the tree and adds the candidates under groups of neighbours; returns the ids of the groups that have none above them. A group has
     /// candidates of one solid, or of none.
     pub(super) fn reset(&mut self, candidates: &Candidates) -> Vec<NodeId> {

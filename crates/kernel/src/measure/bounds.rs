@@ -4,12 +4,13 @@
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, dot};
 use crate::attractor::trim::{TrimmedSurface, Window};
 use crate::attractor::{Attractor, OwnRadius, StateBound};
-use crate::automaton::LeafPrimitive;
+use crate::automaton::{Automaton, LeafPrimitive, StateId, SubdivisionOperator};
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
 use crate::order::ordered_by;
 use glam::DVec3;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 /// The box of a shape: lower and upper ends per axis, each an interval that contains the exact one, in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,10 +63,34 @@ fn length(direction: &Point) -> f64 {
 struct Branch {
     bound: f64,
     cell: Cell,
-    points: Vec<ControlPoint>,
+    points: Points,
     depth: u32,
     /// Where the cell lies in the parameter plane, if its surface is trimmed.
-    window: Option<Window>,
+    window: Option<Box<Window>>,
+}
+
+/// Control points of a cell that waits. Most never have their turn, and where a smooth shape is flat tens of thousands wait: each has those of its
+/// parent, which all its siblings share, and its own are worked out when it is its turn.
+enum Points {
+    Own(Vec<ControlPoint>),
+    /// Of the parent, with its state and the number of the transition.
+    Parents(Arc<[ControlPoint]>, StateId, u32),
+}
+
+impl Points {
+    /// The control points themselves.
+    fn get(self, automaton: &Automaton) -> Vec<ControlPoint> {
+        match self {
+            Self::Own(points) => points,
+            Self::Parents(points, state, number) => child(&points, &automaton.state(state).transitions[number as usize].operator),
+        }
+    }
+}
+
+fn child(points: &[ControlPoint], operator: &SubdivisionOperator) -> Vec<ControlPoint> {
+    let mut own = vec![[0.0; 4]; operator.columns()];
+    child_points(points, operator, &mut own);
+    own
 }
 
 // Among equal bounds the smaller cell first: it ends the search sooner.
@@ -205,7 +230,7 @@ impl<'a> Search<'a> {
         self.largest_term = self.largest_term.max(terms.sum());
         // Cells that cannot win are not stored; later ones may still raise `reached`.
         if bound > self.reached {
-            self.heap.push(Branch { bound, cell, points, depth: 0, window });
+            self.heap.push(Branch { bound, cell, points: Points::Own(points), depth: 0, window: window.map(Box::new) });
         }
     }
 
@@ -226,13 +251,13 @@ impl<'a> Search<'a> {
                 budget.cancel.check()?;
             }
             let state = attractor.state_of(&branch.cell);
+            let own: Arc<[ControlPoint]> = branch.points.get(attractor.automaton()).into();
             for (index, transition) in state.transitions.iter().enumerate() {
                 let window = branch.window.as_ref().and_then(|window| attractor.child_window(branch.cell.root as usize, window, index));
                 if window.as_ref().is_some_and(Window::is_outside) {
                     continue;
                 }
-                let mut points = vec![[0.0; 4]; transition.operator.columns()];
-                child_points(&branch.points, &transition.operator, &mut points);
+                let points = child(&own, &transition.operator);
                 let child = attractor.child_cell(&branch.cell, index, &points);
                 let (floor, ceiling) = cell_support(attractor, &child, &points, direction);
                 match &window {
@@ -242,7 +267,9 @@ impl<'a> Search<'a> {
                     _ => reached = reached.max(floor),
                 }
                 if ceiling > reached {
-                    heap.push(Branch { bound: ceiling.min(branch.bound), cell: child, points, depth: branch.depth + 1, window });
+                    let points = Points::Parents(Arc::clone(&own), branch.cell.state, index as u32);
+                    let (bound, window) = (ceiling.min(branch.bound), window.map(Box::new));
+                    heap.push(Branch { bound, cell: child, points, depth: branch.depth + 1, window });
                 }
             }
             bound = reached;

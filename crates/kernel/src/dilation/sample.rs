@@ -1,0 +1,227 @@
+//! How many triangles a lattice will have, from a sample of its blocks.
+//!
+//! The octree is descended level by level. Of the nodes of a level that the surface may meet as many are followed as can be in a moment, chosen
+//! at random, one of each run of neighbours; each stands for as many as there were for one of those. So every block has the same chance to be
+//! reached, whatever its place, and the sum over the blocks that are, times the inverse of that chance, has the number sought as its mean
+//! (D. E. Knuth, "Estimating the efficiency of backtrack programs", Math. Comp. 29, 1975; P. C. Chen, "Heuristic sampling", SIAM J. Comput. 21, 1992).
+//! A lattice with no more blocks than a sample has is counted, not estimated.
+
+use super::DilationError;
+use super::lattice::Grading;
+use super::octree::{Changed, Node, Pass, Task};
+use super::plan::Setting;
+use super::simplify::Simplifier;
+use super::tree::Candidates;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+/// Nodes of a level that are followed: enough for an error of some ten per cent.
+const FOLLOWED: usize = 48;
+/// Of the blocks at the end so many are made at a time, and so often at least, until they have so many triangles and leaf cells.
+const AT_A_TIME: usize = 4;
+const AT_LEAST: usize = 3;
+const ENOUGH: u64 = 40_000;
+/// What a list that grows to twice what it holds takes for each byte in it, in the mean.
+const GROWN: f64 = 1.5;
+
+/// What is expected of a lattice's surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Expected {
+    /// Triangles as they are made at first.
+    pub(super) made: f64,
+    /// Triangles after the refinement that the topology asks for, without those that are no more than rounding.
+    pub(super) triangles: f64,
+    /// Most bytes that the simplification of a block holds besides.
+    pub(super) simplifying: f64,
+}
+
+/// What was made of a block.
+#[derive(Clone, Copy, Default)]
+struct Made {
+    made: u64,
+    triangles: u64,
+    leaves: u64,
+    simplifying: usize,
+}
+
+/// What an octree's nodes share with the halves of it: the cells that may matter in them, and the solids whose surface may meet them.
+type Inherited = Arc<(Candidates, Vec<u32>)>;
+
+impl Pass<'_> {
+    /// What is expected in the cube of `blocks` blocks a side that begins at block 0; `simplify` tells whether the simplification is of interest.
+    ///
+    /// Deterministic, for any number of threads. Cost: that of eight times [`FOLLOWED`] nodes for each level, and of the blocks that are made.
+    ///
+    /// # Errors
+    /// As [`Pass::run`].
+    pub(super) fn expected(&self, blocks: i64, candidates: &Candidates, simplify: bool) -> Result<Expected, DilationError> {
+        let solids: Vec<u32> = (0..self.attractor.solids().len() as u32).collect();
+        let mut level = vec![(Node { first_block: [0; 3], blocks }, Inherited::new((candidates.clone(), solids)))];
+        let (mut stands_for, mut chance) = (1.0, Chance(1));
+        loop {
+            let reduced: Vec<Result<Option<(Node, Inherited)>, DilationError>> = level
+                .into_par_iter()
+                .with_max_len(1)
+                .map(|(node, inherited)| {
+                    self.budget.cancel.check()?;
+                    Ok(self.reduce(node, &inherited.0, &inherited.1)?.map(|kept| (node, Inherited::new(kept))))
+                })
+                .collect();
+            let mut met = Vec::with_capacity(reduced.len());
+            for node in reduced {
+                met.extend(node?);
+            }
+            let followed = followed(met, &mut stands_for, &mut chance);
+            if followed.first().is_none_or(|(node, _)| node.blocks == 1) {
+                return self.expected_of(followed, stands_for, &mut chance, simplify);
+            }
+            level = followed.iter().flat_map(|(node, kept)| node.children().into_iter().map(|child| (child, Arc::clone(kept)))).collect();
+        }
+    }
+}
+
+impl Pass<'_> {
+    /// What is expected of blocks that stand for so many each, from as many of them as are enough.
+    fn expected_of(
+        &self,
+        mut blocks: Vec<(Node, Inherited)>,
+        stands_for: f64,
+        chance: &mut Chance,
+        simplify: bool,
+    ) -> Result<Expected, DilationError> {
+        // In no order, so that the first are like all.
+        for last in (1..blocks.len()).rev() {
+            blocks.swap(last, (chance.next() * (last + 1) as f64) as usize);
+        }
+        let mut cleaning = self.setting.clone();
+        cleaning.clean_only = true;
+        let (mut sum, mut done) = (Made::default(), 0);
+        for (round, some) in blocks.chunks(AT_A_TIME).enumerate() {
+            // What simplification holds differs little from block to block; to find it takes as long as all the rest.
+            let simplify = simplify && round == 0;
+            let made: Vec<Result<Made, DilationError>> =
+                some.par_iter().with_max_len(1).map(|(node, inherited)| self.made(*node, inherited, &cleaning, simplify)).collect();
+            for made in made {
+                let made = made?;
+                sum = Made {
+                    made: sum.made + made.made,
+                    triangles: sum.triangles + made.triangles,
+                    leaves: sum.leaves + made.leaves,
+                    simplifying: sum.simplifying.max(made.simplifying),
+                };
+            }
+            done += some.len();
+            if round + 1 >= AT_LEAST && sum.triangles.max(sum.made) + sum.leaves > ENOUGH {
+                break;
+            }
+        }
+        let each = stands_for * blocks.len() as f64 / done.max(1) as f64;
+        Ok(Expected { made: sum.made as f64 * each, triangles: sum.triangles as f64 * each, simplifying: sum.simplifying as f64 * GROWN })
+    }
+
+    /// A block as it is made at first, and as it is when it has been refined by itself and cleaned.
+    fn made(&self, node: Node, inherited: &Inherited, cleaning: &Setting, simplify: bool) -> Result<Made, DilationError> {
+        self.budget.cancel.check()?;
+        let (candidates, open) = (&inherited.0, &inherited.1);
+        let Some(mut surface) = self.block(node, candidates, open)? else { return Ok(Made::default()) };
+        let (made, leaves) = (surface.triangles.len() as u64, surface.leaves);
+        let (mut grading, mut affected) = (Grading::default(), BTreeSet::new());
+        let mut critical = std::mem::take(&mut surface.critical);
+        loop {
+            let mut new = Vec::new();
+            critical.into_iter().for_each(|cube| grading.subdivide(cube, &mut new));
+            if new.is_empty() {
+                break;
+            }
+            let changed = Changed::around(&new);
+            critical = self.graded(&grading, Task::Search(&changed)).block(node, candidates, open)?.unwrap_or_default().critical;
+            affected.extend(changed.blocks);
+        }
+        if !affected.is_empty() {
+            surface = self.graded(&grading, Task::Surface(&affected)).block(node, candidates, open)?.unwrap_or_default();
+        }
+        surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
+        let core = self.core(node);
+        Simplifier::new(self.rule, cleaning).run(cleaning, &core, candidates, &mut surface);
+        let triangles = surface.triangles.len() as u64;
+        let mut simplifying = 0;
+        if simplify {
+            surface.settled.clear();
+            let mut simplifier = Simplifier::new(self.rule, self.setting);
+            simplifier.run(self.setting, &core, candidates, &mut surface);
+            simplifying = simplifier.bytes();
+        }
+        Ok(Made { made, triangles, leaves, simplifying })
+    }
+
+    /// Another task of the same pass over a lattice that is graded otherwise.
+    fn graded<'b>(&'b self, grading: &'b Grading, task: Task<'b>) -> Pass<'b> {
+        Pass {
+            attractor: self.attractor,
+            rule: self.rule,
+            setting: self.setting,
+            grading,
+            task,
+            budget: self.budget,
+            triangles: AtomicU64::new(0),
+            failed: AtomicBool::new(false),
+            done: AtomicU64::new(0),
+            space: self.space,
+            workshops: Mutex::default(),
+        }
+    }
+}
+
+/// Of nodes in their order in space as many as are followed: one of each of so many runs of equal length. `stands_for` becomes what each stands for.
+fn followed<T: Clone>(nodes: Vec<T>, stands_for: &mut f64, chance: &mut Chance) -> Vec<T> {
+    if nodes.len() <= FOLLOWED {
+        return nodes;
+    }
+    let run = nodes.len() as f64 / FOLLOWED as f64;
+    *stands_for *= run;
+    // Where runs do not end between two nodes, two of them may choose the same one.
+    let chosen = (0..FOLLOWED).map(|number| ((number as f64 + chance.next()) * run) as usize);
+    chosen.map(|index| nodes[index.min(nodes.len() - 1)].clone()).collect()
+}
+
+/// Numbers in [0, 1) that are the same every time (S. Vigna, "An experimental exploration of Marsaglia's xorshift generators", 2016: splitmix64).
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_has_the_mean_of_what_it_is_of() {
+        // Values that differ by three orders of magnitude and come in waves; the mean of many samples of them is their sum.
+        let values: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k % 37).powi(2) + f64::from(k) * 0.5).collect();
+        let sum: f64 = values.iter().sum();
+        let mut chance = Chance(7);
+        let samples = 2000;
+        let mut total = 0.0;
+        for _ in 0..samples {
+            let mut stands_for = 1.0;
+            let chosen = followed(values.clone(), &mut stands_for, &mut chance);
+            assert_eq!(chosen.len(), FOLLOWED);
+            total += chosen.iter().sum::<f64>() * stands_for;
+        }
+        // The standard error of this mean is below 0.3 per cent.
+        assert!((total / f64::from(samples) / sum - 1.0).abs() < 0.015, "{}", total / f64::from(samples) / sum);
+        let mut stands_for = 1.0;
+        assert_eq!(followed(vec![1, 2, 3], &mut stands_for, &mut chance), [1, 2, 3]);
+        assert_eq!(stands_for, 1.0);
+    }
+}
