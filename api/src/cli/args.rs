@@ -274,7 +274,7 @@ pub(super) struct SolidifyArgs {
     #[arg(long)]
     pub(super) stability: bool,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -329,7 +329,7 @@ pub(super) struct MeasureArgs {
     #[arg(long, value_name = "G/CM3", value_parser = positive)]
     pub(super) density: Option<f64>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -400,7 +400,7 @@ pub(super) struct IntersectArgs {
     #[arg(long, value_name = "FILE.png", requires = "operation")]
     pub(super) preview: Option<PathBuf>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -434,7 +434,7 @@ pub(super) struct SliceArgs {
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) step: Option<f64>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -505,7 +505,7 @@ pub(super) struct ConvertArgs {
     #[arg(long, value_name = "FORMAT")]
     pub(super) format: Option<String>,
     /// Make the mesh a solid first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. Polygons become triangles where anything is done, which is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
 }
