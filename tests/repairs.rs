@@ -118,7 +118,12 @@ fn what_cannot_be_repaired_is_refused_with_its_place() {
     let scratch = Scratch::new();
     let (open, out) = (scratch.join("open.stl"), scratch.join("out.stl"));
     std::fs::write(&open, stl(&cuboid([0.0; 3], [4.0; 3])[..8])).unwrap();
-    let named = &["the hole of 6 edges at [0, 0, 0] is not closed", "and may have 0.25", "leave out the repair and give a radius_mm"];
+    let named = &[
+        "the hole of 4 edges at [0, 0, 0] is not closed",
+        "would have 0.500",
+        "and may have 0.25",
+        "leave out the repair and give a radius_mm",
+    ];
     refused(&run(words("measure FILE --tolerance 0.01 --repair", &[&open])), named);
     refused(&run(words("convert FILE FILE --repair", &[&open, &out])), named);
     refused(&run(words("slice FILE --tolerance 0.01 --step 1 -o FILE --repair", &[&open, &scratch.join("out.svg")])), named);
@@ -176,7 +181,7 @@ fn the_service_repairs_uploads_as_the_command_does_files() {
     assert_eq!(view["state"], "succeeded", "{view}");
     let certificate = &view["certificate"];
     let statement = json!([{ "input": "boxes", "changed": true, "joined_vertices": 0, "removed_flat_triangles": 0, "removed_copies": 0,
-        "parted_edges": 1, "doubled_vertices": 2, "turned_triangles": 12, "crossings": 0 }]);
+        "closed_holes": 0, "closing_triangles": 0, "longest_hole_edges": 0, "parted_edges": 1, "doubled_vertices": 2, "turned_triangles": 12, "crossings": 0 }]);
     assert_eq!((&certificate["repair"], &certificate["components"]), (&statement, &json!(2)));
     holds(&certificate["volume_mm3"], 1.0);
 

@@ -306,10 +306,10 @@ fn small_holes_are_closed() {
         assert_eq!((done, shape(&solid)), (wanted, [1, 0, 0]));
         assert!((volume(solid.mesh()) - 8.0).abs() < 1e-12);
     }
-    // Two sides are as much as the corners of one bowl: nobody knows which.
-    let mut bowl = cube(0.0, 2.0);
-    bowl.triangles.truncate(8);
-    assert!(matches!(refused(&bowl), RepairError::Hole { reason: Unfilled::Large { .. }, .. }), "{:?}", refused(&bowl));
+    // A square tube: its ends have half the area of its sides, which is more than small.
+    let mut tube = cube(0.0, 2.0);
+    tube.triangles.truncate(8);
+    assert!(matches!(refused(&tube), RepairError::Hole { reason: Unfilled::Large { .. }, .. }), "{:?}", refused(&tube));
     // A sheet has a border, and nothing behind it.
     let sheet = TriMesh { vertices: cube(0.0, 2.0).vertices, triangles: vec![[0, 1, 3], [0, 3, 2]] };
     assert!(matches!(refused(&sheet), RepairError::Hole { edges: 4, reason: Unfilled::Crossing, .. }), "{:?}", refused(&sheet));
