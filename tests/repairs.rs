@@ -52,8 +52,8 @@ fn json_of(path: &Path) -> Value {
 
 /// The statement that all readers of the broken box come to; an STL file's corners are joined by reading it.
 fn done(input: &str, joined: u64) -> Value {
-    json!([{ "input": input, "changed": true, "joined_vertices": joined, "removed_flat_triangles": 1, "removed_copies": 1, "parted_edges": 0,
-        "doubled_vertices": 0, "turned_triangles": 14, "crossings": 0 }])
+    json!([{ "input": input, "changed": true, "joined_vertices": joined, "removed_flat_triangles": 1, "removed_copies": 1, "closed_holes": 0, "closing_triangles": 0,
+        "longest_hole_edges": 0, "parted_edges": 0, "doubled_vertices": 0, "turned_triangles": 14, "crossings": 0 }])
 }
 
 #[track_caller]
@@ -108,17 +108,22 @@ fn every_command_repairs_only_when_asked() {
     assert_eq!((&found["closed_manifold"], &found["volume_mm3"], &found["triangles"]), (&json!(true), &json!(56.0), &json!(24)));
 
     // Nobody asked.
-    refused(&run(words("slice FILE --tolerance 0.01 --at 2 -o FILE", &[&text, &drawing])), &["face 13: vertex 0 occurs twice"]);
+    refused(&run(words("slice FILE --tolerance 0.01 --at 2 -o FILE", &[&text, &drawing])), &["face 13: vertex 0 occurs twice", "--repair"]);
     let union = "intersect FILE FILE --operation union --tolerance 0.01 -o FILE";
-    refused(&run(words(union, &[&other, &other, &out])), &["ask for a repair"]);
+    refused(&run(words(union, &[&other, &other, &out])), &["ask for a repair", "--repair"]);
 }
 
 #[test]
 fn what_cannot_be_repaired_is_refused_with_its_place() {
     let scratch = Scratch::new();
     let (open, out) = (scratch.join("open.stl"), scratch.join("out.stl"));
-    std::fs::write(&open, stl(&cuboid([0.0; 3], [4.0; 3])[..10])).unwrap();
-    let named = &["4 edges have one triangle only", "from [0, 0, 4] to [0, 4, 4]", "leave out the repair and give a radius_mm"];
+    std::fs::write(&open, stl(&cuboid([0.0; 3], [4.0; 3])[..8])).unwrap();
+    let named = &[
+        "the hole of 4 edges at [0, 0, 0] is not closed",
+        "would have 0.500",
+        "and may have 0.25",
+        "leave out the repair and give a radius_mm",
+    ];
     refused(&run(words("measure FILE --tolerance 0.01 --repair", &[&open])), named);
     refused(&run(words("convert FILE FILE --repair", &[&open, &out])), named);
     refused(&run(words("slice FILE --tolerance 0.01 --step 1 -o FILE --repair", &[&open, &scratch.join("out.svg")])), named);
@@ -176,7 +181,7 @@ fn the_service_repairs_uploads_as_the_command_does_files() {
     assert_eq!(view["state"], "succeeded", "{view}");
     let certificate = &view["certificate"];
     let statement = json!([{ "input": "boxes", "changed": true, "joined_vertices": 0, "removed_flat_triangles": 0, "removed_copies": 0,
-        "parted_edges": 1, "doubled_vertices": 2, "turned_triangles": 12, "crossings": 0 }]);
+        "closed_holes": 0, "closing_triangles": 0, "longest_hole_edges": 0, "parted_edges": 1, "doubled_vertices": 2, "turned_triangles": 12, "crossings": 0 }]);
     assert_eq!((&certificate["repair"], &certificate["components"]), (&statement, &json!(2)));
     holds(&certificate["volume_mm3"], 1.0);
 
@@ -197,4 +202,16 @@ fn the_service_repairs_uploads_as_the_command_does_files() {
 
     let evaluated = service.post("/v1/jobs", &order("evaluate", json!({ "tolerance_mm": 0.1, "repair": true }), json!(["obj"])));
     assert_eq!((evaluated.status, &evaluated.json()["errors"][0]["pointer"]), (422, &json!("/params/repair")));
+}
+
+#[test]
+fn small_holes_are_closed_and_told() {
+    let scratch = Scratch::new();
+    let open = scratch.join("open.stl");
+    std::fs::write(&open, stl(&cuboid([0.0; 3], [4.0; 3])[..10])).unwrap();
+    let measured: Value = serde_json::from_slice(&succeed(words("measure FILE --tolerance 0.01 --repair", &[&open]))).unwrap();
+    let told = &measured["repair"][0];
+    assert_eq!([&told["closed_holes"], &told["closing_triangles"], &told["longest_hole_edges"]], [&json!(1), &json!(2), &json!(4)]);
+    holds(&measured["volume_mm3"], 64.0);
+    assert!(measured["warnings"][0].as_str().unwrap().contains("1 holes closed, 2 triangles added to close them"), "{measured}");
 }

@@ -237,7 +237,7 @@ fn prompts(file: &MeshFile, volume: f64, topology: &Topology) -> Vec<Prompt> {
         prompt("file.left-out", format!("{count} shapes of the kind {word} hold no polygons and were left out"));
     }
     if !topology.is_closed_manifold() {
-        prompt("mesh.not-manifold", "the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing".to_owned());
+        prompt("mesh.not-manifold", "the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing; lacuna convert --repair mends what leaves no doubt".to_owned());
     } else if volume < 0.0 {
         prompt("mesh.inside-out", format!("the enclosed volume is {volume} mm3: the faces look inwards"));
     }

@@ -250,6 +250,7 @@ export interface ContactStatement {
   distance_mm: Array<number>;
   inside?: InsideStatement | null;
   /** The nearest pair of cells that was looked at. */ nearest: CellPairStatement;
+  /** Pairs of cells whose distance was bounded: what the search cost. */ pairs_looked_at: number;
   /** The places, a thousand at most. */ places: Array<PlaceStatement>;
   /** What is proven. */ verdict: ContactVerdict;
 }
@@ -542,7 +543,7 @@ export interface JobParams {
   /** Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent. */ oriented_box?: boolean;
   /** For trim: the normal of a plane, of any length, and its distance from the origin along that, in mm. What the normal points to is taken away. */ plane?: Array<number>;
   /** The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate and convert. */ radius_mm?: number;
-  /** Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved and no hole filled: open meshes are refused with the place. Absent for evaluate; false when absent. */ repair?: boolean;
+  /** Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved. Holes of up to 64 edges, of at most a quarter of the area of the surface, are closed by triangles between their corners that meet nothing else; other open meshes are refused with the place. Absent for evaluate; false when absent. */ repair?: boolean;
   /** On which side of that surface the wall is: inward (the solid becomes hollow) or outward (what the surface bounds becomes the hollow); inward when absent. */ side?: "inward" | "outward";
   /** Whether triangles are saved within the bound: for solidify alone; true when absent. */ simplify?: boolean;
   /** Whether the certificate says at which radii from half to twice radius_mm the topology changes, and from which on the shape is one piece: for solidify alone; false when absent. */ stability?: boolean;
@@ -982,15 +983,18 @@ export interface Remark {
 }
 
 /**
- * What a repair did to an input that is a mesh. No point of the surface was moved and no hole filled. All counts
- * but that of the crossings are 0 where the mesh was left as it is.
+ * What a repair did to an input that is a mesh. No point of the surface was moved. All counts but that of the
+ * crossings are 0 where the mesh was left as it is.
  */
 export interface RepairStatement {
   /** Whether anything was done; if not, the mesh is used as it came. */ changed: boolean;
+  /** Holes that were closed by triangles between their corners, of at most 64 edges each and a quarter of the surface's area together. */ closed_holes: number;
+  /** Triangles that close them. None meets another one elsewhere than in common corners and edges. */ closing_triangles: number;
   /** Pairs of triangles that meet elsewhere than in common corners and edges. No repair changes them. */ crossings: number;
   /** Vertices that were doubled, so that parts that meet there only are not joined. */ doubled_vertices: number;
   /** Name of the input. */ input: string;
   /** Vertices that became one with another at the same place. */ joined_vertices: number;
+  /** Edges around the longest of these holes. */ longest_hole_edges: number;
   /** Edges of four triangles or more, around which those were joined that bound the same wedge of material. */ parted_edges: number;
   /** Triangles with the corners of another that were taken away, and walls between pieces that fill the space on both sides. */ removed_copies: number;
   /** Triangles without area that were taken away; those across their longest edge were cut where that was needed. */ removed_flat_triangles: number;

@@ -277,7 +277,7 @@ pub(super) struct SolidifyArgs {
     #[arg(long)]
     pub(super) stability: bool,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -332,7 +332,7 @@ pub(super) struct MeasureArgs {
     #[arg(long, value_name = "G/CM3", value_parser = positive)]
     pub(super) density: Option<f64>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -403,7 +403,7 @@ pub(super) struct IntersectArgs {
     #[arg(long, value_name = "FILE.png", requires = "operation")]
     pub(super) preview: Option<PathBuf>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -437,7 +437,7 @@ pub(super) struct SliceArgs {
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) step: Option<f64>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
     #[command(flatten)]
@@ -508,7 +508,7 @@ pub(super) struct ConvertArgs {
     #[arg(long, value_name = "FORMAT")]
     pub(super) format: Option<String>,
     /// Make the mesh a solid first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. Polygons become triangles where anything is done, which is told;
-    /// no hole is filled, and an open mesh is refused.
+    /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
     #[arg(long)]
     pub(super) repair: bool,
 }

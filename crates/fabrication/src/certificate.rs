@@ -294,6 +294,8 @@ pub struct ContactStatement {
     pub nearest: CellPairStatement,
     /// The places, a thousand at most.
     pub places: Vec<PlaceStatement>,
+    /// Pairs of cells whose distance was bounded: what the search cost.
+    pub pairs_looked_at: u64,
     /// Whether there are no other places, and the distance is as narrow as the tolerance allows.
     pub complete: bool,
 }

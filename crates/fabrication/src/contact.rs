@@ -169,6 +169,7 @@ fn statement(found: &Contact) -> ContactStatement {
         inside: None,
         nearest: pair(&found.nearest),
         places: found.places.iter().take(MOST_PLACES).map(place).collect(),
+        pairs_looked_at: found.pairs_looked_at,
         complete: found.complete,
     }
 }

@@ -68,7 +68,7 @@ pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a
 /// The refusal of an input that bounds nothing.
 fn not_a_solid(name: &str, fault: &str) -> JobError {
     let message = format!(
-        "input '{name}' encloses nothing: {fault}; give it a \"radius_mm\", and it is dilated by a ball of that radius, or ask for a repair if it is a mesh"
+        "input '{name}' encloses nothing: {fault}; give it a \"radius_mm\", and it is dilated by a ball of that radius, or ask for a repair if it is a mesh (--repair, \"repair\": true): it joins corners, turns triangles and closes small holes"
     );
     JobError::new(Kind::Invalid, "job.not-a-solid", message)
 }

@@ -10,7 +10,7 @@ use lacuna_kernel::solid::{Repair, RepairError, Repaired, repair};
 use crate::run::JobError;
 use crate::{Certificate, Job};
 
-/// What a repair did to an input that is a mesh. No point of the surface was moved and no hole filled. All counts but that of the crossings are 0 where the mesh
+/// What a repair did to an input that is a mesh. No point of the surface was moved. All counts but that of the crossings are 0 where the mesh
 /// was left as it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
@@ -26,6 +26,12 @@ pub struct RepairStatement {
     pub removed_flat_triangles: u64,
     /// Triangles with the corners of another that were taken away, and walls between pieces that fill the space on both sides.
     pub removed_copies: u64,
+    /// Holes that were closed by triangles between their corners, of at most 64 edges each and a quarter of the surface's area together.
+    pub closed_holes: u64,
+    /// Triangles that close them. None meets another one elsewhere than in common corners and edges.
+    pub closing_triangles: u64,
+    /// Edges around the longest of these holes.
+    pub longest_hole_edges: u64,
     /// Edges of four triangles or more, around which those were joined that bound the same wedge of material.
     pub parted_edges: u64,
     /// Vertices that were doubled, so that parts that meet there only are not joined.
@@ -44,6 +50,9 @@ impl RepairStatement {
             joined_vertices: repair.joined_vertices,
             removed_flat_triangles: repair.flat_triangles,
             removed_copies: repair.copied_triangles,
+            closed_holes: repair.filled_holes,
+            closing_triangles: repair.filling_triangles,
+            longest_hole_edges: repair.longest_hole_edges,
             parted_edges: repair.parted_edges,
             doubled_vertices: repair.doubled_vertices,
             turned_triangles: repair.turned_triangles,
@@ -58,6 +67,8 @@ impl RepairStatement {
             (self.joined_vertices, "vertices joined"),
             (self.removed_flat_triangles, "triangles without area removed"),
             (self.removed_copies, "copies of triangles removed"),
+            (self.closed_holes, "holes closed"),
+            (self.closing_triangles, "triangles added to close them"),
             (self.parted_edges, "edges of more than two triangles parted"),
             (self.doubled_vertices, "vertices doubled"),
             (self.turned_triangles, "triangles turned"),

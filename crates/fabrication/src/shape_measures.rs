@@ -6,7 +6,9 @@ use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::mesh_of;
 use lacuna_kernel::measure::section::{NoDirection, PlaneFrame};
-use lacuna_kernel::measure::{NotEnclosed, Side, ThicknessMap, enclosed_volume, extent_along, oriented_box, thickness, thickness_map};
+use lacuna_kernel::measure::{
+    NotEnclosed, Side, Thickness, ThicknessMap, enclosed_volume, extent_along, oriented_box, thickness, thickness_map,
+};
 use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
@@ -185,18 +187,19 @@ pub(crate) fn walls_and_gaps(mesh: &TriMesh, mapped: bool, budget: &Budget) -> R
         let message = format!("{crossings} pairs of faces of the solid meet where they are not joined: its walls have no thickness there");
         return Err(JobError::new(Kind::Unreachable, "thickness.crossings", message));
     }
-    let of = |side: Side| -> Result<Option<LeastThicknessStatement>, JobError> {
-        let found = thickness(mesh, side, budget)?;
-        Ok(found.map(|found| LeastThicknessStatement {
+    let stated = |found: Option<Thickness>| {
+        found.map(|found| LeastThicknessStatement {
             least_mm: [found.least.low, found.least.high],
             between_mm: found.between.map(|point| point.to_array()),
-        }))
+        })
     };
-    let least = ThicknessStatement { wall: of(Side::Wall)?, gap: of(Side::Gap)? };
     if !mapped {
-        return Ok((least, Geometry::None));
+        let [wall, gap] = [thickness(mesh, Side::Wall, budget)?, thickness(mesh, Side::Gap, budget)?];
+        return Ok((ThicknessStatement { wall: stated(wall), gap: stated(gap) }, Geometry::None));
     }
+    // The map tells the least as well.
     let [wall, gap] = [thickness_map(mesh, Side::Wall, budget)?, thickness_map(mesh, Side::Gap, budget)?];
+    let least = ThicknessStatement { wall: stated(wall.least), gap: stated(gap.least) };
     Ok((least, Geometry::Thickness(Box::new(MappedThickness { mesh: mesh.clone(), wall, gap }))))
 }
 

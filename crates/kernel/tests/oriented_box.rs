@@ -94,3 +94,36 @@ fn no_box_is_smaller_than_the_bound() {
         }
     }
 }
+
+/// Many points: of a turned box, whose corners alone matter; of a long and thin ellipsoid, whose own box is the smallest (its widths along any three axes at right
+/// angles multiply to at least those along its own, by Hadamard's inequality); and of a ball.
+#[test]
+fn many_points_have_the_box_of_their_hull() {
+    let mut random = Random(8);
+    let turn = DMat3::from_quat(DQuat::from_rotation_x(0.7) * DQuat::from_rotation_y(-1.9) * DQuat::from_rotation_z(0.3));
+    let place = DVec3::new(5.0, -70.0, 3.0);
+    let mut points: Vec<DVec3> = corners(DVec3::new(10.0, 4.0, 1.0));
+    points.extend((0..60_000).map(|_| DVec3::new(10.0, 4.0, 1.0) * 0.5 * random.point(1.0)));
+    // On the faces, and in rows.
+    points.extend((0..30_000).map(|k| {
+        DVec3::new(5.0, 2.0, 0.5) * [DVec3::X, DVec3::Y, DVec3::Z][k % 3] + [DVec3::Y, DVec3::Z, DVec3::X][k % 3] * 0.5 * random.unit()
+    }));
+    let points: Vec<DVec3> = points.into_iter().map(|p| turn * p + place).collect();
+    let box_of = found(&points, 0.0, 1e-3);
+    assert_holds(&box_of, &points);
+    assert!(box_of.complete && box_of.volume.low <= 40.0 && (box_of.volume.high - 40.0).abs() < 1e-6, "{:?}", box_of.volume);
+
+    let ball: Vec<DVec3> = (0..60_000).map(|_| random.point(1.0).normalize_or(DVec3::X)).collect();
+    let sizes = DVec3::new(10.0, 4.0, 1.0);
+    let ellipsoid: Vec<DVec3> = ball.iter().map(|p| turn * (sizes * *p) + place).collect();
+    let box_of = found(&ellipsoid, 0.0, 1e-2);
+    assert_holds(&box_of, &ellipsoid);
+    let exact = 8.0 * sizes.element_product();
+    assert!(box_of.complete, "{:?}", box_of.volume);
+    // Points on it are not all of it.
+    assert!(box_of.volume.low <= exact && box_of.volume.high >= 0.99 * exact && box_of.volume.high <= 1.01 * exact, "{:?}", box_of.volume);
+
+    let box_of = found(&ball, 0.5, 2e-2);
+    assert_holds(&box_of, &ball);
+    assert!(box_of.volume.low <= 2.5_f64.powi(3) && box_of.volume.high >= 2.49_f64.powi(3), "{:?}", box_of.volume);
+}

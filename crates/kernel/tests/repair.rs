@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::measure::mass::volume;
-use lacuna_kernel::solid::{Repair, RepairError, Repaired, Solid, Topology, TriMesh, repair};
+use lacuna_kernel::solid::{Crossings, Repair, RepairError, Repaired, Solid, Topology, TriMesh, Unfilled, repair};
 
 /// A box with outward faces.
 fn cuboid(low: [f64; 3], high: [f64; 3]) -> TriMesh {
@@ -180,10 +180,11 @@ fn triangles_without_area() {
 
 #[test]
 fn what_is_not_repaired_is_told() {
+    // Two holes that share a corner are no two loops.
     let mut open = cube(0.0, 2.0);
-    open.triangles.truncate(10);
-    let Err(RepairError::Open { boundary, odd, from, to }) = repair(&open, &Budget::default()) else { panic!("it is open") };
-    assert_eq!((boundary, odd, from, to), (4, 0, DVec3::new(0.0, 0.0, 2.0), DVec3::new(2.0, 0.0, 2.0)));
+    open.triangles.retain(|corners| ![[0, 4, 6], [0, 1, 5]].contains(corners));
+    let Err(RepairError::Open { boundary, odd, .. }) = repair(&open, &Budget::default()) else { panic!("it is open") };
+    assert_eq!((boundary, odd), (6, 0));
     // A wall of one sheet within.
     let mut walled = cube(0.0, 2.0);
     walled.triangles.extend([[0, 3, 7], [0, 7, 4]]);
@@ -291,4 +292,102 @@ fn random_damage_is_undone() {
             assert_eq!(again, Repaired { solid: None, repair: Repair::default() }, "seed {seed}");
         }
     }
+}
+
+#[test]
+fn small_holes_are_closed() {
+    // A side of a cube, a fifth of the rest; and a triangle.
+    for left in [10, 11] {
+        let mut open = cube(0.0, 2.0);
+        open.triangles.truncate(left);
+        let (solid, done) = repaired(&open);
+        let edges = 14 - left as u64;
+        let wanted = Repair { filled_holes: 1, filling_triangles: edges - 2, longest_hole_edges: edges, ..Repair::default() };
+        assert_eq!((done, shape(&solid)), (wanted, [1, 0, 0]));
+        assert!((volume(solid.mesh()) - 8.0).abs() < 1e-12);
+    }
+    // A square tube: its ends have half the area of its sides, which is more than small.
+    let mut tube = cube(0.0, 2.0);
+    tube.triangles.truncate(8);
+    assert!(matches!(refused(&tube), RepairError::Hole { reason: Unfilled::Large { .. }, .. }), "{:?}", refused(&tube));
+    // A sheet has a border, and nothing behind it.
+    let sheet = TriMesh { vertices: cube(0.0, 2.0).vertices, triangles: vec![[0, 1, 3], [0, 3, 2]] };
+    assert!(matches!(refused(&sheet), RepairError::Hole { edges: 4, reason: Unfilled::Crossing, .. }), "{:?}", refused(&sheet));
+    // A ring of a torus left out: two loops that no triangles between their own corners may join wrongly; as discs they make a ball of it.
+    let mut ring = torus(12, 30);
+    ring.triangles.drain(..24);
+    let (solid, done) = repaired(&ring);
+    assert_eq!((done.filled_holes, done.filling_triangles, done.longest_hole_edges, shape(&solid)), (2, 20, 12, [1, 0, 0]));
+    // As many edges as there may be, and one more.
+    for (across, is_filled) in [(64, true), (65, false)] {
+        let mut ring = torus(across, 100);
+        ring.triangles.drain(..2 * across);
+        match repair(&ring, &Budget::default()) {
+            Ok(found) => assert!(is_filled && found.repair.longest_hole_edges == 64),
+            Err(error) => assert!(!is_filled && matches!(error, RepairError::Hole { edges: 65, reason: Unfilled::Long { most: 64 }, .. })),
+        }
+    }
+    // A bar through the hole of a side is in the way of whatever closes it.
+    let mut pierced = cube(0.0, 2.0);
+    pierced.triangles.truncate(10);
+    let pierced = both(&pierced, &cuboid([0.5, 0.5, 1.0], [0.75, 1.5, 3.0]));
+    let both_ways = both(&pierced, &cuboid([1.25, 0.5, 1.0], [1.5, 1.5, 3.0]));
+    assert!(matches!(refused(&both_ways), RepairError::Hole { edges: 4, reason: Unfilled::Crossing, .. }));
+}
+
+/// Patches taken from closed surfaces at random: either the result is a solid without crossings whose triangles are those that were there and those that are told,
+/// or the hole is told by one of its corners.
+#[test]
+fn removed_patches_are_closed_or_told() {
+    let mut seed = 12_u64;
+    let mut random = |below: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as usize % below
+    };
+    let mut closed = 0;
+    for round in 0..200 {
+        let mut mesh = torus(8 + round % 9, 12 + round % 7);
+        // Bumps, so that holes are not plane.
+        for vertex in &mut mesh.vertices {
+            *vertex *= 1.0 + 0.01 * random(10) as f64;
+        }
+        for _ in 0..1 + random(3) {
+            let start = mesh.triangles[random(mesh.triangles.len())];
+            let mut patch: Vec<u32> = start.to_vec();
+            for _ in 0..random(4) {
+                let near = mesh
+                    .triangles
+                    .iter()
+                    .find(|corners| corners.iter().any(|c| patch.contains(c)) && corners.iter().any(|c| !patch.contains(c)));
+                patch.extend(near.into_iter().flatten());
+            }
+            mesh.triangles.retain(|corners| !corners.iter().all(|corner| patch.contains(corner)));
+        }
+        let crossings = Crossings::of(&mesh, &Budget::default()).unwrap().count;
+        match repair(&mesh, &Budget::default()) {
+            Ok(found) => {
+                let solid = found.solid.unwrap();
+                assert!(found.repair.filled_holes > 0 && found.repair.longest_hole_edges >= 3);
+                assert_eq!(solid.mesh().triangles.len(), mesh.triangles.len() + found.repair.filling_triangles as usize);
+                assert_eq!(Crossings::of(solid.mesh(), &Budget::default()).unwrap().count, crossings);
+                let sorted = |mesh: &TriMesh, corners: &[u32; 3]| {
+                    let mut places = corners.map(|corner| mesh.vertices[corner as usize].to_array().map(f64::to_bits));
+                    places.sort_unstable();
+                    places
+                };
+                let there: Vec<_> = solid.mesh().triangles.iter().map(|corners| sorted(solid.mesh(), corners)).collect();
+                assert!(mesh.triangles.iter().all(|corners| there.contains(&sorted(&mesh, corners))));
+                closed += 1;
+            }
+            Err(RepairError::Hole { at, .. }) => assert!(mesh.vertices.contains(&at)),
+            Err(RepairError::Open { .. }) => {
+                // Some corner is passed twice.
+                let halves: Vec<[u32; 2]> = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+                let border = || halves.iter().filter(|[from, to]| !halves.contains(&[*to, *from]));
+                assert!(border().any(|[from, _]| border().filter(|[other, _]| other == from).count() > 1), "{round}");
+            }
+            Err(other) => panic!("{round}: {other}"),
+        }
+    }
+    assert!(closed >= 80, "{closed}");
 }

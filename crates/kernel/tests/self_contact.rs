@@ -318,3 +318,26 @@ fn limits_cancellation_and_the_same_answer() {
     budget.cancel.fire(StopReason::Cancelled);
     assert!(matches!(intersect_self(&curve, &query(0.1), &budget), Err(ContactError::Stopped(_))));
 }
+
+/// Segments of a wire that go on from their common end, and those that go back.
+#[test]
+fn segments_that_go_back_are_told() {
+    let wire = |points: &[[f64; 3]]| mesh(points.to_vec(), (1..points.len() as u32).map(|k| vec![k - 1, k]).collect());
+    // On in a line, around a corner, and back beside the way: the ends are apart by 1.
+    is_free(&wire(&[[0.0; 3], [10.0, 0.0, 0.0], [20.0, 0.0, 0.0], [20.0, 10.0, 0.0], [0.0, 10.0, 0.0]]), 0.01);
+    // Back on itself, by less, by as much and by more than it came; and aslant, where rounding would not tell.
+    for back in [4.0, 0.0, -5.0] {
+        let found = ask(&wire(&[[0.0; 3], [10.0, 0.0, 0.0], [back, 0.0, 0.0], [back, 30.0, 0.0]]), 0.01);
+        assert_eq!((found.verdict(), found.distance_mm.high), (Verdict::Touching, 0.0));
+        assert!(is_in_a_place(&found, DVec3::new(8.0, 0.0, 0.0)));
+    }
+    let found = ask(&wire(&[[1.0, 2.0, 3.0], [4.0, 8.0, 12.0], [2.0, 4.0, 6.0], [2.0, -40.0, 6.0]]), 0.01);
+    assert_eq!(found.verdict(), Verdict::Touching);
+    // A copy of a segment.
+    let copied = mesh(vec![[0.0; 3], [10.0, 0.0, 0.0], [0.0, 5.0, 0.0]], vec![vec![0, 1], vec![1, 0], vec![0, 2]]);
+    assert_eq!(ask(&copied, 0.01).verdict(), Verdict::Touching);
+    // An angle of 1e-9 is no overlap, though arms so near count as near.
+    let sharp =
+        intersect_self(&wire(&[[0.0; 3], [10.0, 0.0, 0.0], [0.0, 1e-8, 0.0], [0.0, 40.0, 0.0]]), &query(0.01), &Budget::default()).unwrap();
+    assert_ne!(sharp.verdict(), Verdict::Touching);
+}

@@ -199,6 +199,7 @@ fn no_ray_is_shorter() {
         let mesh = joined(&[lump, moved]);
         for side in [Side::Wall, Side::Gap] {
             let map = map(&mesh, side);
+            assert_eq!(map.least, least(&mesh, side));
             let thinnest = least(&mesh, side).map_or(f64::INFINITY, |found| f64::midpoint(found.least.low, found.least.high));
             for values in [&map.faces, &map.vertices] {
                 let found = values.iter().copied().fold(f64::INFINITY, f64::min);

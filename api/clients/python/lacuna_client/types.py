@@ -191,6 +191,7 @@ ContactStatement = TypedDict('ContactStatement', {
     'distance_mm': 'list[float]',
     'inside': 'NotRequired[InsideStatement | None]',
     'nearest': 'CellPairStatement',
+    'pairs_looked_at': 'int',
     'places': 'list[PlaceStatement]',
     'verdict': 'ContactVerdict',
 })
@@ -705,10 +706,13 @@ Remark = TypedDict('Remark', {
 
 RepairStatement = TypedDict('RepairStatement', {
     'changed': 'bool',
+    'closed_holes': 'int',
+    'closing_triangles': 'int',
     'crossings': 'int',
     'doubled_vertices': 'int',
     'input': 'str',
     'joined_vertices': 'int',
+    'longest_hole_edges': 'int',
     'parted_edges': 'int',
     'removed_copies': 'int',
     'removed_flat_triangles': 'int',

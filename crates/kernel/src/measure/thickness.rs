@@ -12,6 +12,7 @@ use crate::solid::TriMesh;
 use crate::solid::box_tree::{Box32, BoxTree};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Which side of the faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,14 +37,16 @@ pub struct Thickness {
 /// The thickness of a mesh on one side, all over it. Infinite where no face lies across.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThicknessMap {
+    /// The least of it, as [`thickness()`] tells it; `None` where no face has another one over it.
+    pub least: Option<Thickness>,
     /// The least thickness over each triangle, in mm.
     pub faces: Vec<f64>,
     /// At each vertex the least of the triangles around it, in mm: the least of all vertices is that of the mesh.
     pub vertices: Vec<f64>,
 }
 
-/// Triangles of which the least is found together.
-const CHUNK: u32 = 256;
+/// Leaves of the tree whose triangles are looked at one after the other.
+const CHUNK: usize = 64;
 /// Shadows of less area than this share of the squared lengths have none: faces along the normal.
 const FLAT: f64 = 1e-12;
 
@@ -138,13 +141,14 @@ impl<'m> Faces<'m> {
         Self { mesh, tree }
     }
 
-    /// The nearest face over another one, at most as high as a bound; of equally high ones the first.
-    fn over(&self, below: u32, side: Side, bound: f64, polygons: &mut [Vec<DVec3>; 2]) -> Option<Over> {
+    /// The nearest face over another one, at most as high as a bound; of equally high ones the first. One that is over a neighbour, and those beside it, are looked at
+    /// before the tree is searched, for what they tell is often the answer, and leaves little to search.
+    fn over(&self, below: u32, side: Side, bound: f64, guess: Option<u32>, polygons: &mut [Vec<DVec3>; 2]) -> Option<Over> {
         let face = Face::new(corners(self.mesh, below), side)?;
         let own = self.mesh.triangles[below as usize];
         let mut best: Option<Over> = None;
         let entry = |around: &Box32| face.entry(around);
-        self.tree.nearest(bound, entry, |leaf| {
+        let mut look = |leaf: usize| {
             for (&other, around) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)) {
                 if entry(around).is_none() || self.mesh.triangles[other as usize].iter().any(|corner| own.contains(corner)) {
                     continue;
@@ -157,8 +161,56 @@ impl<'m> Faces<'m> {
                 }
             }
             best.map_or(bound, |best| best.0)
-        });
+        };
+        let bound = guess.map_or(bound, |other| look(self.tree.leaf_with(other)));
+        self.tree.nearest(bound, entry, look);
         best
+    }
+}
+
+/// What lies over the faces of a mesh.
+struct Search<'m> {
+    faces: Faces<'m>,
+    side: Side,
+    budget: &'m Budget,
+}
+
+impl Search<'_> {
+    /// What lies over each face, by leaves of the tree, in which neighbours follow each other. What is higher than a bound need not be found: it is asked with the
+    /// least that was found in the chunk so far.
+    fn all(&self, bound: impl Fn(f64) -> f64 + Sync) -> Result<Vec<(u32, Over)>, Stopped> {
+        let leaves = self.faces.tree.leaves();
+        let of_chunk = |chunk: usize| {
+            let mut polygons = Default::default();
+            let (mut found, mut guess, mut least) = (Vec::new(), None, f64::INFINITY);
+            for leaf in chunk * CHUNK..leaves.min((chunk + 1) * CHUNK) {
+                if self.budget.cancel.reason().is_some() {
+                    break;
+                }
+                for &face in self.faces.tree.items(leaf) {
+                    if let Some(over) = self.faces.over(face, self.side, bound(least), guess, &mut polygons) {
+                        (guess, least) = (Some(over.1), least.min(over.0));
+                        found.push((face, over));
+                    }
+                }
+            }
+            found
+        };
+        let chunks: Vec<_> = (0..leaves.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+        self.budget.cancel.check()?;
+        Ok(chunks.concat())
+    }
+
+    /// The least, and of equal ones that of the first face.
+    fn least(&self, found: &[(u32, Over)]) -> Option<Thickness> {
+        let mesh = self.faces.mesh;
+        let &(face, (height, other, point)) = found.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0).then(a.0.cmp(&b.0)))?;
+        let low = mesh.vertices.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high = mesh.vertices.iter().copied().reduce(DVec3::max).unwrap_or_default();
+        let slack = 64.0 * f64::EPSILON * (low.abs().max(high.abs()).max_element() + low.distance(high));
+        let least = Interval { low: (height - slack).max(0.0), high: height + slack };
+        let foot = Face::new(corners(mesh, face), self.side).map_or(point, |face| point - face.direction * height);
+        Some(Thickness { least, between: [foot, point], faces: [face, other] })
     }
 }
 
@@ -169,49 +221,26 @@ impl<'m> Faces<'m> {
 /// # Errors
 /// [`Stopped`].
 pub fn thickness(mesh: &TriMesh, side: Side, budget: &Budget) -> Result<Option<Thickness>, Stopped> {
-    let faces = Faces::of(mesh);
-    let count = mesh.triangles.len() as u32;
-    let least_of = |chunk: u32| {
-        let mut polygons = Default::default();
-        let mut best: Option<(u32, Over)> = None;
-        for face in chunk * CHUNK..count.min((chunk + 1) * CHUNK) {
-            if budget.cancel.reason().is_some() {
-                return None;
-            }
-            let bound = best.map_or(f64::INFINITY, |(_, (height, ..))| height);
-            best = match faces.over(face, side, bound, &mut polygons) {
-                Some(over) if over.0 < bound => Some((face, over)),
-                _ => best,
-            };
-        }
-        best
-    };
-    let chunks: Vec<Option<(u32, Over)>> = (0..count.div_ceil(CHUNK)).into_par_iter().map(least_of).collect();
-    budget.cancel.check()?;
-    let least = chunks.into_iter().flatten().reduce(|a, b| if b.1.0 < a.1.0 { b } else { a });
-    Ok(least.map(|(face, (height, other, point))| {
-        let low = mesh.vertices.iter().copied().reduce(DVec3::min).unwrap_or_default();
-        let high = mesh.vertices.iter().copied().reduce(DVec3::max).unwrap_or_default();
-        let slack = 64.0 * f64::EPSILON * (low.abs().max(high.abs()).max_element() + low.distance(high));
-        let least = Interval { low: (height - slack).max(0.0), high: height + slack };
-        let foot = Face::new(corners(mesh, face), side).map_or(point, |face| point - face.direction * height);
-        Thickness { least, between: [foot, point], faces: [face, other] }
-    }))
+    let search = Search { faces: Faces::of(mesh), side, budget };
+    // Heights are not negative: their bits are in their order. What others have found first only saves work: a face is left out only if it is higher than the
+    // least of all, whenever that is found.
+    let least = AtomicU64::new(f64::INFINITY.to_bits());
+    let found = search.all(|own| f64::from_bits(least.fetch_min(own.to_bits(), Ordering::Relaxed)).min(own))?;
+    Ok(search.least(&found))
 }
 
-/// The thickness on one side over every face of a closed mesh that does not cross itself: [`thickness()`] is the least of it, and it costs as much for each face
-/// alone. The result does not depend on the number of threads.
+/// The thickness on one side over every face of a closed mesh that does not cross itself, and the least of it. It costs as much for each face as [`thickness()`] does
+/// for the first. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Stopped`].
 pub fn thickness_map(mesh: &TriMesh, side: Side, budget: &Budget) -> Result<ThicknessMap, Stopped> {
-    let all = Faces::of(mesh);
-    let of = |polygons: &mut [Vec<DVec3>; 2], face: u32| match budget.cancel.reason() {
-        None => all.over(face, side, f64::INFINITY, polygons).map_or(f64::INFINITY, |over| over.0),
-        Some(_) => f64::INFINITY,
-    };
-    let faces: Vec<f64> = (0..mesh.triangles.len() as u32).into_par_iter().map_init(Default::default, of).collect();
-    budget.cancel.check()?;
+    let search = Search { faces: Faces::of(mesh), side, budget };
+    let found = search.all(|_| f64::INFINITY)?;
+    let mut faces = vec![f64::INFINITY; mesh.triangles.len()];
+    for (face, (height, ..)) in &found {
+        faces[*face as usize] = *height;
+    }
     let mut vertices = vec![f64::INFINITY; mesh.vertices.len()];
     for (corners, thickness) in mesh.triangles.iter().zip(&faces) {
         for &corner in corners {
@@ -219,5 +248,5 @@ pub fn thickness_map(mesh: &TriMesh, side: Side, budget: &Budget) -> Result<Thic
             *least = least.min(*thickness);
         }
     }
-    Ok(ThicknessMap { faces, vertices })
+    Ok(ThicknessMap { least: search.least(&found), faces, vertices })
 }

@@ -85,7 +85,9 @@ fn repetition(face: &[u32]) -> Option<(&'static str, String)> {
     let mut sorted = face.to_vec();
     sorted.sort_unstable();
     let pair = sorted.windows(2).find(|pair| pair[0] == pair[1]);
-    pair.map(|pair| ("mesh.repeated-vertex", format!("vertex {} occurs twice", pair[0])))
+    pair.map(|pair| {
+        ("mesh.repeated-vertex", format!("vertex {} occurs twice; a repair (--repair, \"repair\": true) takes such faces away", pair[0]))
+    })
 }
 
 /// A fan is the polygon when no triangle of it turns against the whole.

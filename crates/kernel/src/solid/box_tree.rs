@@ -142,6 +142,11 @@ impl BoxTree {
         start(leaf)..start(leaf + 1)
     }
 
+    /// The leaf that holds an item of the tree.
+    pub(crate) fn leaf_with(&self, item: u32) -> usize {
+        leaf_of(self.places[item as usize] as usize, self.order.len(), self.leaves)
+    }
+
     /// The box of a leaf.
     pub(crate) fn leaf_box(&self, leaf: usize) -> &Box32 {
         &self.nodes[self.leaves + leaf]

@@ -15,7 +15,7 @@ use crate::measure::mass::volume;
 pub use crossings::Crossings;
 use glam::DVec3;
 pub use inside::Inside;
-pub use repair::{Repair, RepairError, Repaired, repair};
+pub use repair::{Repair, RepairError, Repaired, Unfilled, repair};
 pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.

@@ -135,7 +135,7 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
         ),
         optional(
             "repair",
-            "Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved and no hole filled: open meshes are refused with the place. Absent for evaluate; false when absent.",
+            "Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved. Holes of up to 64 edges, of at most a quarter of the area of the surface, are closed by triangles between their corners that meet nothing else; other open meshes are refused with the place. Absent for evaluate; false when absent.",
             flag,
         ),
         optional(

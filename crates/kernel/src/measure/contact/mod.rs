@@ -104,6 +104,8 @@ pub struct Contact {
     pub nearest: CellPair,
     /// The places where they come within the resolution, by lower ends along the axis on which they are spread most.
     pub places: Vec<Place>,
+    /// Pairs of cells whose distance was bounded: what the search cost.
+    pub pairs_looked_at: u64,
     /// Whether there are no other places, and the distance is as narrow as the resolution allows: five times as wide, or
     /// less. Else a limit ended the search; what is told holds.
     pub complete: bool,
@@ -223,7 +225,7 @@ pub fn intersect_primitive(
 ///
 /// * when they share a cell of their boundaries: the B-rep of the model says so, whose incidences, adjacencies and gluings
 ///   are followed exactly; corners of given simplices are shared when their coordinates are the same numbers. Of two
-///   triangles it must be all that they have in common, which exact signs decide;
+///   triangles, and of two segments, it must be all that they have in common, which exact signs decide;
 /// * or when they have no proven common point, and a chain of pieces leads from one to the other, each of which shares such a
 ///   cell with the next, and all but the two lie in the ball of radius 16 t around the middle of the closest points of what
 ///   stands for the two: simplices, chords, polygons, or the centres of their balls.

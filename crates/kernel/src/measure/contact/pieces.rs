@@ -9,11 +9,11 @@ use super::ContactError;
 use super::body::{Body, Nature, corners};
 use super::tree::{NodeId, Tree};
 use crate::attractor::Attractor;
-use crate::attractor::cell::{Point, distance_squared};
+use crate::attractor::cell::{Point, Site, distance_squared};
 use crate::automaton::StateId;
 use crate::automaton::topology::{Source, Topology, View};
 use crate::budget::Budget;
-use crate::solid::contact::meet;
+use crate::solid::contact::{is_flat, meet};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ type Seen = (u32, View);
 pub(super) enum Relation {
     /// They are pieces that are joined.
     Joined,
-    /// They are triangles that have more in common than the corners that they share.
+    /// They are triangles, or segments, that have more in common than the corners that they share.
     Crossing,
     /// They are pieces that are not joined, or no pieces.
     Apart,
@@ -229,11 +229,28 @@ fn origins(cut_from: &[u32], cell: u32) -> impl Iterator<Item = u32> {
     std::iter::successors(origin(&cell), move |cell| origin(cell))
 }
 
-/// Whether two exact triangles have more in common than the corners that they share, and the edge between these.
+/// Whether two exact triangles have more in common than the corners that they share, and the edge between these, or two exact segments more than an end.
 fn cross(a: &Body, b: &Body) -> bool {
+    if let (Nature::Exact, Nature::Exact, [Site::Segment(first)], [Site::Segment(second)]) =
+        (a.nature, b.nature, a.sites.as_slice(), b.sites.as_slice())
+    {
+        return overlap(first, second);
+    }
     let (Some(first), Some(second)) = (a.exact_triangle(), b.exact_triangle()) else { return false };
     let name = |k: usize| first.iter().position(|corner| *corner == second[k]).unwrap_or(3 + k) as u32;
     meet([&[0, 1, 2], &[0, 1, 2].map(name)], [first, second])
+}
+
+/// Whether two segments that share an end run on together from it: all three ends are in a line, exactly, and the others on one side of the shared one.
+fn overlap(first: &[Point; 2], second: &[Point; 2]) -> bool {
+    let from = |[shared, to]: [&Point; 2], other: &Point| {
+        let same_side = |axis: usize| (to[axis] > shared[axis]) == (other[axis] > shared[axis]);
+        let apart = (0..3).find(|&axis| to[axis] != shared[axis]);
+        is_flat(&[*shared, *to, *other]) && apart.is_some_and(|axis| other[axis] != shared[axis] && same_side(axis))
+    };
+    let [a, b] = first;
+    let [c, d] = second;
+    (a == c && from([a, b], d)) || (a == d && from([a, b], c)) || (b == c && from([b, a], d)) || (b == d && from([b, a], c))
 }
 
 /// Names of boundary cells, handed out on the way down.

@@ -152,7 +152,7 @@ impl<'a> Search<'a> {
             // The closest points are nowhere else, even if what proves their distance is a larger pair.
             only.distance_mm.high = only.distance_mm.high.min(distance_mm.high);
         }
-        Ok(Contact { distance_mm, nearest: self.described(&self.nearest), places, complete })
+        Ok(Contact { distance_mm, nearest: self.described(&self.nearest), places, pairs_looked_at: self.looked, complete })
     }
 
     /// Finds the pairs that remain. The lower end of the distance, and whether all were found.

@@ -174,6 +174,15 @@ impl<'a> Tree<'a> {
         children
     }
 
+    /// The triangle that a node is exactly, outward from the solid of whose surface it is a part.
+    pub(crate) fn solid_triangle(&self, id: NodeId) -> Option<[Point; 3]> {
+        let solid = self.attractor?.roots()[self.cell(id)?.root as usize].solid;
+        match (solid, self.node(id).body.sites.as_slice()) {
+            (Some(_), [Site::Triangle(corners)]) => Some(*corners),
+            _ => None,
+        }
+    }
+
     /// A bound of n.x over the node, |n| = 1.
     pub(crate) fn reach(&self, id: NodeId, direction: &Point) -> f64 {
         let node = self.node(id);

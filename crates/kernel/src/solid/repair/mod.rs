@@ -1,15 +1,17 @@
-//! A mesh that is no solid made one, where what is meant leaves no doubt: names of vertices, copies, directions of triangles.
+//! A mesh that is no solid made one, where what is meant leaves no doubt: names of vertices, copies, directions of triangles, small holes.
 //!
-//! The points of the surface stay where they are: nothing is moved, nothing filled. Which side of it is material follows from the surface alone, whatever way its
+//! The points of the surface stay where they are: nothing is moved, and only small holes are filled, between corners that are there. Which side of it is material follows from the surface alone, whatever way its
 //! triangles run: a line from there to infinity passes through it an odd number of times. So shells within shells are voids, and solids in voids are solids.
 
 mod clean;
 mod facing;
+mod fill;
 
 use super::{Crossings, Solid, SolidError, TriMesh, fans};
 use crate::budget::{Budget, Stopped};
 use clean::{is_without_area, join, remove_collapsed, remove_copies, remove_flat};
 use facing::Facing;
+use fill::{Filled, fill};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -22,6 +24,12 @@ pub struct Repair {
     pub flat_triangles: u64,
     /// Triangles with the corners of another that were taken away, and walls between pieces that fill the space on both sides.
     pub copied_triangles: u64,
+    /// Holes that were closed.
+    pub filled_holes: u64,
+    /// Triangles that close them.
+    pub filling_triangles: u64,
+    /// Edges around the longest of the holes.
+    pub longest_hole_edges: u64,
     /// Edges of four triangles or more, around which those were joined that bound the same wedge of material.
     pub parted_edges: u64,
     /// Vertices that were doubled, so that parts that meet there only are not joined.
@@ -75,6 +83,16 @@ pub enum RepairError {
         /// Where it ends.
         to: DVec3,
     },
+    /// A hole that is not closed.
+    #[error("the hole of {edges} edges at {at} is not closed: {reason}")]
+    Hole {
+        /// Edges around it.
+        edges: u64,
+        /// A corner of it.
+        at: DVec3,
+        /// Why.
+        reason: Unfilled,
+    },
     /// A surface with one side.
     #[error("the surface around {at} has one side only, as a Moebius strip has, so that nothing is within it")]
     OneSided {
@@ -105,6 +123,28 @@ pub enum RepairError {
     Stopped(#[from] Stopped),
 }
 
+/// Why a hole is not closed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Unfilled {
+    /// It is long.
+    #[error("holes of at most {most} edges are")]
+    Long {
+        /// Edges, at most.
+        most: u64,
+    },
+    /// It is large.
+    #[error("triangles across all holes would have {share:.3} of the area of the surface, and may have {most}")]
+    Large {
+        /// Area of all fillings, against the surface.
+        share: f64,
+        /// That share, at most.
+        most: f64,
+    },
+    /// No way to close it was found.
+    #[error("no triangles between its corners were found that meet neither each other nor the rest of the surface")]
+    Crossing,
+}
+
 impl RepairError {
     /// Stable code.
     #[must_use]
@@ -113,6 +153,7 @@ impl RepairError {
             Self::Empty => "repair.empty",
             Self::Flat { .. } => "repair.flat",
             Self::Open { .. } => "repair.open",
+            Self::Hole { .. } => "repair.hole",
             Self::OneSided { .. } => "repair.one-sided",
             Self::Crossing { .. } => "repair.crossing",
             Self::Narrow { .. } => "repair.narrow",
@@ -122,7 +163,7 @@ impl RepairError {
     }
 }
 
-/// Repairs a mesh: vertices at the same place are joined, triangles without area and copies are taken away, triangles are turned so that material lies behind them,
+/// Repairs a mesh: vertices at the same place are joined, triangles without area and copies are taken away, small holes are closed, triangles are turned so that material lies behind them,
 /// and corners are doubled where parts meet in edges or corners only. A mesh that is a solid already and whose shells look where they should is left as it is.
 /// Cost: n log n.
 ///
@@ -148,21 +189,22 @@ pub fn repair(mesh: &TriMesh, budget: &Budget) -> Result<Repaired, RepairError> 
     if clean.triangles.is_empty() {
         return Err(RepairError::Empty);
     }
-    let at = |triangle: u32| clean.vertices[clean.triangles[triangle as usize][0] as usize];
     let flat: Vec<u32> = (0..clean.triangles.len() as u32)
         .into_par_iter()
         .filter(|&t| is_without_area(&clean.vertices, clean.triangles[t as usize]))
         .collect();
     if let Some(&first) = flat.first() {
-        return Err(RepairError::Flat { count: flat.len() as u64, at: at(first) });
+        return Err(RepairError::Flat { count: flat.len() as u64, at: first_corner(&clean, first) });
     }
+    let Filled { holes: filled_holes, triangles: filling_triangles, longest: longest_hole_edges } =
+        fill(&clean.vertices, &mut clean.triangles, budget)?;
     let Patches { patches, against, parted_edges } = Patches::of(&clean)?;
     let found = Crossings::of(&clean, budget)?;
     let turned = match found.first.first() {
         None => turned(&clean, &patches, &against, budget)?,
         // Where nothing has to be decided, nothing is.
         Some(_) if parted_edges == 0 && against.iter().all(|&against| !against) => against,
-        Some(pair) => return Err(RepairError::Crossing { count: found.count, at: at(pair[0]) }),
+        Some(pair) => return Err(RepairError::Crossing { count: found.count, at: first_corner(&clean, pair[0]) }),
     };
     let turned_triangles = turned.iter().filter(|&&turned| turned).count() as u64;
     if given && flat_triangles + copied_triangles + turned_triangles == 0 {
@@ -182,12 +224,19 @@ pub fn repair(mesh: &TriMesh, budget: &Budget) -> Result<Repaired, RepairError> 
         joined_vertices,
         flat_triangles,
         copied_triangles,
+        filled_holes,
+        filling_triangles,
+        longest_hole_edges,
         parted_edges,
         doubled_vertices,
         turned_triangles,
         crossings: found.count,
     };
     Ok(Repaired { solid: Some(solid), repair })
+}
+
+fn first_corner(mesh: &TriMesh, triangle: u32) -> DVec3 {
+    mesh.vertices[mesh.triangles[triangle as usize][0] as usize]
 }
 
 /// Parts of a surface whose triangles hang together by edges of two.

@@ -6,12 +6,21 @@
 //! of simplices, which have no cells but are known exactly.
 //!
 //! d(c, B) is enclosed by the nodes of B's tree that may hold the points of B closest to the piece: those no farther from c
-//! than d(c, B) + 2 r, as a point x of the piece has its closest point within d(x, B) <= d(c, B) + r of it. A piece hands
-//! its nodes to its parts, so that no search begins at the roots.
+//! than d(c, B) + 2 r, as a point x of the piece has its closest point within d(x, B) <= d(c, B) + r of it; and no farther than r + s, if
+//! d(., B) is known to be at most s on the piece. A piece hands its nodes to its parts, so that no search begins at the roots.
+//!
+//! That alone would split two shapes that share surface into pieces as small as the tolerance all over it. The least, over the sites near a piece, of what its
+//! farthest corner has bounds it as well, and better where one site is the nearest all along it (see `flat`). So pieces are small only near edges of the other's
+//! triangulation, and of two that lie in one plane not even there, as pieces are cut along the edges. Corners are looked at for the lower end, too: where one
+//! site is nearest, no other point is farther.
 //!
 //! A solid is what it encloses. Of a point within B the distance is 0, and of a piece around it at most r - d(c, surface of B). The inside of A is searched in cubes:
 //! those whose centre is outside of A, and farther than r from its surface, hold nothing of it. What a cube that meets the surface holds is within 2 r of points
-//! of the surface, which are pieces themselves; so small cubes there are not searched, and 2 r is added in the end.
+//! of the surface, which are pieces themselves; so small cubes there are not searched, and 2 r is added in the end. Cubes are sought only for points of the inside
+//! where d(., B) is a local maximum, since its largest value is at one of them or on the surface; most cubes near B cannot hold one (see `inside`).
+
+mod flat;
+mod inside;
 
 use super::Interval;
 use super::contact::{Body, ContactError, Nature, NodeId, Tree, corners, tree};
@@ -21,6 +30,7 @@ use crate::budget::Budget;
 use crate::order::ordered_by;
 use crate::solid::{Inside, TriMesh};
 use crate::tolerance::Tolerance;
+use flat::{cut, farthest, halves};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -71,8 +81,9 @@ fn holds(solids: &[Filled<'_>], point: &Point) -> bool {
 
 /// The Hausdorff distance of two shapes, both ways, as intervals no wider than the tolerance unless a limit is hit.
 ///
-/// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Shapes that
-/// are alike everywhere are the slowest: every cell as small as the tolerance is looked at.
+/// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Triangles along one triangle of the
+/// other are not split; along several that bend, as many pieces as tolerances fit along their edges. Fractals and curved
+/// surfaces that are alike everywhere are the slowest: every cell as small as the tolerance is looked at.
 ///
 /// # Errors
 /// [`ContactError`] for a trimmed surface, or when stopped. Limits are no errors.
@@ -128,7 +139,14 @@ struct Search<'a> {
     place: Ball,
     /// Points of the inside that were not searched are within this of the surface.
     skin: f64,
+    /// Upper ends up to this much above the lower end are good enough.
+    enough_mm: f64,
+    /// The largest upper end of pieces that are good enough, and in no queue.
+    settled: f64,
 }
+
+/// Sites that are tried for a piece, at most.
+const MOST_SINGLE: usize = 16;
 
 fn directed<'a>(
     [first, second]: [Tree<'a>; 2],
@@ -150,6 +168,9 @@ fn directed<'a>(
         number: 0,
         low: 0.0,
         skin: 0.0,
+        // What is left of the tolerance is for the skin.
+        enough_mm: 0.5 * tolerance.mm(),
+        settled: 0.0,
     };
     search.look(Part::Node(0), &[0], &[], f64::INFINITY);
     for solid in solids[0] {
@@ -178,7 +199,7 @@ fn directed<'a>(
         }
         high = 0.0;
     }
-    let distance_mm = Interval { low: search.low, high: high.max(search.low) + search.skin };
+    let distance_mm = Interval { low: search.low, high: high.max(search.low).max(search.settled) + search.skin };
     Ok((Directed { distance_mm, place: search.place }, complete))
 }
 
@@ -202,8 +223,10 @@ impl<'a> Search<'a> {
         let parts: Vec<Part> = match piece.part {
             Part::Node(id) if self.first.is_splittable(id) => self.first.children(id).map(Part::Node).collect(),
             Part::Node(id) if self.first.subdivides(id) => Vec::new(),
-            Part::Node(id) => self.first.node(id).body.sites.iter().flat_map(halves).map(Part::Site).collect(),
-            Part::Site(site) => halves(&site).into_iter().map(Part::Site).collect(),
+            Part::Node(_) | Part::Site(_) => {
+                let (sites, _) = self.sites(piece.part);
+                sites.iter().flat_map(|site| self.smaller(site, &piece.near)).map(Part::Site).collect()
+            }
             Part::Cube(centre, half) => eighths(&centre, half).map(|centre| Part::Cube(centre, 0.5 * half)).into(),
         };
         parts.iter().for_each(|&part| self.look(part, &piece.near, &piece.own, piece.high));
@@ -213,17 +236,21 @@ impl<'a> Search<'a> {
     /// Encloses the supremum over a part, at most `most`, and puts it into the queue if it may be the largest.
     fn look(&mut self, part: Part, near: &[NodeId], own: &[NodeId], most: f64) {
         let (centre, radius, astray) = self.around(part);
-        let (mut least, mut farthest, near) = self.distance(Which::Second, &centre, radius, near);
+        let (mut least, mut farthest, mut near) = self.distance(Which::Second, &centre, radius, near);
+        let reach = farthest + 2.0 * (radius + self.slack);
         if holds(self.solids[1], &centre) {
             // The piece reaches beyond the surface by what is left of its radius there.
             (least, farthest) = (0.0, -least);
         }
-        let high = (farthest + radius + self.slack).min(most);
+        let mut high = (farthest + radius + self.slack).min(most);
         if high <= self.low {
             return;
         }
         let (mut is_of_first, mut own_near) = (true, Vec::new());
         if let Part::Cube(..) = part {
+            if self.has_no_maximum(&centre, reach, near.iter().map(|near| near.id).collect()) {
+                return;
+            }
             let (nearest, surface, near) = self.distance(Which::First, &centre, radius, own);
             is_of_first = holds(self.solids[0], &centre);
             if nearest > radius + self.slack && !is_of_first {
@@ -233,18 +260,108 @@ impl<'a> Search<'a> {
                 self.skin = self.skin.max(2.0 * radius + self.slack);
                 return;
             }
-            own_near = near;
+            own_near = near.into_iter().map(|near| near.id).collect();
         }
-        let low = least - astray - self.slack;
-        if is_of_first && low > self.low {
-            (self.low, self.place) = (low, Ball { centre, radius: astray + self.slack });
+        if is_of_first {
+            self.offer(least - astray - self.slack, &centre, astray);
         }
-        if high > self.low {
+        if radius > self.slack && high > self.low + self.enough_mm {
+            high = high.min(self.by_corners(part, radius, &near));
+        }
+        if !matches!(part, Part::Cube(..)) {
+            // Of a solid, this keeps all of its surface that a way between two points of the piece may meet.
+            near.retain(|near| near.low <= radius + high + 2.0 * self.slack);
+        }
+        if high <= self.low + self.enough_mm {
+            self.settled = self.settled.max(high);
+        } else {
             self.number += 1;
+            let near = near.into_iter().map(|near| near.id).collect();
             let piece = Piece { high, number: self.number, part, near, own: own_near };
             self.bytes += memory(&piece);
             self.queue.push(piece);
         }
+    }
+
+    /// Takes a lower end that is larger than the largest, reached within `astray` of a point.
+    fn offer(&mut self, low: f64, at: &Point, astray: f64) {
+        if low > self.low {
+            (self.low, self.place) = (low, Ball { centre: *at, radius: astray + self.slack });
+        }
+    }
+
+    /// What stands for a part, and how far that is from it at most; nothing for a cube.
+    fn sites(&self, part: Part) -> (Vec<Site>, f64) {
+        match part {
+            Part::Site(site) => (vec![site], 0.0),
+            Part::Node(id) => (self.first.node(id).body.sites.clone(), self.first.node(id).body.error),
+            Part::Cube(..) => (Vec::new(), 0.0),
+        }
+    }
+
+    /// Bounds the supremum over a part from above by what its farthest corners are from single sites, and looks at the
+    /// farthest one for the lower end.
+    fn by_corners(&mut self, part: Part, radius: f64, near: &[Near]) -> f64 {
+        let near: Vec<NodeId> = near.iter().map(|near| near.id).collect();
+        let (sites, astray) = self.sites(part);
+        if sites.iter().all(|site| matches!(site, Site::Point(_))) {
+            return f64::INFINITY;
+        }
+        let mut worst: Option<(f64, Point)> = None;
+        for site in &sites {
+            let Some(single) = self.single(site, &near) else { return f64::INFINITY };
+            if worst.is_none_or(|(high, _)| single.high > high) {
+                worst = Some((single.high, single.corner));
+            }
+        }
+        let Some((high, corner)) = worst else { return f64::INFINITY };
+        if high + astray > self.low && !holds(self.solids[1], &corner) {
+            let (least, ..) = self.distance(Which::Second, &corner, radius, &near);
+            self.offer(least - astray - self.slack, &corner, astray);
+        }
+        high + astray + self.slack
+    }
+
+    /// The single site of the second shape, of those nearest to the middle of a site, from which its farthest corner is the least far.
+    fn single(&mut self, site: &Site, near: &[NodeId]) -> Option<Single> {
+        let middle = middle(site);
+        let mut queue = BinaryHeap::new();
+        for &id in near.iter().take(MOST_SINGLE) {
+            queue.push(Reverse(Near { low: self.apart(Which::Second, &middle, id).low, id }));
+        }
+        let mut best: Option<Single> = None;
+        let mut tried = 0;
+        while let Some(Reverse(Near { low, id })) = queue.pop() {
+            // The middle is as far from what is left as is told, and some corner is as far as the middle.
+            if tried >= MOST_SINGLE || best.as_ref().is_some_and(|best| low >= best.high) {
+                break;
+            }
+            if self.second.node(id).is_group() {
+                for id in self.second.children(id) {
+                    queue.push(Reverse(Near { low: self.apart(Which::Second, &middle, id).low, id }));
+                }
+                continue;
+            }
+            tried += 1;
+            let body = &self.second.node(id).body;
+            for along in &body.sites {
+                let (far, corner) = farthest(site, along);
+                if best.as_ref().is_none_or(|best| far + body.error < best.high) {
+                    best = Some(Single { high: far + body.error, corner, along: *along });
+                }
+            }
+        }
+        best
+    }
+
+    /// Parts of a site: on the two sides of an edge of the triangle that it lies along, or halves.
+    fn smaller(&mut self, site: &Site, near: &[NodeId]) -> Vec<Site> {
+        let thin = self.accuracy_mm.max(4.0 * self.slack);
+        let cut = |single: Single| match (site, &single.along) {
+            (Site::Triangle(triangle), Site::Triangle(along)) => cut(triangle, along, thin),
+            _ => None,
+        };
+        self.single(site, near).and_then(cut).unwrap_or_else(|| halves(site))
     }
 
     /// A point c, how far points of the part are from it at most, and how far the nearest is at most.
@@ -267,7 +384,7 @@ impl<'a> Search<'a> {
     /// [least, most] of the distance of c from one of the shapes, a solid being its surface here, and the nodes that may be closest to points within
     /// `radius` of c, all of `near` being known to be enough. The interval is narrow against the radius, or the
     /// tolerance, unless a limit is hit.
-    fn distance(&mut self, which: Which, c: &Point, radius: f64, near: &[NodeId]) -> (f64, f64, Vec<NodeId>) {
+    fn distance(&mut self, which: Which, c: &Point, radius: f64, near: &[NodeId]) -> (f64, f64, Vec<Near>) {
         let mut queue = BinaryHeap::new();
         let mut high = f64::INFINITY;
         for &id in near {
@@ -280,33 +397,39 @@ impl<'a> Search<'a> {
             // Whatever ends the search, what was not opened bounds the distance.
             if high - low <= wanted || self.is_exhausted() || self.budget.cancel.reason().is_some() {
                 least = least.min(low);
-                done.push((low, id));
+                done.push(Near { low, id });
                 break;
             }
             let children = self.tree(which).children(id);
             if children.is_empty() {
                 // As narrow as can be: others may still be nearer than this one surely is.
                 least = least.min(low);
-                done.push((low, id));
+                done.push(Near { low, id });
                 continue;
             }
             children.for_each(|child| self.enter(which, c, child, &mut queue, &mut high));
         }
-        done.extend(queue.into_iter().map(|Reverse(Near { low, id })| (low, id)));
-        done.retain(|&(low, _)| low <= high + 2.0 * (radius + self.slack));
+        done.extend(queue.into_iter().map(|Reverse(near)| near));
+        done.retain(|near| near.low <= high + 2.0 * (radius + self.slack));
         // In the order of their discovery, whatever that of the heap.
-        done.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        (least.min(high), high, done.into_iter().map(|(_, id)| id).collect())
+        done.sort();
+        (least.min(high), high, done)
     }
 
     fn enter(&mut self, which: Which, c: &Point, id: NodeId, queue: &mut BinaryHeap<Reverse<Near>>, high: &mut f64) {
+        let apart = self.apart(which, c, id);
+        *high = high.min(apart.high);
+        queue.push(Reverse(Near { low: apart.low, id }));
+    }
+
+    /// The distance of a point from a node lies in this interval.
+    fn apart(&mut self, which: Which, c: &Point, id: NodeId) -> Interval {
         self.looked += 1;
         let slack = self.slack;
         let tree = self.tree(which);
         let gap = Body::of_site(Site::Point(*c), Nature::Loose).gap(&tree.node(id).body, slack);
-        *high = high.min(gap.high);
         let slab = gap.direction.map_or(0.0, |n| -tree.reach(id, &n.map(|x| -x)) - n.iter().zip(c).map(|(n, c)| n * c).sum::<f64>());
-        queue.push(Reverse(Near { low: gap.low.max(slab - slack), id }));
+        Interval { low: gap.low.max(slab - slack), high: gap.high }
     }
 
     fn tree(&mut self, which: Which) -> &mut Tree<'a> {
@@ -315,6 +438,14 @@ impl<'a> Search<'a> {
             Which::Second => &mut self.second,
         }
     }
+}
+
+/// A site of the second shape, against one of the first.
+struct Single {
+    /// How far the farthest corner is from it, and from the second shape at most.
+    high: f64,
+    corner: Point,
+    along: Site,
 }
 
 /// Which of two shapes.
@@ -341,17 +472,4 @@ fn middle(site: &Site) -> Point {
 /// The centres of a cube's eighths.
 fn eighths(centre: &Point, half: f64) -> [Point; 8] {
     std::array::from_fn(|code| std::array::from_fn(|axis| centre[axis] + if code >> axis & 1 == 1 { 0.5 * half } else { -0.5 * half }))
-}
-
-/// Parts of half the size: two of a segment, four of a triangle, none of a point.
-fn halves(site: &Site) -> Vec<Site> {
-    let half = |a: &Point, b: &Point| -> Point { std::array::from_fn(|axis| 0.5 * a[axis] + 0.5 * b[axis]) };
-    match site {
-        Site::Point(_) => Vec::new(),
-        Site::Segment([a, b]) => vec![Site::Segment([*a, half(a, b)]), Site::Segment([half(a, b), *b])],
-        Site::Triangle([a, b, c]) => {
-            let (ab, bc, ca) = (half(a, b), half(b, c), half(c, a));
-            [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]].map(Site::Triangle).into()
-        }
-    }
 }
