@@ -144,7 +144,7 @@ impl BoxTree {
 
     /// The leaf that holds an item of the tree.
     pub(crate) fn leaf_with(&self, item: u32) -> usize {
-        leaf_of(self.places[item as usize] as usize, self.order.len(), self.leaves)
+        self.places[item as usize] as usize / LEAF
     }
 
     /// The box of a leaf.
