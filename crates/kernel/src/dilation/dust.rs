@@ -4,8 +4,8 @@
 //! solid. A piece of the solid that holds a point of D(s) holds a whole ball of radius s, and its box is no narrower than 2 s. So a narrower piece lies outside D(s), and
 //! without it the solid still contains D(s). A void that lies in D(r) is not one of the dilation's: it is filled.
 //!
-//! A shell whose corners have become one point bounds nothing: it goes. As a void of D(r) it would have held a critical point of the distance, which has two
-//! sites at one distance at least; where there is one site alone at the point, there was none.
+//! A shell no longer than rounding may move what it bounds, see [`NUDGE`], has no volume to speak of, nor a sign of it: it goes, and the bound for rounding covers that. As a void
+//! of D(r) it would have held a critical point of the distance, which has two sites at one distance at least; where there is one site alone, there was none.
 
 use super::block::BlockSurface;
 use super::plan::Setting;
@@ -13,6 +13,7 @@ use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, cross, distance_squared, dot};
 use crate::attractor::sites::SiteRule;
 use crate::groups::Groups;
+use crate::solid::mend::NUDGE;
 
 /// A shell of the surface.
 #[derive(Clone, Copy)]
@@ -90,7 +91,8 @@ fn fate<'a>(
     if distance + around <= setting.reach {
         return Fate::Goes;
     }
-    if shell.low != shell.high {
+    let longest = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(0.0, f64::max);
+    if longest > NUDGE * setting.rounding {
         return Fate::Stays;
     }
     let mut near = Vec::new();

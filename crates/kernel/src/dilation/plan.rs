@@ -483,3 +483,52 @@ fn noted(made: &mut [BlockSurface], uncertain: &mut BTreeSet<Cube>) -> BTreeSet<
     uncertain.extend(made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.uncertain)));
     made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attractor::cell::Point;
+    use crate::model::{Interior, Model, PolygonMesh, Shape};
+    use crate::tolerance::Radius;
+
+    /// Two rods side by side, 3 mm apart, and a rod by itself.
+    fn rods() -> Attractor {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let vertices =
+            vec![at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(0.0, 3.0, 0.0), at(20.0, 3.0, 0.0), at(0.0, 40.0, 0.0), at(20.0, 40.0, 0.0)];
+        let shape = Shape::Mesh(PolygonMesh { vertices, faces: vec![vec![0, 1], vec![2, 3], vec![4, 5]], interior: Interior::Surface });
+        Model { name: None, shape }.lower().unwrap().attractor
+    }
+
+    /// What is left of a surface with a tetrahedron of the given size at a place, besides a larger one, and how many shells went in doubt.
+    fn without_dust(at: Point, size: f64) -> (usize, usize) {
+        let (attractor, budget) = (rods(), Budget::default());
+        let balls = Balls { least: Radius::new(1.4).unwrap().mm(), most: 1.4 };
+        let plan = Plan::new(&attractor, balls, Tolerance::new(0.14).unwrap(), true, &budget).unwrap();
+        let setting = plan.setting(plan.pitch, &budget);
+        let tetrahedron = |first: Point, size: f64| -> [Point; 4] {
+            let corner = |axis: usize| std::array::from_fn(|other| first[other] + if other == axis { size } else { 0.0 });
+            [first, corner(0), corner(1), corner(2)].map(|x: Point| x.map(|x| f64::from(x as f32)))
+        };
+        // Counter-clockwise seen from within: a void, unless it has no volume.
+        let faces = |first: u32| [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]].map(|face: [u32; 3]| face.map(|corner| first + corner));
+        let mut surface = BlockSurface {
+            vertices: tetrahedron([5.0, -10.0, 0.0], 8.0).into_iter().chain(tetrahedron(at, size)).collect(),
+            triangles: faces(0).into_iter().chain(faces(4)).collect(),
+            ..BlockSurface::default()
+        };
+        let doubtful = dust::remove(&setting, &plan.rule, &plan.space(&setting).candidates, &mut surface);
+        (surface.triangles.len(), doubtful)
+    }
+
+    #[test]
+    fn shells_no_larger_than_rounding_go_and_may_be_in_doubt() {
+        // Beyond one rod: nothing there could be a void.
+        assert_eq!(without_dust([10.0, 41.400_001, 0.0], 0.0), (4, 0));
+        assert_eq!(without_dust([10.0, 41.400_001, 0.0], 4e-6), (4, 0));
+        // Between two, as far from both: it may have been one.
+        assert_eq!(without_dust([10.0, 1.5, 0.0], 0.0), (4, 1));
+        // A void that can be seen there stays.
+        assert_eq!(without_dust([10.0, 1.5, 0.0], 0.02), (8, 0));
+    }
+}
