@@ -1,9 +1,11 @@
 //! Who answers questions: processes of their own, as for jobs, because what a question takes shows only when it is answered.
 //!
 //! A process for questions has little memory, and little time; it is not behind those of jobs, because somebody waits. One that needs more
-//! is ended, alone. As many are kept as answer what comes one after the other; more are started while more is asked at once.
+//! is ended, alone. To start one costs more than most answers, so those that a burst of questions asked for are kept for the next one, and go when they were not needed for a while.
 
+use std::collections::VecDeque;
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use lacuna_kernel::budget::Limits;
 
@@ -17,14 +19,18 @@ use crate::store::Store;
 /// The most memory that an answer may take, in bytes; less where jobs may have less.
 const MEMORY_BYTES: u64 = 1 << 30;
 
-/// Processes that wait for the next question.
+/// Processes that wait for the next question, however long.
 const KEPT: usize = 2;
+
+/// How long others wait.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Where questions are answered.
 #[derive(Debug)]
 pub struct Asked {
     engine: Engine,
-    idle: Mutex<Vec<Process>>,
+    /// Those that wait, and since when: the last that answered is asked first, and so the first have waited longest.
+    idle: Mutex<VecDeque<(Instant, Process)>>,
 }
 
 impl Asked {
@@ -42,13 +48,18 @@ impl Asked {
         if self.engine.here.is_some() {
             return questions::answer(question, document, most, find, self.engine);
         }
-        let mut place = Place::of(Purpose::Questions, crate::locked(&self.idle).pop());
+        let mut place = Place::of(Purpose::Questions, crate::locked(&self.idle).pop_back().map(|(_, process)| process));
         let memory_bytes = MEMORY_BYTES.min(most.memory_bytes);
         let answer = place.ask(question, document, *most, memory_bytes, store, find, rayon::current_num_threads());
+        let now = Instant::now();
         let mut idle = crate::locked(&self.idle);
-        if idle.len() < KEPT {
-            idle.extend(place.into_process());
+        idle.extend(place.into_process().map(|process| (now, process)));
+        let mut going = Vec::new();
+        while idle.len() > KEPT && idle.front().is_some_and(|(since, _)| now - *since > PATIENCE) {
+            going.extend(idle.pop_front());
         }
+        drop(idle);
+        drop(going);
         answer
     }
 }
