@@ -5,7 +5,7 @@ use lacuna_kernel::budget::{Budget, Limits, Stopped};
 use lacuna_kernel::dilation::{DilationError, Prediction, dilate_unsimplified, predict};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
-use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
+use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, bounding_box_memory, dimension};
 use lacuna_kernel::model::{Finding, Lowered, Model, PolygonMesh};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
@@ -459,6 +459,8 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;
+    // The box is searched before all else.
+    let box_bytes = || bounding_box_memory(&lowered.attractor, budget).map(|bytes| bytes as f64);
     // A wall's other surface is made like the dilation of the first.
     let radius = match (radius, job.params.wall) {
         (None, Some(wall)) => Some(Radius::new(wall.thickness_mm)?),
@@ -466,7 +468,8 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     };
     if job.kind == JobKind::Evaluate || radius.is_none() {
         let counted = if matches!(job.kind, JobKind::Evaluate | JobKind::Convert) { leaf_cells } else { 0.0 };
-        return Ok(Plan { leaf_cells, memory_bytes: counted * BYTES_PER_CELL, ..Plan::default() });
+        let memory_bytes = if counted > 0.0 { (counted * BYTES_PER_CELL).max(box_bytes()?) } else { 0.0 };
+        return Ok(Plan { leaf_cells, memory_bytes, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
     let simplify = job.kind == JobKind::Solidify && job.params.simplify;
@@ -475,7 +478,7 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         leaf_cells,
         triangles: prediction.triangles,
         counted_triangles: prediction.counted_triangles,
-        memory_bytes: held_bytes(&prediction, simplify),
+        memory_bytes: held_bytes(&prediction, simplify).max(box_bytes()?),
         output_bytes: stl_bytes(prediction.triangles),
         lattice_pitch_mm: Some(prediction.pitch_mm),
     })

@@ -107,14 +107,28 @@ const RELATIVE_WIDTH: f64 = 1e-10;
 /// # Errors
 /// [`Stopped`] when the budget's token was fired.
 pub fn bounding_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, Stopped> {
-    let mut ends = [Interval { low: 0.0, high: 0.0 }; 6];
+    Ok(searched_box(attractor, budget)?.0)
+}
+
+/// Bytes that [`bounding_box`] holds at most: shapes that are nearly flat where they reach farthest keep many cells. Cost: that of the box.
+///
+/// # Errors
+/// As [`bounding_box`].
+pub fn bounding_box_memory(attractor: &Attractor, budget: &Budget) -> Result<u64, Stopped> {
+    Ok(searched_box(attractor, budget)?.1)
+}
+
+/// The box, and the most bytes that a search held.
+fn searched_box(attractor: &Attractor, budget: &Budget) -> Result<(AxisBox, u64), Stopped> {
+    let (mut ends, mut most) = ([Interval { low: 0.0, high: 0.0 }; 6], 0);
     for (index, end) in ends.iter_mut().enumerate() {
         let (axis, sign) = (index / 2, if index % 2 == 0 { -1.0 } else { 1.0 });
         let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-        let support = support(attractor, &direction, budget)?;
+        let (support, bytes) = support(attractor, &direction, budget)?;
         *end = Interval::new(sign * support.low, sign * support.high);
+        most = most.max(bytes);
     }
-    Ok(AxisBox { low: [ends[0], ends[2], ends[4]], high: [ends[1], ends[3], ends[5]] })
+    Ok((AxisBox { low: [ends[0], ends[2], ends[4]], high: [ends[1], ends[3], ends[5]] }, most))
 }
 
 /// The box of the union of all roots' cells, each dilated by the ball of its own constant radius.
@@ -156,13 +170,13 @@ pub(crate) fn dilated_box(attractor: &Attractor, budget: &Budget) -> Result<Axis
 /// # Errors
 /// [`Stopped`] when the budget's token was fired.
 pub fn extent_along(attractor: &Attractor, direction: DVec3, budget: &Budget) -> Result<[Interval; 2], Stopped> {
-    let least = support(attractor, &(-direction).to_array(), budget)?;
-    let largest = support(attractor, &direction.to_array(), budget)?;
+    let least = support(attractor, &(-direction).to_array(), budget)?.0;
+    let largest = support(attractor, &direction.to_array(), budget)?.0;
     Ok([Interval::new(-least.high, -least.low), largest])
 }
 
 /// sup of x . direction over the attractor.
-fn support(attractor: &Attractor, direction: &Point, budget: &Budget) -> Result<Interval, Stopped> {
+fn support(attractor: &Attractor, direction: &Point, budget: &Budget) -> Result<(Interval, u64), Stopped> {
     let mut search = Search::new(attractor, direction);
     let ends = attractor.trimmed().iter().flat_map(TrimmedSurface::loop_points);
     search.reached = ends.map(|point| dot(direction, &point)).fold(f64::NEG_INFINITY, f64::max);
@@ -189,7 +203,7 @@ pub(super) fn support_of_cell(
 ) -> Result<Interval, Stopped> {
     let mut search = Search::new(attractor, direction);
     search.start(cell, points, None);
-    search.run(budget)
+    Ok(search.run(budget)?.0)
 }
 
 /// Best first through the cells that may attain the supremum.
@@ -234,12 +248,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn run(self, budget: &Budget) -> Result<Interval, Stopped> {
+    fn run(self, budget: &Budget) -> Result<(Interval, u64), Stopped> {
         let Self { attractor, direction, mut heap, mut reached, low, high, largest_term } = self;
         let width = RELATIVE_WIDTH * (high - low).max(f64::MIN_POSITIVE);
         let moved = attractor.trimmed().iter().map(TrimmedSurface::moved_mm).fold(0.0, f64::max);
         let rounding = 1e-12 * largest_term + moved;
-        let mut expansions = 0;
+        let (mut expansions, mut own_bytes) = (0, 0);
         let mut bound = reached;
         while let Some(branch) = heap.pop() {
             bound = branch.bound.max(reached);
@@ -252,6 +266,7 @@ impl<'a> Search<'a> {
             }
             let state = attractor.state_of(&branch.cell);
             let own: Arc<[ControlPoint]> = branch.points.get(attractor.automaton()).into();
+            own_bytes += size_of_val(&*own);
             for (index, transition) in state.transitions.iter().enumerate() {
                 let window = branch.window.as_ref().and_then(|window| attractor.child_window(branch.cell.root as usize, window, index));
                 if window.as_ref().is_some_and(Window::is_outside) {
@@ -274,7 +289,8 @@ impl<'a> Search<'a> {
             }
             bound = reached;
         }
-        Ok(Interval { low: reached - rounding, high: bound.max(reached) + rounding })
+        let held = heap.capacity() * size_of::<Branch>() + own_bytes;
+        Ok((Interval { low: reached - rounding, high: bound.max(reached) + rounding }, held as u64))
     }
 }
 
