@@ -414,7 +414,9 @@ const PROCESS_BYTES: f64 = 18e6;
 
 /// Peak memory of a dilation. Blocks that are simplified shrink before they are joined: then what is held is the lattice once, and what simplification takes.
 pub(crate) fn held_bytes(prediction: &Prediction, simplify: bool) -> f64 {
-    if simplify { prediction.memory_bytes + THREADS * prediction.simplifying_bytes } else { HELD_PER_BYTE * prediction.memory_bytes }
+    let surface =
+        if simplify { prediction.memory_bytes + THREADS * prediction.simplifying_bytes } else { HELD_PER_BYTE * prediction.memory_bytes };
+    surface.max(prediction.box_bytes)
 }
 
 /// Bytes that an evaluation holds for each leaf cell.
@@ -459,8 +461,6 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let radius = radius(job)?;
     let lowered = lower(job, budget)?;
     let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;
-    // The box is searched before all else.
-    let box_bytes = || bounding_box_memory(&lowered.attractor, budget).map(|bytes| bytes as f64);
     // A wall's other surface is made like the dilation of the first.
     let radius = match (radius, job.params.wall) {
         (None, Some(wall)) => Some(Radius::new(wall.thickness_mm)?),
@@ -468,7 +468,9 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     };
     if job.kind == JobKind::Evaluate || radius.is_none() {
         let counted = if matches!(job.kind, JobKind::Evaluate | JobKind::Convert) { leaf_cells } else { 0.0 };
-        let memory_bytes = if counted > 0.0 { (counted * BYTES_PER_CELL).max(box_bytes()?) } else { 0.0 };
+        // The box is searched before all else.
+        let box_bytes = if counted > 0.0 { bounding_box_memory(&lowered.attractor, budget)? as f64 } else { 0.0 };
+        let memory_bytes = (counted * BYTES_PER_CELL).max(box_bytes);
         return Ok(Plan { leaf_cells, memory_bytes, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
@@ -478,7 +480,7 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         leaf_cells,
         triangles: prediction.triangles,
         counted_triangles: prediction.counted_triangles,
-        memory_bytes: held_bytes(&prediction, simplify).max(box_bytes()?),
+        memory_bytes: held_bytes(&prediction, simplify),
         output_bytes: stl_bytes(prediction.triangles),
         lattice_pitch_mm: Some(prediction.pitch_mm),
     })

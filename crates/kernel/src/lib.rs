@@ -12,5 +12,6 @@ pub mod measure;
 pub mod model;
 mod order;
 pub mod solid;
+mod split_mix;
 pub mod tessellation;
 pub mod tolerance;

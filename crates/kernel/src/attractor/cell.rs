@@ -85,6 +85,12 @@ pub(crate) fn subtract(a: &Point, b: &Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// The point at a share of the way from a to b.
+#[inline]
+pub(crate) fn between(a: &Point, b: &Point, share: f64) -> Point {
+    std::array::from_fn(|axis| a[axis] + share * (b[axis] - a[axis]))
+}
+
 #[inline]
 pub(crate) fn dot(a: &Point, b: &Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -22,6 +22,7 @@ use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::measure::triangle::{Feature, closest_feature};
+use crate::split_mix::mix;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -104,13 +105,6 @@ impl Hasher for NameHasher {
     fn write_usize(&mut self, length: usize) {
         self.write_u64(length as u64);
     }
-}
-
-/// A bijection of 64 bits that spreads every bit (the finaliser of SplitMix64).
-fn mix(mut x: u64) -> u64 {
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ (x >> 31)
 }
 
 /// The four vertices of a tetrahedron in the order of their numbers.

@@ -2,7 +2,7 @@
 
 use super::block::NameHasher;
 use super::tree::{NodeId, SiteId, Tree, Weighted, in_space};
-use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, between, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_on_triangle;
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
@@ -503,8 +503,4 @@ pub(super) fn highest(site: &Site, direction: &Point) -> f64 {
         Site::Segment(ends) => ends.iter().map(|end| dot(end, direction)).fold(f64::NEG_INFINITY, f64::max),
         Site::Triangle(corners) => corners.iter().map(|corner| dot(corner, direction)).fold(f64::NEG_INFINITY, f64::max),
     }
-}
-
-fn between(a: &Point, b: &Point, share: f64) -> Point {
-    std::array::from_fn(|axis| a[axis] + share * (b[axis] - a[axis]))
 }

@@ -113,6 +113,30 @@ impl Node {
 const CELL_SHARE: f64 = 0.4;
 
 impl<'a> Pass<'a> {
+    /// One over so many blocks of space.
+    pub(super) fn new(
+        rule: &'a SiteRule<'a>,
+        setting: &'a Setting,
+        grading: &'a Grading,
+        task: Task<'a>,
+        budget: &'a Budget,
+        space: f64,
+    ) -> Self {
+        Self {
+            attractor: rule.attractor(),
+            rule,
+            setting,
+            grading,
+            task,
+            budget,
+            triangles: AtomicU64::new(0),
+            failed: AtomicBool::new(false),
+            done: AtomicU64::new(0),
+            space,
+            workshops: Mutex::default(),
+        }
+    }
+
     /// The surface in the cube of `blocks` blocks a side that begins at block `first`.
     pub(super) fn run(&self, first: [i64; 3], blocks: i64, candidates: &Candidates) -> Result<Vec<BlockSurface>, DilationError> {
         let solids: Vec<u32> = (0..self.attractor.solids().len() as u32).collect();

@@ -13,14 +13,13 @@ use crate::attractor::Attractor;
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::automaton::LeafPrimitive;
 use crate::budget::Budget;
-use crate::measure::bounds::{AxisBox, bounding_box};
+use crate::measure::bounds::{AxisBox, searched_box};
 use crate::solid::mend::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
 use crate::tolerance::Tolerance;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Numbers that all blocks share, in mm or mm^2.
 #[derive(Clone, Debug)]
@@ -244,6 +243,8 @@ pub(super) struct Plan<'a> {
     /// Lengths beyond the lattice's own bounds: rounding to single precision, the unit of values and double precision.
     extra: f64,
     bounds: AxisBox,
+    /// What the search for them held.
+    box_bytes: u64,
     rule: SiteRule<'a>,
     clean_only: bool,
 }
@@ -256,7 +257,7 @@ impl<'a> Plan<'a> {
         simplify: bool,
         budget: &Budget,
     ) -> Result<Self, DilationError> {
-        let bounds = bounding_box(attractor, budget)?;
+        let (bounds, box_bytes) = searched_box(attractor, budget)?;
         let radius = balls.most;
         // A tolerance of the radius' order would allow an empty result.
         let of_least = tolerance.mm().min(0.5 * balls.least);
@@ -276,7 +277,7 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
+        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, box_bytes, rule, clean_only: !simplify })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -329,6 +330,7 @@ impl<'a> Plan<'a> {
             triangles: expected.triangles,
             memory_bytes,
             simplifying_bytes: expected.simplifying,
+            box_bytes: self.box_bytes as f64,
             pitch_mm: self.pitch,
         })
     }
@@ -380,19 +382,7 @@ impl<'a> Plan<'a> {
     }
 
     fn pass<'b>(&'b self, setting: &'b Setting, grading: &'b Grading, task: Task<'b>, budget: &'b Budget, blocks: i64) -> Pass<'b> {
-        Pass {
-            attractor: self.rule.attractor(),
-            rule: &self.rule,
-            setting,
-            grading,
-            task,
-            budget,
-            triangles: AtomicU64::new(0),
-            failed: AtomicBool::new(false),
-            done: AtomicU64::new(0),
-            space: (blocks as f64).powi(3),
-            workshops: Mutex::new(Vec::new()),
-        }
+        Pass::new(&self.rule, setting, grading, task, budget, (blocks as f64).powi(3))
     }
 
     /// One surface from those of all blocks, with as few triangles as the promise allows.

@@ -12,11 +12,10 @@ use super::octree::{Changed, Node, Pass, Task};
 use super::plan::Setting;
 use super::simplify::Simplifier;
 use super::tree::Candidates;
+use crate::split_mix;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Nodes of a level that are followed: enough for an error of some ten per cent.
 const FOLLOWED: usize = 48;
@@ -159,19 +158,7 @@ impl Pass<'_> {
 
     /// Another task of the same pass over a lattice that is graded otherwise.
     fn graded<'b>(&'b self, grading: &'b Grading, task: Task<'b>) -> Pass<'b> {
-        Pass {
-            attractor: self.attractor,
-            rule: self.rule,
-            setting: self.setting,
-            grading,
-            task,
-            budget: self.budget,
-            triangles: AtomicU64::new(0),
-            failed: AtomicBool::new(false),
-            done: AtomicU64::new(0),
-            space: self.space,
-            workshops: Mutex::default(),
-        }
+        Pass::new(self.rule, self.setting, grading, task, self.budget, self.space)
     }
 }
 
@@ -187,16 +174,14 @@ fn followed<T: Clone>(nodes: Vec<T>, stands_for: &mut f64, chance: &mut Chance) 
     chosen.map(|index| nodes[index.min(nodes.len() - 1)].clone()).collect()
 }
 
-/// Numbers in [0, 1) that are the same every time (S. Vigna, "An experimental exploration of Marsaglia's xorshift generators", 2016: splitmix64).
+/// Numbers in [0, 1) that are the same every time.
 struct Chance(u64);
 
 impl Chance {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        let number = split_mix::number(self.0);
+        self.0 = self.0.wrapping_add(split_mix::STEP);
+        (number >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
 

@@ -119,7 +119,7 @@ pub fn bounding_box_memory(attractor: &Attractor, budget: &Budget) -> Result<u64
 }
 
 /// The box, and the most bytes that a search held.
-fn searched_box(attractor: &Attractor, budget: &Budget) -> Result<(AxisBox, u64), Stopped> {
+pub(crate) fn searched_box(attractor: &Attractor, budget: &Budget) -> Result<(AxisBox, u64), Stopped> {
     let (mut ends, mut most) = ([Interval { low: 0.0, high: 0.0 }; 6], 0);
     for (index, end) in ends.iter_mut().enumerate() {
         let (axis, sign) = (index / 2, if index % 2 == 0 { -1.0 } else { 1.0 });

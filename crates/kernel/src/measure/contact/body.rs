@@ -11,7 +11,7 @@
 //! not spoil it. What rounding does to the values themselves is less than the slack of both bodies: they are sums of
 //! fewer than ten products of coordinates' differences with numbers of at most 1.
 
-use crate::attractor::cell::{Ball, Point, Site, cross, distance_squared, dot, subtract};
+use crate::attractor::cell::{Ball, Point, Site, between, cross, distance_squared, dot, subtract};
 use crate::solid::contact::{is_flat, meet};
 use robust::{Coord3D, orient3d};
 
@@ -109,7 +109,7 @@ impl Body {
     pub(super) fn middle(&self, other: &Self) -> Point {
         let pairs = self.sites.iter().flat_map(|mine| other.sites.iter().map(move |its| closest_pair(mine, its)));
         let closest = pairs.min_by(|a, b| distance_squared(&a.0, &a.1).total_cmp(&distance_squared(&b.0, &b.1)));
-        closest.map_or(self.ball.centre, |(x, y)| along(&x, &y, 0.5))
+        closest.map_or(self.ball.centre, |(x, y)| between(&x, &y, 0.5))
     }
 
     /// The corners of the triangle that it is exactly; `None` for anything else, and for a triangle without area.
@@ -247,11 +247,7 @@ fn through([from, to]: &[Point; 2], [a, b, c]: &[Point; 3]) -> Option<Point> {
     let normal = cross(&subtract(b, a), &subtract(c, a));
     let (start, end) = (dot(&normal, &subtract(from, a)), dot(&normal, &subtract(to, a)));
     let share = start / (start - end);
-    (share.is_finite() && (0.0..=1.0).contains(&share)).then(|| along(from, to, share))
-}
-
-fn along(from: &Point, to: &Point, share: f64) -> Point {
-    std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis]))
+    (share.is_finite() && (0.0..=1.0).contains(&share)).then(|| between(from, to, share))
 }
 
 /// Closest points of two segments (Ericson, "Real-Time Collision Detection", 2005, 5.1.9): the closest points of their
@@ -267,8 +263,8 @@ fn closest_on_segments(a: &[Point; 2], b: &[Point; 2]) -> (Point, Point) {
         if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
     };
     let t = clamped(uv * clamped(uv * vr - vv * ur, determinant) + vr, vv);
-    let y = along(&b[0], &b[1], t);
-    (along(&a[0], &a[1], clamped(dot(&u, &subtract(&y, &a[0])), uu)), y)
+    let y = between(&b[0], &b[1], t);
+    (between(&a[0], &a[1], clamped(dot(&u, &subtract(&y, &a[0])), uu)), y)
 }
 
 /// Whether two sites surely have a common point: exactly for two triangles with area; of others, a common corner, or a
