@@ -5,17 +5,13 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::lacuna;
-use lacuna_tests::support::cases;
-use lacuna_tests::support::service::Service;
+use lacuna_tests::support::cases::model;
+use lacuna_tests::support::service::{Service, submit, until, view};
 use lacuna_tests::support::stage::{LEASE, Stage};
 use serde_json::{Value, json};
 
 /// How long anything may take that takes a moment on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);
-
-fn model(name: &str) -> Value {
-    serde_json::from_slice(&std::fs::read(cases::named(name).model()).unwrap()).unwrap()
-}
 
 /// A small solid, a different one for every number.
 fn order(number: u32) -> Value {
@@ -28,28 +24,6 @@ fn long_order(number: u32) -> Value {
     let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
     json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
-}
-
-/// Submits and gives the id.
-#[track_caller]
-fn submit(front: &Service, order: &Value) -> String {
-    let answer = front.post("/v1/jobs", order);
-    assert!(matches!(answer.status, 200 | 202), "{}: {}", answer.status, answer.json());
-    answer.json()["id"].as_str().unwrap().to_owned()
-}
-
-fn view(front: &Service, id: &str) -> Value {
-    front.get(&format!("/v1/jobs/{id}")).json()
-}
-
-#[track_caller]
-fn until(what: &str, mut reached: impl FnMut() -> bool) -> Duration {
-    let start = Instant::now();
-    while !reached() {
-        assert!(start.elapsed() < PATIENCE, "not reached: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    start.elapsed()
 }
 
 /// The number of the worker that says it has started a job.
@@ -130,11 +104,11 @@ fn a_job_is_stopped_from_another_process_and_its_events_are_told_there() {
         let mut events = TcpStream::connect(second.address).unwrap();
         events.set_read_timeout(Some(PATIENCE)).unwrap();
         write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: lacuna\r\n\r\n").unwrap();
-        until("progress", || view(&second, &id)["progress"]["phase"].is_string());
+        until(PATIENCE, "progress", || view(&second, &id)["progress"]["phase"].is_string());
         let stopped = Instant::now();
         let answer = second.post(&format!("/v1/jobs/{id}/cancel"), &json!({}));
         assert!(matches!(answer.status, 200 | 202), "{}", answer.status);
-        until("cancelled", || view(&first, &id)["state"] == "cancelled");
+        until(PATIENCE, "cancelled", || view(&first, &id)["state"] == "cancelled");
         longest = longest.max(stopped.elapsed());
         let told: Vec<String> = BufReader::new(events).lines().map_while(Result::ok).take_while(|line| line != "event: done").collect();
         for event in ["event: state", "event: progress"] {
@@ -155,15 +129,15 @@ fn a_worker_that_is_asked_to_end_hands_its_job_back_and_another_ends_it() {
     let mut order = long_order(0);
     order["params"]["tolerance_mm"] = json!(1e-5);
     let id = submit(&front, &order);
-    until("a start", || taker(&workers, &id, 1).is_some());
+    until(PATIENCE, "a start", || taker(&workers, &id, 1).is_some());
     let first = taker(&workers, &id, 1).unwrap();
-    until("progress", || view(&front, &id)["progress"]["phase"].is_string());
+    until(PATIENCE, "progress", || view(&front, &id)["progress"]["phase"].is_string());
     let asked = Instant::now();
     let mut leaving = workers[first].take().unwrap();
     leaving.signal("TERM");
     let status = leaving.end(PATIENCE);
     assert!(status.success(), "{status}");
-    until("a second start", || taker(&workers, &id, 2) == Some(1 - first));
+    until(PATIENCE, "a second start", || taker(&workers, &id, 2) == Some(1 - first));
     eprintln!(
         "after SIGTERM with a drain time of 1 s and a lease of {LEASE} s another worker has started the job after {:?}",
         asked.elapsed()
@@ -180,10 +154,10 @@ fn a_dead_worker_s_job_is_another_s_and_a_job_that_kills_is_given_up() {
 
     // Killed in the middle of a job, which another worker then does.
     let id = submit(&front, &long_order(0));
-    until("a start", || taker(&workers, &id, 1).is_some());
+    until(PATIENCE, "a start", || taker(&workers, &id, 1).is_some());
     let dead = taker(&workers, &id, 1).unwrap();
     workers[dead].take().unwrap().kill();
-    let taken_up = until("a second start", || taker(&workers, &id, 2) == Some(1 - dead));
+    let taken_up = until(PATIENCE, "a second start", || taker(&workers, &id, 2) == Some(1 - dead));
     eprintln!("with a lease of {LEASE} s a dead worker's job was taken up after {taken_up:?}");
     assert_eq!(view(&front, &id)["attempt"], 2);
 
@@ -197,7 +171,7 @@ fn a_dead_worker_s_job_is_another_s_and_a_job_that_kills_is_given_up() {
     // Jobs at several workers are stopped from the front.
     let other = stage.start("worker", "four");
     let ids: Vec<String> = (1..3).map(|number| submit(&front, &long_order(number))).collect();
-    until("a start", || ids.iter().any(|id| other.said(&["job started", id])));
+    until(PATIENCE, "a start", || ids.iter().any(|id| other.said(&["job started", id])));
     for id in &ids {
         assert_eq!(front.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
         assert_eq!(front.ended(id)["state"], "cancelled");
@@ -210,13 +184,13 @@ fn a_worker_that_was_given_up_does_not_overwrite() {
     let front = stage.start("front", "front");
     let mut workers = [Some(stage.start("worker", "one")), None];
     let id = submit(&front, &long_order(0));
-    until("a start", || taker(&workers, &id, 1).is_some());
+    until(PATIENCE, "a start", || taker(&workers, &id, 1).is_some());
     // As long as it stands still it cannot renew its lease.
     workers[0].as_ref().unwrap().signal("STOP");
     workers[1] = Some(stage.start("worker", "two"));
-    until("a second start", || taker(&workers, &id, 2) == Some(1));
+    until(PATIENCE, "a second start", || taker(&workers, &id, 2) == Some(1));
     workers[0].as_ref().unwrap().signal("CONT");
-    until("the first worker sees it", || workers[0].as_ref().unwrap().said(&["no longer this worker's", &id]));
+    until(PATIENCE, "the first worker sees it", || workers[0].as_ref().unwrap().said(&["no longer this worker's", &id]));
     let job = view(&front, &id);
     assert_eq!((&job["state"], &job["attempt"]), (&json!("running"), &json!(2)), "{job}");
     // The first worker is free again.
@@ -231,7 +205,7 @@ fn nothing_is_lost_while_the_database_is_away() {
     let front = stage.start("front", "front");
     let worker = stage.start("worker", "one");
     let running = submit(&front, &long_order(0));
-    until("a start", || worker.said(&["job started", &running]));
+    until(PATIENCE, "a start", || worker.said(&["job started", &running]));
     let waiting: Vec<String> = (0..5).map(|number| submit(&front, &order(number))).collect();
 
     stage.database.stop();
@@ -247,7 +221,7 @@ fn nothing_is_lost_while_the_database_is_away() {
     std::thread::sleep(Duration::from_secs(10).saturating_sub(away.elapsed()));
     stage.database.resume();
 
-    let back = until("ready", || front.get("/readyz").status == 200);
+    let back = until(PATIENCE, "ready", || front.get("/readyz").status == 200);
     eprintln!("ready {back:?} after the database was back");
     assert_eq!(view(&front, &running)["attempt"], 1, "the worker kept its job");
     assert!(!worker.said(&["the lease is lost"]));
@@ -271,14 +245,14 @@ fn what_ends_while_the_database_or_the_store_is_away_is_recorded_when_it_is_back
             "params": { "tolerance_mm": tolerance } })
     };
     let first = submit(&front, &order(0.05));
-    until("a start", || worker.said(&["job started", &first]));
+    until(PATIENCE, "a start", || worker.said(&["job started", &first]));
     stage.database.stop();
-    until("an end that cannot be recorded", || worker.said(&["not recorded yet", &first]));
+    until(PATIENCE, "an end that cannot be recorded", || worker.said(&["not recorded yet", &first]));
     stage.database.resume();
-    until("ready", || front.get("/readyz").status == 200);
+    until(PATIENCE, "ready", || front.get("/readyz").status == 200);
 
     let second = submit(&front, &order(0.1));
-    until("a start", || worker.said(&["job started", &second]));
+    until(PATIENCE, "a start", || worker.said(&["job started", &second]));
     stage.objects.signal("STOP");
     std::thread::sleep(Duration::from_secs(4));
     assert_ne!(view(&front, &second)["state"], "succeeded", "its files are nowhere yet");

@@ -9,19 +9,18 @@ use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use lacuna_tests::support::cases;
+use lacuna_tests::support::cases::model;
 use lacuna_tests::support::python::system_python;
 use lacuna_tests::support::scratch::Scratch;
-use lacuna_tests::support::service::Service;
+use lacuna_tests::support::service::{Service, submit, until};
 use serde_json::{Value, json};
 
 /// Limits out of the way of tests that send much at once.
 const MUCH: [(&str, &str); 3] =
     [("LACUNA_SUBMISSIONS_PER_MINUTE", "1000000"), ("LACUNA_QUEUED", "100000"), ("LACUNA_JOBS_PER_KEY", "100000")];
 
-fn model(name: &str) -> Value {
-    serde_json::from_slice(&fs::read(cases::named(name).model()).unwrap()).unwrap()
-}
+/// How long anything may take that takes a moment on an idle machine.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The work of a moment, another one for every number.
 fn small(number: usize) -> Value {
@@ -45,24 +44,8 @@ fn large() -> Value {
         "params": { "tolerance_mm": 0.2 } })
 }
 
-#[track_caller]
-fn submit(service: &Service, order: &Value) -> String {
-    let answer = service.post("/v1/jobs", order);
-    assert!(matches!(answer.status, 200 | 202), "{}: {}", answer.status, answer.json());
-    answer.json()["id"].as_str().unwrap().to_owned()
-}
-
 fn state(service: &Service, id: &str) -> String {
     service.get(&format!("/v1/jobs/{id}")).json()["state"].as_str().unwrap_or("absent").to_owned()
-}
-
-#[track_caller]
-fn until(what: &str, mut reached: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !reached() {
-        assert!(start.elapsed() < Duration::from_secs(60), "not reached: {what}");
-        std::thread::sleep(Duration::from_millis(10));
-    }
 }
 
 #[test]
@@ -131,7 +114,7 @@ fn a_storm_of_jobs_that_are_stopped_at_once_leaves_the_workers_free() {
                     }
                     let wished = Instant::now();
                     assert_eq!(service.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
-                    until("cancelled", || state(service, &id) == "cancelled");
+                    until(PATIENCE, "cancelled", || state(service, &id) == "cancelled");
                     let mut longest = longest.lock().unwrap();
                     *longest = longest.max(wished.elapsed());
                 }
@@ -144,7 +127,7 @@ fn a_storm_of_jobs_that_are_stopped_at_once_leaves_the_workers_free() {
     assert_eq!(service.done(&small(0))["state"], "succeeded");
     // A job's end is told a moment before its worker is counted as free.
     for gauge in ["lacuna_jobs_queued 0", "lacuna_jobs_running 0"] {
-        until(gauge, || String::from_utf8(service.get("/metrics").body).unwrap().lines().any(|line| line == gauge));
+        until(PATIENCE, gauge, || String::from_utf8(service.get("/metrics").body).unwrap().lines().any(|line| line == gauge));
     }
 }
 
@@ -197,7 +180,7 @@ fn a_full_disk_is_told_and_harms_nothing_that_was_accepted() {
     assert_eq!(state(&service, &before), "succeeded");
 
     fs::remove_file(&ballast).unwrap();
-    until("ready", || service.get("/readyz").status == 200);
+    until(PATIENCE, "ready", || service.get("/readyz").status == 200);
     let job = service.ended(&waits);
     assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("storage-full")), "{job}");
     assert_eq!(service.done(&small(1))["state"], "succeeded");
@@ -327,7 +310,7 @@ fn a_service_that_is_asked_to_end_drains_and_its_jobs_go_on_at_the_next_start() 
     let one = [("LACUNA_WORKERS", "1"), ("LACUNA_DRAIN_SECONDS", "2")];
     let mut service = Service::start_with(scratch.path(), &one);
     let running = submit(&service, &long(0));
-    until("running", || state(&service, &running) == "running");
+    until(PATIENCE, "running", || state(&service, &running) == "running");
     let waiting = submit(&service, &small(0));
     // An answer that is under way is still given.
     let address = service.address;
@@ -335,7 +318,7 @@ fn a_service_that_is_asked_to_end_drains_and_its_jobs_go_on_at_the_next_start() 
     let body = small(1).to_string();
     let head = "POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\nprefer: wait=1\r\ncontent-type: application/json";
     write!(waiter, "{head}\r\ncontent-length: {}\r\n\r\n{body}", body.len()).unwrap();
-    until("the third job", || service.get("/v1/jobs").json()["items"].as_array().unwrap().len() == 3);
+    until(PATIENCE, "the third job", || service.get("/v1/jobs").json()["items"].as_array().unwrap().len() == 3);
     service.signal("TERM");
     assert!(service.end(Duration::from_secs(30)).success());
     let mut answer = String::new();
@@ -343,7 +326,7 @@ fn a_service_that_is_asked_to_end_drains_and_its_jobs_go_on_at_the_next_start() 
     assert!(answer.starts_with("HTTP/1.1 202 "), "{answer}");
 
     let again = Service::start_with(scratch.path(), &one);
-    until("a second attempt", || again.get(&format!("/v1/jobs/{running}")).json()["attempt"] == 2);
+    until(PATIENCE, "a second attempt", || again.get(&format!("/v1/jobs/{running}")).json()["attempt"] == 2);
     assert_eq!(again.post(&format!("/v1/jobs/{running}/cancel"), &json!({})).status / 100, 2);
     assert_eq!(again.ended(&waiting)["state"], "succeeded");
     assert_eq!(again.get("/v1/jobs").json()["items"].as_array().unwrap().len(), 3);

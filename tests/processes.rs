@@ -2,14 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use lacuna_tests::support::cases;
+use lacuna_tests::support::cases::model;
 use lacuna_tests::support::scratch::Scratch;
-use lacuna_tests::support::service::{Service, is_alive, resident_bytes, send_signal};
+use lacuna_tests::support::service::{Service, is_alive, resident_bytes, send_signal, submit, until};
 use serde_json::{Value, json};
 
-fn model(name: &str) -> Value {
-    serde_json::from_slice(&std::fs::read(cases::named(name).model()).unwrap()).unwrap()
-}
+/// How long anything may take that takes a moment on an idle machine.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The work of a moment, another one for every number.
 fn small(number: u32) -> Value {
@@ -23,28 +22,11 @@ fn long(number: u32) -> Value {
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
 }
 
-#[track_caller]
-fn submit(service: &Service, order: &Value) -> String {
-    let answer = service.post("/v1/jobs", order);
-    assert!(matches!(answer.status, 200 | 202), "{}: {}", answer.status, answer.json());
-    answer.json()["id"].as_str().unwrap().to_owned()
-}
-
-#[track_caller]
-fn until(what: &str, mut reached: impl FnMut() -> bool) -> Duration {
-    let start = Instant::now();
-    while !reached() {
-        assert!(start.elapsed() < Duration::from_secs(60), "not reached: {what}");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    start.elapsed()
-}
-
 /// A job that is being computed, and the process that does it, beside those of other jobs.
 #[track_caller]
 fn running(service: &Service, number: u32, others: &[u32]) -> (String, u32) {
     let id = submit(service, &long(number));
-    until("progress", || service.get(&format!("/v1/jobs/{id}")).json()["progress"].is_object());
+    until(PATIENCE, "progress", || service.get(&format!("/v1/jobs/{id}")).json()["progress"].is_object());
     let its: Vec<u32> = service.children().into_iter().filter(|child| !others.contains(child)).collect();
     assert_eq!(its.len(), 1, "a process of its own");
     (id, its[0])
@@ -126,7 +108,7 @@ fn a_question_that_exceeds_its_memory_is_refused_alone() {
     }
     let grown = service.resident_bytes().saturating_sub(before);
     assert!(grown < 16 << 20, "the service itself has {grown} bytes more");
-    until("the process that had no memory is gone", || !processes.iter().any(|&process| is_alive(process)));
+    until(PATIENCE, "the process that had no memory is gone", || !processes.iter().any(|&process| is_alive(process)));
     // What an answer may not take a job may try, and fail.
     let job = service.done(&large);
     assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("limit.memory")), "{job}");
@@ -162,7 +144,7 @@ fn a_crash_ends_one_job_and_nothing_else() {
     {
         let (id, process) = running(&service, 1 + u32::try_from(number).unwrap(), &[beside]);
         // The first SEGV only takes the handler away that looks for overflown stacks: nothing in the program causes it again.
-        until("dead", || {
+        until(PATIENCE, "dead", || {
             let _ = send_signal(process, signal);
             !is_alive(process)
         });
@@ -189,7 +171,7 @@ fn a_process_that_dies_between_two_jobs_is_replaced() {
         let kept = service.children();
         assert_eq!(kept.len(), 1, "a small process is kept");
         assert!(send_signal(kept[0], "KILL"));
-        until("dead", || !is_alive(kept[0]));
+        until(PATIENCE, "dead", || !is_alive(kept[0]));
     }
 }
 
@@ -216,7 +198,7 @@ fn stopping_a_job_frees_its_process_at_once() {
         let (id, process) = running(&service, number, &[]);
         let start = Instant::now();
         assert_eq!(service.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
-        until("free", || !is_alive(process));
+        until(PATIENCE, "free", || !is_alive(process));
         times.push(start.elapsed());
         assert_eq!(service.ended(&id)["state"], "cancelled");
     }
@@ -235,7 +217,7 @@ fn a_time_limit_ends_the_process_too() {
     let job = service.done(&order);
     assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("limit.seconds")), "{job}");
     assert_eq!((&job["problem"]["limit"], &job["problem"]["allowed"]), (&json!("seconds"), &json!(0.5)));
-    until("gone", || service.children().is_empty());
+    until(PATIENCE, "gone", || service.children().is_empty());
 }
 
 #[test]
@@ -245,7 +227,7 @@ fn a_service_that_is_killed_leaves_no_process_behind() {
     let first = running(&service, 0, &[]).1;
     let processes = [first, running(&service, 1, &[first]).1];
     service.kill();
-    let time = until("gone", || processes.iter().all(|&process| !is_alive(process)));
+    let time = until(PATIENCE, "gone", || processes.iter().all(|&process| !is_alive(process)));
     eprintln!("two processes ended {time:?} after their service was killed");
     // What they were writing is swept at the next start, and the jobs are done again.
     let again = Service::start(scratch.path());

@@ -4,44 +4,20 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use lacuna_tests::support::cases;
+use lacuna_tests::support::cases::model;
 use lacuna_tests::support::collector::Collector;
-use lacuna_tests::support::service::Service;
+use lacuna_tests::support::service::{Service, submit, until, view};
 use lacuna_tests::support::stage::Stage;
 use serde_json::{Value, json};
 
 /// How long anything may take that takes a moment on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);
 
-fn model(name: &str) -> Value {
-    serde_json::from_slice(&std::fs::read(cases::named(name).model()).unwrap()).unwrap()
-}
-
 /// The distance of two fractals: the smaller the tolerance, the longer the work, a different one for every number.
 fn order(tolerance: f64, number: u32) -> Value {
     let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
     json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": tolerance * (1.0 + f64::from(number) / 1e3) },
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
-}
-
-#[track_caller]
-fn submit(front: &Service, order: &Value) -> String {
-    let answer = front.post("/v1/jobs", order);
-    assert!(matches!(answer.status, 200 | 202), "{}: {}", answer.status, answer.json());
-    answer.json()["id"].as_str().unwrap().to_owned()
-}
-
-fn view(front: &Service, id: &str) -> Value {
-    front.get(&format!("/v1/jobs/{id}")).json()
-}
-
-#[track_caller]
-fn until(what: &str, mut reached: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !reached() {
-        assert!(start.elapsed() < PATIENCE, "not reached: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }
 
 #[test]
@@ -53,7 +29,7 @@ fn workers_that_are_restarted_one_after_the_other_lose_no_job() {
     let ids: Vec<String> = (0..9).map(|number| submit(&front, &order([1e-4, 2e-5, 1e-5][number as usize % 3], number))).collect();
     let mut workers: Vec<Service> = (0..WORKERS).map(|number| stage.start("worker", &format!("worker {number}"))).collect();
     let mut gone = Vec::new();
-    until("work", || workers.iter().any(|worker| worker.said(&["job started"])));
+    until(PATIENCE, "work", || workers.iter().any(|worker| worker.said(&["job started"])));
     for (number, worker) in workers.iter_mut().enumerate() {
         worker.signal("TERM");
         let status = worker.end(PATIENCE);
@@ -62,7 +38,7 @@ fn workers_that_are_restarted_one_after_the_other_lose_no_job() {
         gone.push(std::mem::replace(worker, again));
         // The next one goes when this one is at work, or when there is nothing left to do.
         let ended = || ids.iter().all(|id| view(&front, id)["state"] == "succeeded");
-        until("work again", || worker.said(&["job started"]) || ended());
+        until(PATIENCE, "work again", || worker.said(&["job started"]) || ended());
     }
     let all: Vec<&Service> = gone.iter().chain(&workers).collect();
     let count = |words: &[&str]| all.iter().map(|worker| worker.count(words)).sum::<usize>();
@@ -71,7 +47,7 @@ fn workers_that_are_restarted_one_after_the_other_lose_no_job() {
         let job = front.ended(id);
         assert_eq!(job["state"], "succeeded", "{job}");
         // Whoever recorded the end may still be writing its log.
-        until("an end in the log", || count(&["job ended", id, "state=\"succeeded\""]) == 1);
+        until(PATIENCE, "an end in the log", || count(&["job ended", id, "state=\"succeeded\""]) == 1);
         let starts = count(&["job started", id]);
         assert_eq!(job["attempt"], starts, "{job}");
         assert_eq!(count(&["job ended", id, "state=\"queued\""]), starts - 1, "every other start was handed back: {job}");
@@ -141,10 +117,10 @@ fn a_wish_to_stop_stands_behind_nothing() {
         }
         for number in 0..8 {
             let id = submit(&first, &order(1e-6, number));
-            until("progress", || view(&first, &id)["progress"]["phase"].is_string());
+            until(PATIENCE, "progress", || view(&first, &id)["progress"]["phase"].is_string());
             let wished = Instant::now();
             assert_eq!(second.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
-            until("cancelled", || view(&first, &id)["state"] == "cancelled");
+            until(PATIENCE, "cancelled", || view(&first, &id)["state"] == "cancelled");
             times.push(wished.elapsed());
         }
         over.store(true, Ordering::Relaxed);

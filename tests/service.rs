@@ -7,14 +7,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::{run, succeed};
-use lacuna_tests::support::cases;
+use lacuna_tests::support::cases::{self, model};
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::{Answer, Service};
 use serde_json::{Value, json};
-
-fn model(name: &str) -> Value {
-    serde_json::from_slice(&std::fs::read(cases::named(name).model()).unwrap()).unwrap()
-}
 
 /// A small solid.
 fn order() -> Value {

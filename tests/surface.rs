@@ -3,14 +3,10 @@
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::{run, succeed};
-use lacuna_tests::support::cases;
+use lacuna_tests::support::cases::model;
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::Service;
 use serde_json::{Value, json};
-
-fn model(name: &str) -> Value {
-    serde_json::from_slice(&std::fs::read(cases::named(name).model()).unwrap()).unwrap()
-}
 
 /// Work for a minute at least.
 fn long_order(tolerance: f64) -> Value {

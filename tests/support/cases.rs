@@ -177,6 +177,15 @@ pub fn named(name: &str) -> Case {
     read(&folder().join(name))
 }
 
+/// The model document of the case with a name.
+///
+/// # Panics
+/// When there is none.
+#[must_use]
+pub fn model(name: &str) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(named(name).model()).unwrap()).unwrap()
+}
+
 /// The cases that make a solid.
 #[must_use]
 pub fn solids() -> Vec<Case> {

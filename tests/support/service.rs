@@ -297,6 +297,38 @@ impl Drop for Service {
     }
 }
 
+/// Orders a job, and gives its id.
+///
+/// # Panics
+/// When it is not accepted.
+#[track_caller]
+#[must_use]
+pub fn submit(service: &Service, order: &Value) -> String {
+    let answer = service.post("/v1/jobs", order);
+    assert!(matches!(answer.status, 200 | 202), "{}: {}", answer.status, answer.json());
+    answer.json()["id"].as_str().unwrap().to_owned()
+}
+
+/// A job as a service tells of it.
+#[must_use]
+pub fn view(service: &Service, id: &str) -> Value {
+    service.get(&format!("/v1/jobs/{id}")).json()
+}
+
+/// Waits until something is so; how long that took.
+///
+/// # Panics
+/// When it is not so in time.
+#[track_caller]
+pub fn until(patience: Duration, what: &str, mut reached: impl FnMut() -> bool) -> Duration {
+    let start = Instant::now();
+    while !reached() {
+        assert!(start.elapsed() < patience, "not reached: {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    start.elapsed()
+}
+
 /// Sends a process a signal by its name, as `kill` knows it; tells whether it was there.
 #[must_use]
 pub fn send_signal(process: u32, name: &str) -> bool {
