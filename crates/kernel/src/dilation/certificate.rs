@@ -266,12 +266,17 @@ impl Nearby {
         &self.views[range.first as usize..(range.first + range.count) as usize]
     }
 
-    /// Begins with a star: its corners, the middle first, are `corners` afterwards.
-    pub(super) fn begin(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: impl Iterator<Item = (u32, Point)>) {
+    /// Forgets all views where they are too many; not within a star.
+    fn forget_many(&mut self) {
         if self.views.len() > MOST_VIEWS {
             self.views.clear();
             self.ranges.fill(Range::default());
         }
+    }
+
+    /// Begins with a star: its corners, the middle first, are `corners` afterwards.
+    pub(super) fn begin(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: impl Iterator<Item = (u32, Point)>) {
+        self.forget_many();
         self.star += 1;
         self.sites.clear();
         self.marked.clear();
@@ -312,6 +317,7 @@ impl Nearby {
 
     /// The point of the sites that is closest to a vertex at x, if all sites within reach have the same, and the nearest site's deficit: there the distance is smooth.
     pub(super) fn foot(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point) -> Option<(Point, f64)> {
+        self.forget_many();
         self.see(tree, places, vertex, x, self.square);
         let mut foot: Option<(Point, f64)> = None;
         for view in self.views(vertex).iter().filter(|view| view.square <= self.square) {

@@ -105,6 +105,8 @@ pub(super) struct Growth<'l> {
     counted: Vec<f64>,
     /// Faces that went in the last step, of the first set's surface.
     pub(super) cancelled: u64,
+    /// The most bytes that a step held.
+    held: f64,
 }
 
 #[derive(Clone)]
@@ -124,7 +126,7 @@ impl<'l> Growth<'l> {
     pub(super) fn new(lattice: &'l Lattice, primitive: &Surface, (sets, after): (Vec<Vec<usize>>, Vec<usize>)) -> Self {
         let first = State { surface: primitive.clone(), copies: 1.0, determinants: 1.0 };
         let states = vec![first; sets.len()];
-        Self { lattice, sets, after, states, level: 0, counted: vec![primitive.triangle_count() as f64], cancelled: 0 }
+        Self { lattice, sets, after, states, level: 0, counted: vec![primitive.triangle_count() as f64], cancelled: 0, held: 0.0 }
     }
 
     /// Bytes that the next step holds.
@@ -173,12 +175,14 @@ impl<'l> Growth<'l> {
     pub(super) fn prediction(&self, level: u32) -> super::LevelPrediction {
         let more = self.growth().powi(level.saturating_sub(self.level) as i32);
         let last = self.counted[self.level as usize];
-        // The step before the last holds the most.
-        super::LevelPrediction { triangles: last * more, memory_bytes: self.bytes() * (more / self.growth()).max(1.0) }
+        // Of the steps to come the last holds the most.
+        let to_come = if level > self.level { self.bytes() * more / self.growth() } else { 0.0 };
+        super::LevelPrediction { triangles: last * more, memory_bytes: to_come.max(self.held) }
     }
 
     /// Goes to the next level.
     pub(super) fn step(&mut self, budget: &Budget) -> Result<(), Stopped> {
+        self.held = self.held.max(self.bytes());
         let scale = self.lattice.ratio.pow(self.level + 1);
         let mut states = Vec::with_capacity(self.states.len());
         for (index, set) in self.sets.iter().enumerate() {

@@ -90,11 +90,21 @@ const MAXIMUM_STEPS: usize = 50_000;
 /// Radii of cycles closer than this are not told apart.
 const SAME_RATE: f64 = 1e-9;
 
+/// One more transition of a path. Paths share what they begin with.
+#[derive(Clone, Copy)]
+struct Letter {
+    /// The letter before, unless this is the first.
+    before: Option<u32>,
+    state: u32,
+    transition: u32,
+}
+
 struct Path<'a> {
     start: usize,
     end: usize,
-    /// States and transitions.
-    word: Vec<(usize, usize)>,
+    /// Its last letter, and how many it has.
+    last: u32,
+    length: usize,
     product: Cow<'a, Dense>,
     error: f64,
     /// min over prefixes of norm^(1/length).
@@ -112,6 +122,7 @@ struct Search<'a> {
     work: f64,
     allowed: f64,
     numbers: usize,
+    letters: Vec<Letter>,
     heap: BinaryHeap<Path<'a>>,
     serial: usize,
     largest: Vec<f64>,
@@ -119,14 +130,26 @@ struct Search<'a> {
 
 /// Searches until the bounds meet, or `allowed` multiplications are done, or memory is used up.
 pub(super) fn search(steps: &[Vec<Step>], norm: Norm, lower: &mut Lower, allowed: f64) -> Upper {
-    let mut search = Search { steps, norm, lower, work: 0.0, allowed, numbers: 0, heap: BinaryHeap::new(), serial: 0, largest: Vec::new() };
+    let mut search = Search {
+        steps,
+        norm,
+        lower,
+        work: 0.0,
+        allowed,
+        numbers: 0,
+        letters: Vec::new(),
+        heap: BinaryHeap::new(),
+        serial: 0,
+        largest: Vec::new(),
+    };
     let many = steps.iter().map(Vec::len).sum::<usize>() > MAXIMUM_STEPS;
     for (state, outgoing) in steps.iter().enumerate() {
         for step in outgoing.iter().filter(|step| !many || step.to == state) {
             let path = Path {
                 start: state,
                 end: step.to,
-                word: vec![(state, step.transition)],
+                last: search.spell(None, state, step),
+                length: 1,
                 product: Cow::Borrowed(&step.matrix),
                 error: step.error,
                 rate: step.norm,
@@ -149,7 +172,7 @@ impl<'a> Search<'a> {
         while let Some(path) = self.heap.pop() {
             let enough = self.lower.rate + GAP * (1.0 - self.lower.rate).abs();
             let cost: f64 = self.steps[path.end].iter().map(|step| self.cost(&path.product, &step.matrix)).sum();
-            let done = path.rate <= enough || path.word.len() >= MAXIMUM_DEPTH || !path.rate.is_finite();
+            let done = path.rate <= enough || path.length >= MAXIMUM_DEPTH || !path.rate.is_finite();
             if done || self.work + cost > self.allowed || self.numbers > MAXIMUM_NUMBERS {
                 return path.rate;
             }
@@ -181,13 +204,27 @@ impl<'a> Search<'a> {
         let rounding = self.norm.rounding(&path.product, &step.matrix);
         let error = (path.error * step_size + path_size * step.error + rounding) * (1.0 + 1e-12);
         let norm = (self.norm.of(&product) + error) * (1.0 + f64::EPSILON);
-        let mut word = path.word.clone();
-        word.push((path.end, step.transition));
+        let (last, length) = (self.spell(Some(path.last), path.end, step), path.length + 1);
         // Powers are rounded by a few units in the last place.
-        let rate = path.rate.min(norm.powf(1.0 / word.len() as f64) * (1.0 + 8.0 * f64::EPSILON));
+        let rate = path.rate.min(norm.powf(1.0 / length as f64) * (1.0 + 8.0 * f64::EPSILON));
         self.numbers += product.entries.len();
-        let extended = Path { start: path.start, end: step.to, word, product: Cow::Owned(product), error, rate, serial: 0 };
+        let extended = Path { start: path.start, end: step.to, last, length, product: Cow::Owned(product), error, rate, serial: 0 };
         self.visit(extended, norm);
+    }
+
+    /// The letter of a step that follows another.
+    fn spell(&mut self, before: Option<u32>, state: usize, step: &Step) -> u32 {
+        self.letters.push(Letter { before, state: state as u32, transition: step.transition as u32 });
+        self.letters.len() as u32 - 1
+    }
+
+    /// States and transitions of a path.
+    fn word(&self, path: &Path<'_>) -> Vec<(usize, usize)> {
+        let letter = |at: u32| self.letters[at as usize];
+        let backwards = std::iter::successors(Some(letter(path.last)), |last| last.before.map(letter));
+        let mut word: Vec<_> = backwards.map(|letter| (letter.state as usize, letter.transition as usize)).collect();
+        word.reverse();
+        word
     }
 
     /// A bound of the norm of the computed product, for the errors of what follows.
@@ -199,7 +236,7 @@ impl<'a> Search<'a> {
     }
 
     fn visit(&mut self, mut path: Path<'a>, norm: f64) {
-        let length = path.word.len();
+        let length = path.length;
         if self.largest.len() < length {
             self.largest.resize(length, 0.0);
         }
@@ -214,12 +251,13 @@ impl<'a> Search<'a> {
 
     /// Raises the lower bound by the spectral radius of a closed path.
     fn close(&mut self, path: &Path<'_>, norm: f64) {
-        let length = path.word.len();
+        let length = path.length;
         let floor = self.lower.rate * (1.0 + SAME_RATE);
         if norm.powf(1.0 / length as f64) <= floor || self.work > self.allowed || self.lower.seen.len() > 10_000 {
             return;
         }
-        if !self.lower.seen.insert(least_rotation(&path.word)) {
+        let word = self.word(path);
+        if !self.lower.seen.insert(least_rotation(&word)) {
             return;
         }
         let n = path.product.rows as f64;
@@ -229,7 +267,7 @@ impl<'a> Search<'a> {
             let rate = radius.powf(1.0 / length as f64);
             if rate > floor {
                 self.lower.rate = rate;
-                self.lower.cycle = Some((path.start, path.word.iter().map(|&(_, transition)| transition).collect()));
+                self.lower.cycle = Some((path.start, word.iter().map(|&(_, transition)| transition).collect()));
             }
         }
     }
