@@ -210,3 +210,34 @@ fn random_solids_against_fine_samples() {
         }
     }
 }
+
+#[test]
+fn what_both_have_costs_nothing() {
+    let fine = block(DVec3::ZERO, DVec3::splat(20.0), 24, true);
+    for interior in [Interior::Solid, Interior::Surface] {
+        // Also where the triangles come in another order, and begin with another corner.
+        let turned: Vec<Triangle> = fine.iter().rev().map(|&[a, b, c]| [b, c, a]).collect();
+        let (first, second) = (mesh(&fine, interior), mesh(&turned, interior));
+        for (a, b) in [(&first, &first), (&first, &second), (&second, &first)] {
+            let found = far(a, b, 1e-5, 1);
+            assert_eq!((found.distance_mm().low, found.distance_mm().high), (0.0, 0.0));
+        }
+        // Turned over they are not known to be the same, and are searched: a surface is where it was.
+        if interior == Interior::Surface {
+            let over: Vec<Triangle> = block(DVec3::ZERO, DVec3::splat(20.0), 4, true).iter().map(|&[a, b, c]| [a, c, b]).collect();
+            let found = far(&mesh(&block(DVec3::ZERO, DVec3::splat(20.0), 4, true), interior), &mesh(&over, interior), 1e-3, 1_000_000);
+            assert!(found.distance_mm().low == 0.0);
+        }
+        // A second block beside the first, lower by 1 in the other. The solids differ, so that the inside is searched.
+        let coarse = block(DVec3::ZERO, DVec3::splat(20.0), 2, true);
+        let beside = |z: f64| [coarse.clone(), block(DVec3::new(40.0, 0.0, z), DVec3::splat(5.0), 1, true)].concat();
+        let (level, lower) = (mesh(&beside(0.0), interior), mesh(&beside(-1.0), interior));
+        let found = far(&level, &lower, 0.05, 4_000_000);
+        holds(found.from_first, 1.0);
+        holds(found.from_second, 1.0);
+        // A solid that holds the other: only the surface is shared.
+        let found = far(&level, &mesh(&coarse, interior), 0.05, 4_000_000);
+        holds(found.from_first, 25.0);
+        holds(found.from_second, 0.0);
+    }
+}

@@ -341,3 +341,31 @@ fn segments_that_go_back_are_told() {
         intersect_self(&wire(&[[0.0; 3], [10.0, 0.0, 0.0], [0.0, 1e-8, 0.0], [0.0, 40.0, 0.0]]), &query(0.01), &Budget::default()).unwrap();
     assert_ne!(sharp.verdict(), Verdict::Touching);
 }
+
+#[test]
+fn segments_along_a_triangle_from_its_corner_are_told() {
+    // The triangle lies in z = x + 2 y: sums of whole numbers, so that the plane is exact. A segment leaves the corner (1, 1) for (x, y), raised.
+    let at = |x: f64, y: f64| [x, y, x + 2.0 * y];
+    let with = |[x, y]: [f64; 2], raised: f64, turned: bool| {
+        let end = at(x, y);
+        let segment = if turned { vec![3, 0] } else { vec![0, 3] };
+        // A second triangle far away: there is something to compare with even where all that is near is joined.
+        let far = [at(900.0, 0.0), at(910.0, 0.0), at(900.0, 10.0)];
+        let vertices = [vec![at(1.0, 1.0), at(9.0, 1.0), at(1.0, 9.0), [end[0], end[1], end[2] + raised]], far.to_vec()].concat();
+        mesh(vertices, vec![vec![0, 1, 2], segment, vec![4, 5, 6]])
+    };
+    for turned in [false, true] {
+        // Inside, past the opposite side, and along a side by less and by more than it is long.
+        for end in [[3.0, 2.0], [20.0, 30.0], [4.0, 1.0], [30.0, 1.0], [1.0, 5.0], [1.0, 12.0]] {
+            let found = ask(&with(end, 0.0, turned), 0.01);
+            assert_eq!((found.verdict(), found.distance_mm.high), (Verdict::Touching, 0.0), "{end:?}");
+            assert!(is_in_a_place(&found, DVec3::from_array(at(1.0, 1.0))), "{end:?}");
+            // Off the plane by one unit in the last place it is only joined.
+            assert_ne!(ask(&with(end, 1e-14, turned), 0.01).verdict(), Verdict::Touching, "{end:?} raised");
+        }
+        // Outside the angle, on the line of a side the other way, and the side itself.
+        for end in [[-3.0, -2.0], [-4.0, 1.0], [1.0, -5.0], [30.0, 0.0], [0.0, 9.0], [9.0, 1.0]] {
+            assert_ne!(ask(&with(end, 0.0, turned), 0.01).verdict(), Verdict::Touching, "{end:?}");
+        }
+    }
+}

@@ -2,6 +2,7 @@
 //! bounded by a few multiplications, whatever the signs of its operators.
 
 mod address;
+mod attained;
 mod bound;
 pub mod cell;
 mod complex;
@@ -28,6 +29,7 @@ use crate::solid::TriMesh;
 use crate::tolerance::Tolerance;
 pub(crate) use address::rounding;
 pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
+pub(crate) use attained::AttainedPoint;
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
@@ -81,6 +83,8 @@ pub struct Attractor {
     bounds: Vec<StateBound>,
     /// Worked out when first asked for: measures and comparisons do without, and it is most of what lowering takes.
     covers: OnceLock<Vec<Option<PointCover>>>,
+    /// Of every state, when first asked for.
+    attained: Vec<OnceLock<Vec<AttainedPoint>>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
     precisions: Vec<Option<LinearPrecision>>,
@@ -222,12 +226,14 @@ impl Attractor {
         defect::measure_drawings(&mut automaton, &bounds);
         let connected = connected::connected(&automaton, &bounds, &contraction);
         let precisions = precision::precisions(&automaton, &bounds);
+        let count = automaton.states().len();
         let attractor = Self {
             automaton,
             roots,
             solids,
             bounds,
             covers: OnceLock::new(),
+            attained: vec![OnceLock::new(); count],
             connected,
             precisions,
             contraction,
@@ -401,6 +407,11 @@ impl Attractor {
     pub(crate) fn cover(&self, state: StateId) -> Option<&PointCover> {
         let covers = self.covers.get_or_init(|| cover::covers(&self.automaton, &self.bounds, &self.contraction));
         covers[state.index()].as_ref()
+    }
+
+    /// Some points of a state's attractor.
+    pub(crate) fn attained(&self, state: StateId) -> &[AttainedPoint] {
+        self.attained[state.index()].get_or_init(|| attained::attained(&self.automaton, &self.contraction, state))
     }
 
     /// Parameters of a state's points, where its curves or faces are proven to have linear precision.

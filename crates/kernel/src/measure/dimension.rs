@@ -147,7 +147,7 @@ fn by_contraction(attractor: &Attractor, index: usize, growth: f64, budget: &Bud
             let mut ends = [0.0; 2];
             for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
                 let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-                *end = support_of_cell(attractor, attractor.root_cell(index), root.points.clone(), &direction, budget)?.low;
+                *end = support_of_cell(attractor, attractor.root_cell(index), &root.points, &direction, budget)?.low;
             }
             if ends[0] + ends[1] > 0.0 {
                 low = 1.0;
@@ -409,9 +409,8 @@ fn are_apart(
             continue;
         }
         let (forth, back) = (direction.map(|x| x / length), direction.map(|x| -x / length));
-        let end = |(cell, points): &(Cell, Vec<ControlPoint>), direction: &Point| {
-            support_of_cell(attractor, *cell, points.clone(), direction, budget)
-        };
+        let end =
+            |(cell, points): &(Cell, Vec<ControlPoint>), direction: &Point| support_of_cell(attractor, *cell, points, direction, budget);
         let first = [-end(own, &back)?.high, end(own, &forth)?.high];
         let second = [-end(other, &back)?.high, end(other, &forth)?.high];
         let size = (first[1] - first[0]).max(second[1] - second[0]);

@@ -8,6 +8,7 @@ pub mod hausdorff;
 pub mod mass;
 pub mod oriented_box;
 pub mod section;
+mod support;
 pub mod thickness;
 pub mod triangle;
 

@@ -3,7 +3,7 @@
 use super::TrimmedSurface;
 use super::arc::{Arc, Parameter};
 use crate::attractor::Attractor;
-use crate::attractor::cell::{Cell, Point};
+use crate::attractor::cell::Point;
 
 /// A cell of a trimmed surface.
 #[derive(Clone, Debug)]
@@ -62,10 +62,10 @@ impl Attractor {
         Some(Window::new(surface, bounds, surface.region.arcs_near(bounds)))
     }
 
-    /// Points of a crossed cell on the loops.
-    pub(crate) fn window_points(&self, cell: &Cell, window: &Window) -> impl Iterator<Item = Point> {
-        let surface = self.trim_of(cell.root as usize).map(|index| &self.trimmed()[index]);
-        let spans = surface.and_then(|surface| surface.spans_of(cell.root as usize));
+    /// Points on the loops of a crossed cell below that root.
+    pub(crate) fn window_points(&self, root: usize, window: &Window) -> impl Iterator<Item = Point> {
+        let surface = self.trim_of(root).map(|index| &self.trimmed()[index]);
+        let spans = surface.and_then(|surface| surface.spans_of(root));
         let within = |p: &Parameter| (0..2).all(|k| window.bounds[0][k] <= p[k] && p[k] <= window.bounds[1][k]);
         let ends = window.arcs.iter().map(Arc::start).filter(within);
         ends.filter_map(move |parameter| Some(surface?.point(spans?, parameter)))

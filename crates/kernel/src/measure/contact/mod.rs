@@ -224,8 +224,8 @@ pub fn intersect_primitive(
 /// at most 4 t, and simplices of any size. Two different pieces are *joined*
 ///
 /// * when they share a cell of their boundaries: the B-rep of the model says so, whose incidences, adjacencies and gluings
-///   are followed exactly; corners of given simplices are shared when their coordinates are the same numbers. Of two
-///   triangles, and of two segments, it must be all that they have in common, which exact signs decide;
+///   are followed exactly; corners of given simplices are shared when their coordinates are the same numbers. Of
+///   triangles and segments it must be all that they have in common, which exact signs decide;
 /// * or when they have no proven common point, and a chain of pieces leads from one to the other, each of which shares such a
 ///   cell with the next, and all but the two lie in the ball of radius 16 t around the middle of the closest points of what
 ///   stands for the two: simplices, chords, polygons, or the centres of their balls.

@@ -13,7 +13,7 @@ use crate::attractor::cell::{Point, Site, distance_squared};
 use crate::automaton::StateId;
 use crate::automaton::topology::{Source, Topology, View};
 use crate::budget::Budget;
-use crate::solid::contact::{is_flat, meet};
+use crate::solid::contact::{is_flat, meet, side, turn, view};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -229,12 +229,19 @@ fn origins(cut_from: &[u32], cell: u32) -> impl Iterator<Item = u32> {
     std::iter::successors(origin(&cell), move |cell| origin(cell))
 }
 
-/// Whether two exact triangles have more in common than the corners that they share, and the edge between these, or two exact segments more than an end.
+/// Whether two exact triangles have more in common than the corners that they share, and the edge between these, two exact segments more than an end, or
+/// an exact segment and triangle more than a corner.
 fn cross(a: &Body, b: &Body) -> bool {
     if let (Nature::Exact, Nature::Exact, [Site::Segment(first)], [Site::Segment(second)]) =
         (a.nature, b.nature, a.sites.as_slice(), b.sites.as_slice())
     {
         return overlap(first, second);
+    }
+    for (segment, triangle) in [(a, b), (b, a)] {
+        if let (Nature::Exact, [Site::Segment(ends)], Some(corners)) = (segment.nature, segment.sites.as_slice(), triangle.exact_triangle())
+        {
+            return runs_along(ends, corners);
+        }
     }
     let (Some(first), Some(second)) = (a.exact_triangle(), b.exact_triangle()) else { return false };
     let name = |k: usize| first.iter().position(|corner| *corner == second[k]).unwrap_or(3 + k) as u32;
@@ -251,6 +258,23 @@ fn overlap(first: &[Point; 2], second: &[Point; 2]) -> bool {
     let [a, b] = first;
     let [c, d] = second;
     (a == c && from([a, b], d)) || (a == d && from([a, b], c)) || (b == c && from([b, a], d)) || (b == d && from([b, a], c))
+}
+
+/// Whether a segment that shares one end with a triangle with area runs along it from there: the other end is in the triangle's plane, exactly, and in its
+/// angle at that corner, sides included. Any other segment from a corner leaves the triangle at once; one that shares both ends is a side.
+fn runs_along(segment: &[Point; 2], triangle: &[Point; 3]) -> bool {
+    let place = |end: &Point| triangle.iter().position(|corner| corner == end);
+    let (k, other) = match segment.each_ref().map(place) {
+        [Some(k), None] => (k, &segment[1]),
+        [None, Some(k)] => (k, &segment[0]),
+        _ => return false,
+    };
+    let [corner, next, last] = [0, 1, 2].map(|step| &triangle[(k + step) % 3]);
+    let Some(axis) = view(triangle).filter(|_| side(corner, next, last, other) == 0.0) else { return false };
+    let angle = turn(axis, corner, next, last);
+    let turns = [turn(axis, corner, next, other), turn(axis, corner, other, last)];
+    // Signs alone: a product of small numbers might vanish.
+    turns.iter().all(|&turn| turn == 0.0 || (turn > 0.0) == (angle > 0.0))
 }
 
 /// Names of boundary cells, handed out on the way down.

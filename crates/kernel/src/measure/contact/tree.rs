@@ -120,6 +120,11 @@ impl<'a> Tree<'a> {
         self.nodes.push(node);
     }
 
+    /// Nodes that were made so far.
+    pub(crate) fn count(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// A node that was handed out.
     pub(crate) fn node(&self, id: NodeId) -> &Node {
         &self.nodes[id as usize]

@@ -14,6 +14,8 @@
 //! triangulation, and of two that lie in one plane not even there, as pieces are cut along the edges. Corners are looked at for the lower end, too: where one
 //! site is nearest, no other point is farther.
 //!
+//! Simplices that both have are at the distance 0, and so is the inside of a solid that both have: neither is searched (see `same`).
+//!
 //! A solid is what it encloses. Of a point within B the distance is 0, and of a piece around it at most r - d(c, surface of B). The inside of A is searched in cubes:
 //! those whose centre is outside of A, and farther than r from its surface, hold nothing of it. What a cube that meets the surface holds is within 2 r of points
 //! of the surface, which are pieces themselves; so small cubes there are not searched, and 2 r is added in the end. Cubes are sought only for points of the inside
@@ -21,6 +23,7 @@
 
 mod flat;
 mod inside;
+mod same;
 
 use super::Interval;
 use super::contact::{Body, ContactError, Nature, NodeId, Tree, corners, tree};
@@ -82,7 +85,7 @@ fn holds(solids: &[Filled<'_>], point: &Point) -> bool {
 /// The Hausdorff distance of two shapes, both ways, as intervals no wider than the tolerance unless a limit is hit.
 ///
 /// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Triangles along one triangle of the
-/// other are not split; along several that bend, as many pieces as tolerances fit along their edges. Fractals and curved
+/// other are not split, and those that are the other's own cost nothing; along several that bend, as many pieces as tolerances fit along their edges. Fractals and curved
 /// surfaces that are alike everywhere are the slowest: every cell as small as the tolerance is looked at.
 ///
 /// # Errors
@@ -123,6 +126,8 @@ ordered_by!(Piece, |this, other| this.high.total_cmp(&other.high).then(other.num
 struct Search<'a> {
     first: Tree<'a>,
     second: Tree<'a>,
+    /// Of the nodes of the first that were there at the start, whether all of it belongs to the second.
+    shared: Vec<bool>,
     /// Solids of the first and of the second.
     solids: [&'a [Filled<'a>]; 2],
     budget: &'a Budget,
@@ -149,12 +154,14 @@ struct Search<'a> {
 const MOST_SINGLE: usize = 16;
 
 fn directed<'a>(
-    [first, second]: [Tree<'a>; 2],
+    [mut first, second]: [Tree<'a>; 2],
     solids: [&'a [Filled<'a>]; 2],
     tolerance: Tolerance,
     budget: &'a Budget,
 ) -> Result<(Directed, bool), ContactError> {
+    let same_solids = same::shared_solids(solids[0], solids[1]);
     let mut search = Search {
+        shared: same::shared(&mut first, &second),
         slack: first.slack + second.slack,
         place: first.node(0).body.ball,
         first,
@@ -173,7 +180,7 @@ fn directed<'a>(
         settled: 0.0,
     };
     search.look(Part::Node(0), &[0], &[], f64::INFINITY);
-    for solid in solids[0] {
+    for (solid, _) in solids[0].iter().zip(same_solids).filter(|(_, same)| !same) {
         let Some(low) = solid.mesh.vertices.iter().copied().reduce(DVec3::min) else { continue };
         let high = solid.mesh.vertices.iter().copied().fold(low, DVec3::max);
         let (centre, half) = (0.5 * (low + high), 0.5 * (high - low).max_element() * (1.0 + 1e-9));
@@ -235,6 +242,9 @@ impl<'a> Search<'a> {
 
     /// Encloses the supremum over a part, at most `most`, and puts it into the queue if it may be the largest.
     fn look(&mut self, part: Part, near: &[NodeId], own: &[NodeId], most: f64) {
+        if matches!(part, Part::Node(id) if self.shared.get(id as usize) == Some(&true)) {
+            return;
+        }
         let (centre, radius, astray) = self.around(part);
         let (mut least, mut farthest, mut near) = self.distance(Which::Second, &centre, radius, near);
         let reach = farthest + 2.0 * (radius + self.slack);
