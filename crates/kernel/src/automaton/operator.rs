@@ -184,7 +184,7 @@ impl SubdivisionOperator {
     #[must_use]
     pub fn apply(&self, point: &[f64]) -> Vec<f64> {
         if let Form::Product { factors, .. } = &self.form {
-            return apply_factors(factors, point);
+            return through_factors(factors, point, false);
         }
         let mut image = vec![0.0; self.rows];
         for (column, &weight) in point.iter().enumerate() {
@@ -201,7 +201,7 @@ impl SubdivisionOperator {
     #[must_use]
     pub fn pull_back(&self, functional: &[f64]) -> Vec<f64> {
         if let Form::Product { factors, .. } = &self.form {
-            return pull_back_factors(factors, functional);
+            return through_factors(factors, functional, true);
         }
         self.entries().chunks_exact(self.rows).map(|column| product_sum(column, functional)).collect()
     }
@@ -260,45 +260,25 @@ fn kronecker(factors: &[SubdivisionOperator]) -> Vec<f64> {
     product.entries().to_vec()
 }
 
-/// (T_u x T_v) x, direction after direction.
-fn apply_factors(factors: &[SubdivisionOperator], point: &[f64]) -> Vec<f64> {
-    let mut current = point.to_vec();
-    let (mut outer, mut inner) = (1, point.len());
+/// (T_u x T_v) x, direction after direction; or `back`, x^T (T_u x T_v).
+fn through_factors(factors: &[SubdivisionOperator], values: &[f64], back: bool) -> Vec<f64> {
+    let mut current = values.to_vec();
+    let (mut outer, mut inner) = (1, values.len());
     for factor in factors {
-        let (rows, columns) = (factor.rows, factor.columns);
-        inner /= columns;
-        let mut image = vec![0.0; outer * rows * inner];
+        let (from, to) = if back { (factor.rows, factor.columns) } else { (factor.columns, factor.rows) };
+        inner /= from;
+        let mut image = vec![0.0; outer * to * inner];
         for block in 0..outer {
-            for column in 0..columns {
-                let source = &current[(block * columns + column) * inner..][..inner];
+            for column in 0..factor.columns {
                 for (row, &entry) in factor.column(column).iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
-                    let target = &mut image[(block * rows + row) * inner..][..inner];
+                    let (source, target) = if back { (row, column) } else { (column, row) };
+                    let source = &current[(block * from + source) * inner..][..inner];
+                    let target = &mut image[(block * to + target) * inner..][..inner];
                     target.iter_mut().zip(source).for_each(|(sum, &x)| *sum += entry * x);
                 }
             }
         }
-        outer *= rows;
-        current = image;
-    }
-    current
-}
-
-/// c^T (T_u x T_v), direction after direction.
-fn pull_back_factors(factors: &[SubdivisionOperator], functional: &[f64]) -> Vec<f64> {
-    let mut current = functional.to_vec();
-    let (mut outer, mut inner) = (1, functional.len());
-    for factor in factors {
-        let (rows, columns) = (factor.rows, factor.columns);
-        inner /= rows;
-        let mut image = vec![0.0; outer * columns * inner];
-        for (source, target) in current.chunks_exact(rows * inner).zip(image.chunks_exact_mut(columns * inner)) {
-            for (column, target) in target.chunks_exact_mut(inner).enumerate() {
-                for (source, &entry) in source.chunks_exact(inner).zip(factor.column(column)) {
-                    target.iter_mut().zip(source).for_each(|(sum, &x)| *sum += entry * x);
-                }
-            }
-        }
-        outer *= columns;
+        outer *= to;
         current = image;
     }
     current

@@ -51,7 +51,7 @@ impl AxisBox {
     }
 }
 
-/// The box of the attractor; each of its six numbers is an interval, 1e-10 of the shape's size wide unless
+/// The box of the attractor; each of its six numbers is an interval, 1e-11 of the shape's size wide unless
 /// the shape's extremes are too many to separate.
 ///
 /// # Errors
