@@ -2,10 +2,11 @@
 
 use std::process::Command;
 
-use lacuna_tests::support::binary::{lacuna, succeed};
+use lacuna_tests::support::binary::{lacuna, run, succeed};
 use lacuna_tests::support::cases;
 use lacuna_tests::support::root;
 use lacuna_tests::support::scratch::Scratch;
+use lacuna_tests::support::service::Service;
 use serde_json::{Value, json};
 
 /// The job of a solid without simplification: its lattice is what a plan predicts.
@@ -60,4 +61,99 @@ fn a_plan_is_the_same_for_any_number_of_threads() {
     let plan = |threads: &str| Command::new(lacuna()).arg("plan").arg(&file).env("RAYON_NUM_THREADS", threads).output().unwrap().stdout;
     let one = plan("1");
     assert!(!one.is_empty() && one == plan("2") && one == plan("5"), "{}", String::from_utf8_lossy(&one));
+}
+
+/// A job with a limit, and the name of what its refusal offers.
+fn limited(kind: &str, model: &str, params: &Value, limits: &Value, remedy: &'static str) -> (Value, &'static str) {
+    let model: Value = serde_json::from_slice(&std::fs::read(cases::named(model).model()).unwrap()).unwrap();
+    (json!({ "lacuna": 1, "kind": kind, "model": model, "params": params, "limits": limits, "outputs": ["obj"] }), remedy)
+}
+
+/// Jobs that exceed a limit far; some with a tolerance so large already that only the limit helps: half the radius and more is the same to a dilation.
+fn beyond() -> Vec<(Value, &'static str)> {
+    let triangles = |allowed: u32| json!({ "triangles": allowed });
+    let plain = |tolerance: f64, radius: f64| json!({ "tolerance_mm": tolerance, "radius_mm": radius });
+    let lattice = json!({ "tolerance_mm": 0.01, "radius_mm": 2.0, "simplify": false });
+    let evaluated = |tolerance: f64| json!({ "tolerance_mm": tolerance });
+    vec![
+        limited("solidify", "curves/circle", &plain(0.002, 1.0), &triangles(300_000), "tolerance_mm"),
+        limited("solidify", "ifs/koch_curve", &plain(0.9, 0.6), &triangles(3000), "triangles"),
+        limited("solidify", "meshes/cube_open", &lattice, &triangles(40_000), "tolerance_mm"),
+        limited("evaluate", "nurbs/torus", &evaluated(0.0005), &json!({ "cells": 20_000 }), "tolerance_mm"),
+        limited("evaluate", "ifs/sierpinski_tetrahedron", &evaluated(0.05), &json!({ "cells": 5000 }), "tolerance_mm"),
+        limited("evaluate", "nurbs/torus", &evaluated(0.0002), &json!({ "memory_bytes": 4_000_000 }), "tolerance_mm"),
+    ]
+}
+
+/// The job with what a refusal offers.
+fn mended(job: &Value, remedy: &Value, name: &str) -> Value {
+    let mut job = job.clone();
+    assert_eq!(remedy.as_object().map(|offered| offered.keys().map(String::as_str).collect()), Some(vec![name]), "{remedy}");
+    let value = remedy[name].as_f64().unwrap();
+    if name == "tolerance_mm" {
+        assert!(value > job["params"][name].as_f64().unwrap(), "{value}");
+        job["params"][name] = json!(value);
+    } else {
+        job["limits"][name] = json!(value.ceil() as u64);
+    }
+    job
+}
+
+#[test]
+fn what_a_plan_offers_passes() {
+    let scratch = Scratch::new();
+    let file = scratch.join("job.json");
+    for (job, name) in beyond() {
+        std::fs::write(&file, job.to_string()).unwrap();
+        let plan: Value = serde_json::from_slice(&succeed(["plan".as_ref(), file.as_os_str()])).unwrap();
+        let excess = &plan["exceeds"];
+        let limit = job["limits"].as_object().unwrap().keys().next().unwrap();
+        assert_eq!((&excess["limit"], &excess["allowed"]), (&json!(limit), &json!(job["limits"][limit].as_f64())), "{plan}");
+        assert!(excess["asked"].as_f64() > excess["allowed"].as_f64().map(|allowed| 2.0 * allowed), "{excess}");
+        std::fs::write(&file, mended(&job, &excess["remedy"], name).to_string()).unwrap();
+        let plan: Value = serde_json::from_slice(&succeed(["plan".as_ref(), file.as_os_str()])).unwrap();
+        assert!(plan.get("exceeds").is_none(), "{plan}");
+        succeed(["run".as_ref(), file.as_os_str(), "-o".as_ref(), scratch.join("made").as_os_str(), "--quiet".as_ref()]);
+    }
+}
+
+#[test]
+fn the_command_line_names_what_passes_when_a_limit_ends_the_work() {
+    let scratch = Scratch::new();
+    let file = scratch.join("job.json");
+    // Memory is held by the operating system to what the service allows, and by nobody here.
+    for (job, name) in beyond().into_iter().filter(|(job, _)| job["limits"].get("memory_bytes").is_none()) {
+        std::fs::write(&file, job.to_string()).unwrap();
+        let made = scratch.join("made");
+        let ended = run(["run".as_ref(), file.as_os_str(), "-o".as_ref(), made.as_os_str(), "--quiet".as_ref()]);
+        let said = String::from_utf8(ended.stderr).unwrap();
+        assert_eq!(ended.status.code(), Some(4), "{said}");
+        let offer = format!("this would pass: {name} = ");
+        let value: f64 =
+            said.lines().find_map(|line| line.trim().strip_prefix(&offer)).unwrap_or_else(|| panic!("{said}")).parse().unwrap();
+        std::fs::write(&file, mended(&job, &json!({ name: value }), name).to_string()).unwrap();
+        succeed(["run".as_ref(), file.as_os_str(), "-o".as_ref(), made.as_os_str(), "--quiet".as_ref()]);
+    }
+}
+
+#[test]
+fn the_service_refuses_what_a_plan_says_is_beyond_the_limits() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    for (job, name) in beyond() {
+        let answer = service.post("/v1/jobs", &job);
+        let problem = answer.json();
+        assert_eq!(
+            (answer.status, &problem["code"], &problem["type"]),
+            (422, &json!("plan-exceeds-limit"), &json!("/problems/limit")),
+            "{problem}"
+        );
+        assert!(problem["detail"].as_str().unwrap().contains(name), "{problem}");
+        let listed = service.get("/v1/jobs").json();
+        let before = listed["items"].as_array().unwrap().len();
+        let ended = service.done(&mended(&job, &problem["remedy"], name));
+        assert_eq!(ended["state"], "succeeded", "{ended}");
+        // What was refused is no job.
+        assert_eq!(service.get("/v1/jobs").json()["items"].as_array().unwrap().len(), before + 1);
+    }
 }

@@ -47,19 +47,20 @@ fn cubes(count: u32, memory_bytes: u64) -> Value {
 
 #[test]
 fn a_job_that_exceeds_its_memory_ends_alone() {
-    const ALLOWED: u64 = 8 << 20;
+    // Half of what the plan says, and less: a third would be refused by it.
+    const ALLOWED: u64 = 32 << 20;
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
     let (bystander, process) = running(&service, 0, &[]);
-    let job = service.done(&cubes(4000, ALLOWED));
+    let job = service.done(&cubes(10_000, ALLOWED));
     let problem = &job["problem"];
     assert_eq!((&job["state"], &problem["code"], &problem["status"]), (&json!("failed"), &json!("limit.memory"), &json!(422)), "{job}");
-    assert_eq!((&problem["limit"], problem["allowed"].as_f64()), (&json!("memory_bytes"), Some(8_388_608.0)), "{problem}");
+    assert_eq!((&problem["limit"], problem["allowed"].as_f64()), (&json!("memory_bytes"), Some(33_554_432.0)), "{problem}");
     assert!(problem["detail"].as_str().unwrap().contains("the operating system refused it another"), "{problem}");
     // Nobody else notices; and with the memory that it needs the same work is done.
     assert_eq!(service.get(&format!("/v1/jobs/{bystander}")).json()["state"], "running");
     assert!(service.children() == [process] && is_alive(process));
-    let enough = service.done(&cubes(4000, 1 << 30));
+    let enough = service.done(&cubes(10_000, 1 << 30));
     assert_eq!(enough["state"], "succeeded", "{enough}");
     assert_eq!(enough["reused"], false);
 }

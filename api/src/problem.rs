@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use axum::body::Body;
 use axum::http::{HeaderValue, Response, StatusCode, header};
 use axum::response::IntoResponse;
-use lacuna_fabrication::JobError;
+use lacuna_fabrication::{Excess, JobError};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -412,6 +412,18 @@ impl From<JobError> for Problem {
             Some(facts) => problem.limit(facts),
             None => problem,
         }
+    }
+}
+
+impl From<Excess> for Problem {
+    /// A job that its plan refuses.
+    fn from(excess: Excess) -> Self {
+        let Excess { limit, asked, allowed, remedy } = excess;
+        let way_out: Vec<String> = remedy.iter().map(|(name, value)| format!("; {name} = {value} would pass")).collect();
+        let detail = format!("The plan asks for about {asked:.0} {limit}, and {allowed:.0} are allowed{}", way_out.concat());
+        let problem = Self::new(ProblemKind::Limit, detail).code("plan-exceeds-limit");
+        let remedy = Some(remedy).filter(|remedy| !remedy.is_empty());
+        Self { limit: Some(limit), asked: Some(asked), allowed: Some(allowed), remedy, ..problem }
     }
 }
 

@@ -359,6 +359,14 @@ export interface ExactNumber {
   /** The nearest double. */ value: number;
 }
 
+/** A limit that a plan exceeds. */
+export interface Excess {
+  /** What is allowed. */ allowed: number;
+  /** What is predicted. */ asked: number;
+  /** Its name among the limits of a job: `cells`, `triangles` or `memory_bytes`. */ limit: string;
+  /** A parameter of the job, or the limit where no tolerance is enough, and a value that would pass. Empty when the search for one took too long. */ remedy: Record<string, number>;
+}
+
 /** How far a shape extends along a direction: between two planes across it that touch the shape. */
 export interface ExtentStatement {
   /** The direction, of length 1. */ direction: Array<number>;
@@ -871,6 +879,7 @@ export interface PlaceStatement {
 /** What a job is predicted to cost. */
 export interface Plan {
   /** Triangles against which the limit of triangles is held: those of the lattices as they are first made. */ counted_triangles?: number;
+  exceeds?: Excess | null;
   /** Edge of the lattice's cubes. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
   /** Peak memory of the process that does the job, in bytes. 0 where nothing is predicted. */ memory_bytes: number;

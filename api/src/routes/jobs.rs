@@ -7,7 +7,7 @@ use axum::Json;
 use axum::extract::{Extension, Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use lacuna_fabrication::JobKind;
+use lacuna_fabrication::{JobKind, Plan};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
@@ -125,9 +125,15 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
     });
     let replaced = replaced.transpose()?;
     match state.ask(owner, Question::Plan, body) {
+        Ok(answer) => {
+            let plan: Plan = serde_json::from_str(&answer).map_err(|error| Problem::internal(format!("a plan cannot be read: {error}")))?;
+            if let Some(excess) = plan.exceeds {
+                return Err(excess.into());
+            }
+        }
         // A prediction that takes too long, or more memory than an answer may have, is no reason to refuse what may be done.
-        Err(problem) if !["limit.seconds", "limit.memory"].contains(&problem.code.as_ref()) => return Err(problem),
-        _ => {}
+        Err(problem) if ["limit.seconds", "limit.memory"].contains(&problem.code.as_ref()) => {}
+        Err(problem) => return Err(problem),
     }
     let submission = Submission {
         owner: owner.0.clone(),

@@ -11,7 +11,8 @@ use lacuna_kernel::solid::TriMesh;
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::operand::{Operand, at_fault, operand, predicted, rounded, share, sources};
-use crate::run::{JobError, Outcome, Plan, stl_bytes, wrong_inputs};
+use crate::plan::{Plan, stl_bytes};
+use crate::run::{JobError, Outcome, wrong_inputs};
 use crate::{Geometry, Job, Operation, certificate};
 
 /// Does a job of kind `intersect` with an operation.

@@ -7,7 +7,8 @@ use lacuna_kernel::model::{PolygonMesh, Shape};
 use lacuna_kernel::solid::{SolidError, Topology, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
 
-use crate::run::{Geometry, JobError, Outcome, Plan, not_carried, stl_bytes};
+use crate::plan::{Plan, stl_bytes};
+use crate::run::{Geometry, JobError, Outcome, not_carried};
 use crate::{Job, certificate};
 
 /// The polygons of a job whose one input is nothing but polygons: everything else is evaluated.

@@ -6,7 +6,8 @@ use lacuna_kernel::levels::{LevelError, LevelPrimitive, predict, solid_level};
 use lacuna_kernel::measure::bounding_box;
 use lacuna_kernel::model::{Ifs, Shape};
 
-use crate::run::{JobError, Outcome, Plan, lower, stl_bytes};
+use crate::plan::{Plan, stl_bytes};
+use crate::run::{JobError, Outcome, lower};
 use crate::{Geometry, Job, certificate};
 
 /// What was copied.

@@ -7,6 +7,7 @@ mod convert;
 pub mod job;
 pub mod level;
 mod operand;
+pub mod plan;
 pub mod repair;
 pub mod run;
 pub mod shape_measures;
@@ -17,7 +18,8 @@ pub mod split;
 
 pub use certificate::Certificate;
 pub use job::{CutPlane, Input, Job, JobKind, Operation, Params, Planes, Split, SplitKey, WallOrder, WallSide};
+pub use plan::{Excess, Plan, plan};
 pub use repair::{RepairStatement, repaired_mesh};
-pub use run::{Geometry, JobError, Outcome, Part, Plan, StreamError, Validation, plan, run, stream_points, validate};
+pub use run::{Geometry, JobError, Outcome, Part, StreamError, Validation, run, stream_points, validate};
 pub use slice::Stack;
 pub use solve::{SolutionSpace, SolveRefusal, Solved, solve};

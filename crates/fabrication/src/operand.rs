@@ -16,7 +16,8 @@ use std::f64::consts::PI;
 use crate::Job;
 use crate::certificate::OperandStatement;
 use crate::job::Input;
-use crate::run::{JobError, Plan, held_bytes, lower_all, not_carried, stl_bytes, wrong_inputs};
+use crate::plan::{Plan, held_bytes, stl_bytes};
+use crate::run::{JobError, lower_all, not_carried, wrong_inputs};
 
 /// An input as a solid.
 pub(crate) struct Operand {

@@ -1,11 +1,11 @@
-//! One entry for every door: `plan` predicts, `run` does, `validate` tells what is wrong.
+//! One entry for every door: `run` does a job, `validate` tells what is wrong with a model.
 
-use lacuna_kernel::attractor::{Attractor, RefineError, count_cells, refine, refine_with_normals, stream};
-use lacuna_kernel::budget::{Budget, Limits, Stopped};
-use lacuna_kernel::dilation::{DilationError, Prediction, dilate_unsimplified, predict};
+use lacuna_kernel::attractor::{Attractor, RefineError, refine, refine_with_normals, stream};
+use lacuna_kernel::budget::{Budget, Stopped};
+use lacuna_kernel::dilation::{DilationError, dilate_unsimplified};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
-use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, bounding_box_memory, dimension};
+use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
 use lacuna_kernel::model::{Finding, Lowered, Model, PolygonMesh};
 use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
@@ -13,6 +13,7 @@ use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
 use crate::operand::is_solid;
+use crate::plan::with_remedy;
 use crate::repair::repaired;
 use crate::shape_measures::{MappedThickness, enclosed, extent, no_solid, smallest_box, walls_and_gaps};
 use crate::solve::freedom;
@@ -58,26 +59,6 @@ pub struct Outcome {
     pub geometry: Geometry,
     /// What is proven of it. `input_digest` and `output_digests` are the caller's to fill in.
     pub certificate: Certificate,
-}
-
-/// What a job is predicted to cost.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-pub struct Plan {
-    /// Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that
-    /// the boundary of the result needs.
-    pub leaf_cells: f64,
-    /// Triangles of the result without simplification, which leaves a tenth to a hundredth of them. Of an operation on solids: those of its result.
-    pub triangles: f64,
-    /// Triangles against which the limit of triangles is held: those of the lattices as they are first made.
-    #[cfg_attr(feature = "wire", serde(default))]
-    pub counted_triangles: f64,
-    /// Peak memory of the process that does the job, in bytes. 0 where nothing is predicted.
-    pub memory_bytes: f64,
-    /// Bytes of a binary STL file with so many `triangles`.
-    pub output_bytes: f64,
-    /// Edge of the lattice's cubes.
-    pub lattice_pitch_mm: Option<f64>,
 }
 
 /// What `validate` says of a model whose document was legal.
@@ -228,7 +209,7 @@ pub(crate) fn radius(job: &Job) -> Result<Option<Radius>, JobError> {
 /// [`JobError`] with its kind: an invalid model, an unreachable tolerance, a limit, or a stop.
 pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let (job, repairs) = repaired(job, budget)?;
-    let mut outcome = made(&job, budget)?;
+    let mut outcome = made(&job, budget).map_err(|error| with_remedy(&job, error, budget))?;
     outcome.certificate.state_repairs(repairs);
     Ok(outcome)
 }
@@ -258,7 +239,7 @@ fn made(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
 }
 
 /// How a job splits its input.
-fn split_of(job: &Job) -> Result<Split, JobError> {
+pub(crate) fn split_of(job: &Job) -> Result<Split, JobError> {
     let missing =
         || JobError::new(Kind::Invalid, "bad-parameter", "split needs volume_mm, the size that parts must fit, or cuts_mm".into());
     job.params.split.clone().ok_or_else(missing)
@@ -397,121 +378,6 @@ pub fn stream_points<E>(
         sink(&piece).map_err(StreamError::Sink)
     })?;
     Ok(certificate::of_points(attractor, points, streamed, &bounds, tolerance))
-}
-
-/// Bytes of a binary STL file with so many triangles.
-pub(crate) fn stl_bytes(triangles: f64) -> f64 {
-    84.0 + 50.0 * triangles
-}
-
-/// What a process holds for each byte that a lattice is accounted for where its mesh is left as it is: found on the fixtures, as is the next.
-/// `fixtures/ESTIMATES.md` shows how well they do.
-const HELD_PER_BYTE: f64 = 2.0;
-/// Threads that simplify at a time, each with memory of its own. The machine of the process that does the job may have more.
-const THREADS: f64 = 2.0;
-/// What a process holds that does next to nothing, in bytes: the program, its threads and their stacks.
-const PROCESS_BYTES: f64 = 18e6;
-
-/// Peak memory of a dilation. Blocks that are simplified shrink before they are joined: then what is held is the lattice once, and what simplification takes.
-pub(crate) fn held_bytes(prediction: &Prediction, simplify: bool) -> f64 {
-    let surface =
-        if simplify { prediction.memory_bytes + THREADS * prediction.simplifying_bytes } else { HELD_PER_BYTE * prediction.memory_bytes };
-    surface.max(prediction.box_bytes)
-}
-
-/// Bytes that an evaluation holds for each leaf cell.
-const BYTES_PER_CELL: f64 = 64.0;
-
-/// Predicts the cost of the job.
-///
-/// # Errors
-/// As [`run`], for what shows before the work.
-pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
-    let (job, _) = repaired(job, budget)?;
-    let plan = planned(&job, budget)?;
-    let memory_bytes = if plan.memory_bytes > 0.0 { PROCESS_BYTES + plan.memory_bytes } else { 0.0 };
-    Ok(Plan { memory_bytes, ..plan })
-}
-
-fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
-    if let (JobKind::Solidify, Some(level)) = (job.kind, job.params.level) {
-        return level::plan(job, level, budget);
-    }
-    let tolerance = Tolerance::new(job.params.tolerance_mm)?;
-    match job.kind {
-        JobKind::Intersect if job.params.operation == Some(Operation::Split) => {
-            let how = split_of(job)?;
-            return boolean::plan(job, tolerance, budget, |tolerance, budget| split::split(job, &how, tolerance, budget));
-        }
-        JobKind::Intersect if job.params.operation.is_some() => {
-            let operation = job.params.operation.unwrap_or(Operation::Union);
-            return boolean::plan(job, tolerance, budget, |tolerance, budget| boolean::combine(job, operation, tolerance, budget));
-        }
-        JobKind::Slice => return slice::plan(job, tolerance, budget),
-        // Nothing is made, and what a search costs shows in the search.
-        JobKind::Intersect => return Ok(Plan::default()),
-        JobKind::Measure if job.inputs.len() > 1 => return Ok(Plan::default()),
-        JobKind::Convert => {
-            if let Some(mesh) = convert::polygons(job) {
-                return Ok(convert::plan(mesh));
-            }
-        }
-        JobKind::Evaluate | JobKind::Solidify | JobKind::Measure => {}
-    }
-    let radius = radius(job)?;
-    let lowered = lower(job, budget)?;
-    let leaf_cells = predict_cells(&lowered.attractor, tolerance, budget)?;
-    // A wall's other surface is made like the dilation of the first.
-    let radius = match (radius, job.params.wall) {
-        (None, Some(wall)) => Some(Radius::new(wall.thickness_mm)?),
-        (radius, _) => radius,
-    };
-    if job.kind == JobKind::Evaluate || radius.is_none() {
-        let counted = if matches!(job.kind, JobKind::Evaluate | JobKind::Convert) { leaf_cells } else { 0.0 };
-        // The box is searched before all else.
-        let box_bytes = if counted > 0.0 { bounding_box_memory(&lowered.attractor, budget)? as f64 } else { 0.0 };
-        let memory_bytes = (counted * BYTES_PER_CELL).max(box_bytes);
-        return Ok(Plan { leaf_cells, memory_bytes, ..Plan::default() });
-    }
-    let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
-    let simplify = job.kind == JobKind::Solidify && job.params.simplify;
-    let prediction = predict(&lowered.attractor, radius, tolerance, simplify, budget)?;
-    Ok(Plan {
-        leaf_cells,
-        triangles: prediction.triangles,
-        counted_triangles: prediction.counted_triangles,
-        memory_bytes: held_bytes(&prediction, simplify),
-        output_bytes: stl_bytes(prediction.triangles),
-        lattice_pitch_mm: Some(prediction.pitch_mm),
-    })
-}
-
-/// Leaf cells that a prediction visits at most.
-const COUNTED_CELLS: u64 = 400_000;
-
-/// Leaf cells at a tolerance: counted when few, else extrapolated by the growth between two coarser
-/// tolerances, N ~ tolerance^-dimension.
-fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<f64, JobError> {
-    let limits = Limits { cells: COUNTED_CELLS, ..budget.limits };
-    let counted = Budget { limits, progress: None, ..budget.clone() };
-    let mut coarse = tolerance.mm();
-    let mut known: Vec<(f64, f64)> = Vec::new();
-    for _ in 0..200 {
-        match count_cells(attractor, Tolerance::new(coarse)?, &counted) {
-            Ok(count) => known.push((coarse, count as f64)),
-            Err(RefineError::Cells { .. } | RefineError::Memory { .. } | RefineError::Depth { .. }) => {}
-            Err(stopped @ RefineError::Stopped(_)) => return Err(stopped.into()),
-        }
-        match known.as_slice() {
-            [(first, count), ..] if *first == tolerance.mm() => return Ok(*count),
-            [(fine, many), .., (rough, few)] if *rough >= 4.0 * fine => {
-                let dimension = (many / few).ln() / (rough / fine).ln();
-                return Ok(many * (fine / tolerance.mm()).powf(dimension.max(0.0)));
-            }
-            _ => coarse *= 2.0,
-        }
-    }
-    Ok(known.first().map_or(f64::INFINITY, |(_, count)| *count))
 }
 
 /// Says what is wrong with a model, and what its unknown operators leave open.

@@ -9,7 +9,8 @@ use lacuna_kernel::tolerance::Tolerance;
 use crate::certificate::{self, PlaneStatement, SectionsStatement};
 use crate::job::Planes;
 use crate::operand::{Source, solid_of};
-use crate::run::{JobError, Outcome, Plan, StreamError};
+use crate::plan::Plan;
+use crate::run::{JobError, Outcome, StreamError};
 use crate::{Geometry, Job};
 
 /// A solid and the planes that cut it. Sections are made when they are asked for: a stack of any height takes no memory.

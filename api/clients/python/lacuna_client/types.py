@@ -254,6 +254,8 @@ EnclosedStatement = TypedDict('EnclosedStatement', {'method': 'VolumeMethod', 'v
 
 ExactNumber = TypedDict('ExactNumber', {'exact': 'str', 'value': 'float'})
 
+Excess = TypedDict('Excess', {'allowed': 'float', 'asked': 'float', 'limit': 'str', 'remedy': 'dict[str, float]'})
+
 ExtentStatement = TypedDict('ExtentStatement', {
     'direction': 'list[float]',
     'from_mm': 'list[float]',
@@ -632,6 +634,7 @@ PlaceStatement = TypedDict('PlaceStatement', {
 
 Plan = TypedDict('Plan', {
     'counted_triangles': 'NotRequired[float]',
+    'exceeds': 'NotRequired[Excess | None]',
     'lattice_pitch_mm': 'NotRequired[float | None]',
     'leaf_cells': 'float',
     'memory_bytes': 'float',

@@ -172,7 +172,7 @@ impl Grading<'_> {
             self.budget.cancel.check()?;
         }
         if self.roots.len() as u64 >= limits.cells {
-            return Err(RefineError::Cells { allowed: limits.cells, tolerance_mm, reachable_mm: 2.0 * tolerance_mm });
+            return Err(RefineError::Cells { allowed: limits.cells, tolerance_mm });
         }
         if depth >= limits.depth {
             return Err(RefineError::Depth { allowed: limits.depth, tolerance_mm, reached_mm });

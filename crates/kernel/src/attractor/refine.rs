@@ -21,8 +21,6 @@ pub enum RefineError {
         allowed: u64,
         /// What was asked.
         tolerance_mm: f64,
-        /// A tolerance that would pass, as far as the cells refined so far tell.
-        reachable_mm: f64,
     },
     /// More memory than allowed.
     #[error("the tolerance of {tolerance_mm} mm needs more than {allowed_bytes} bytes for its {leaf_cells} cells and more")]
@@ -33,8 +31,6 @@ pub enum RefineError {
         tolerance_mm: f64,
         /// Leaf cells that filled it.
         leaf_cells: u64,
-        /// A tolerance that would pass, as far as the cells refined so far tell.
-        reachable_mm: f64,
     },
     /// An address longer than allowed.
     #[error("the tolerance of {tolerance_mm} mm needs addresses longer than {allowed}; cells of that depth reach {reached_mm} mm")]
@@ -69,23 +65,18 @@ impl RefineError {
         }
     }
 
-    /// The limit that was hit.
+    /// The limit that was hit; what would pass, where the work tells.
     #[must_use]
     pub fn limit(&self) -> Option<LimitFacts> {
         match self {
             Self::Stopped(_) => None,
-            Self::Cells { allowed, reachable_mm, .. } => Some(LimitFacts {
-                limit: "cells",
-                asked: *allowed as f64 + 1.0,
-                allowed: *allowed as f64,
-                remedy: Some(("tolerance_mm", *reachable_mm)),
-            }),
-            Self::Memory { allowed_bytes, reachable_mm, .. } => Some(LimitFacts {
-                limit: "memory_bytes",
-                asked: *allowed_bytes as f64 + 1.0,
-                allowed: *allowed_bytes as f64,
-                remedy: Some(("tolerance_mm", *reachable_mm)),
-            }),
+            Self::Cells { allowed, .. } => {
+                Some(LimitFacts { limit: "cells", asked: *allowed as f64 + 1.0, allowed: *allowed as f64, remedy: None })
+            }
+            Self::Memory { allowed_bytes, .. } => {
+                let allowed = *allowed_bytes as f64;
+                Some(LimitFacts { limit: "memory_bytes", asked: allowed + 1.0, allowed, remedy: None })
+            }
             Self::Depth { allowed, reached_mm, .. } => Some(LimitFacts {
                 limit: "depth",
                 asked: f64::from(*allowed) + 1.0,
@@ -290,7 +281,7 @@ impl Part {
             return Ok(());
         }
         let leaf_cells = (points.len() + segments.len() + triangles.len()) as u64;
-        Err(RefineError::Memory { allowed_bytes, tolerance_mm: tolerance.mm(), leaf_cells, reachable_mm: 2.0 * tolerance.mm() })
+        Err(RefineError::Memory { allowed_bytes, tolerance_mm: tolerance.mm(), leaf_cells })
     }
 
     fn append(&mut self, other: Part) {

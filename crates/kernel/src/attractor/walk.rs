@@ -130,7 +130,7 @@ fn chosen<C>(queue: &mut VecDeque<Piece<C>>, waiting: u64) -> Vec<Place> {
 fn check(whole: Extent, tolerance_mm: f64, budget: &Budget) -> Result<(), RefineError> {
     let allowed = budget.limits.cells;
     if whole.leaf_cells > allowed {
-        return Err(RefineError::Cells { allowed, tolerance_mm, reachable_mm: 2.0 * whole.deviation_mm.max(tolerance_mm) });
+        return Err(RefineError::Cells { allowed, tolerance_mm });
     }
     budget.report("refine", 0.0, whole.leaf_cells);
     Ok(())

@@ -1,6 +1,5 @@
 //! Why there is no solid.
 
-use super::plan::Setting;
 use crate::attractor::RefineError;
 use crate::budget::Stopped;
 use crate::error::{Kind, LimitFacts};
@@ -13,30 +12,14 @@ pub enum DilationError {
     #[error(transparent)]
     Stopped(#[from] Stopped),
     /// More triangles than allowed.
-    #[error(
-        "the tolerance of {tolerance_mm} mm needs about {asked:.0} triangles, and {allowed} are allowed; {reachable_mm:.4} mm would pass"
-    )]
+    #[error("the tolerance of {tolerance_mm} mm needs more than the {allowed} triangles that are allowed")]
     Triangles {
         /// What was asked.
         tolerance_mm: f64,
-        /// Triangles predicted or made so far.
-        asked: f64,
+        /// Triangles of the lattice when it was stopped.
+        made: u64,
         /// The limit.
         allowed: u64,
-        /// A tolerance that would pass.
-        reachable_mm: f64,
-    },
-    /// More memory than allowed.
-    #[error("the tolerance of {tolerance_mm} mm needs about {asked:.0} bytes, and {allowed} are allowed; {reachable_mm:.4} mm would pass")]
-    Memory {
-        /// What was asked.
-        tolerance_mm: f64,
-        /// Bytes predicted.
-        asked: f64,
-        /// The limit.
-        allowed: u64,
-        /// A tolerance that would pass.
-        reachable_mm: f64,
     },
     /// Single precision cannot carry the tolerance at these coordinates.
     #[error(
@@ -117,7 +100,7 @@ impl DilationError {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
             Self::Drawn { error, .. } => error.kind(),
-            Self::Triangles { .. } | Self::Memory { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
+            Self::Triangles { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } | Self::NoHollow { .. } => Kind::Unreachable,
             Self::Inside => Kind::Invalid,
             Self::Defect(_) => Kind::Defect,
@@ -131,7 +114,6 @@ impl DilationError {
             Self::Stopped(stopped) => stopped.code(),
             Self::Drawn { error, .. } => error.code(),
             Self::Triangles { .. } => "limit-triangles",
-            Self::Memory { .. } => "limit-memory",
             Self::Precision { .. } => "tolerance-unreachable",
             Self::Inside => "mesh.inside-undefined",
             Self::NoHollow { .. } => "wall.no-hollow",
@@ -141,10 +123,9 @@ impl DilationError {
         }
     }
 
-    /// The limit that was hit.
+    /// The limit that was hit; what would pass, where the work tells: [`predict`](super::predict()) tells what another tolerance needs.
     #[must_use]
     pub fn limit(&self) -> Option<LimitFacts> {
-        let facts = |limit, asked, allowed, reachable| LimitFacts { limit, asked, allowed, remedy: Some(("tolerance_mm", reachable)) };
         match *self {
             Self::Drawn { ref error, share } => error.limit().map(|facts| LimitFacts {
                 // What was asked of them is a share of the tolerance.
@@ -155,9 +136,15 @@ impl DilationError {
             Self::Cells { allowed } => {
                 Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
             }
-            Self::Triangles { asked, allowed, reachable_mm, .. } => Some(facts("triangles", asked, allowed as f64, reachable_mm)),
-            Self::Memory { asked, allowed, reachable_mm, .. } => Some(facts("memory_bytes", asked, allowed as f64, reachable_mm)),
-            Self::Precision { tolerance_mm, reachable_mm, .. } => Some(facts("tolerance_mm", tolerance_mm, reachable_mm, reachable_mm)),
+            Self::Triangles { made, allowed, .. } => {
+                Some(LimitFacts { limit: "triangles", asked: made as f64, allowed: allowed as f64, remedy: None })
+            }
+            Self::Precision { tolerance_mm, reachable_mm, .. } => Some(LimitFacts {
+                limit: "tolerance_mm",
+                asked: tolerance_mm,
+                allowed: reachable_mm,
+                remedy: Some(("tolerance_mm", reachable_mm)),
+            }),
             Self::NoHollow { thickness_mm, largest_mm } => {
                 let (asked, allowed) = (thickness_mm, largest_mm[0]);
                 Some(LimitFacts { limit: "wall_mm", asked, allowed, remedy: Some(("wall_mm", 0.9 * allowed)) })
@@ -166,11 +153,5 @@ impl DilationError {
                 Some(LimitFacts { limit: "depth", asked: f64::from(allowed) + 1.0, allowed: f64::from(allowed), remedy: None })
             }
         }
-    }
-
-    pub(super) fn triangles(setting: &Setting, asked: f64, allowed: u64) -> Self {
-        // As many triangles to an area of pitch^2, which grows like the tolerance.
-        let reachable_mm = setting.tolerance * 1.2 * asked / allowed as f64;
-        Self::Triangles { tolerance_mm: setting.tolerance, asked, allowed, reachable_mm }
     }
 }

@@ -258,7 +258,8 @@ fn frontier(attractor: &Attractor, roots: &[usize]) -> u32 {
 impl Attractor {
     /// Whether a root's cells are drawn as one complex: curves between two vertices, wires that branch, or a
     /// face that its edges surround, and so all its descendants.
-    pub(crate) fn has_brep(&self, root: usize) -> bool {
+    #[must_use]
+    pub fn has_brep(&self, root: usize) -> bool {
         self.brep.as_ref().is_some_and(|(_, start)| start.drawn[self.roots[root].state.index()])
     }
 }

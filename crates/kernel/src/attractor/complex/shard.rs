@@ -40,14 +40,14 @@ impl<'a> Context<'a> {
         let allowed = self.budget.limits.cells;
         if self.leaves.load(Ordering::Relaxed) > allowed {
             let tolerance_mm = self.tolerance_mm;
-            return Err(RefineError::Cells { allowed, tolerance_mm, reachable_mm: 2.0 * tolerance_mm });
+            return Err(RefineError::Cells { allowed, tolerance_mm });
         }
         let allowed_bytes = self.budget.limits.memory_bytes;
         if self.bytes.load(Ordering::Relaxed) <= allowed_bytes {
             return Ok(());
         }
         let (tolerance_mm, leaf_cells) = (self.tolerance_mm, self.leaves.load(Ordering::Relaxed));
-        Err(RefineError::Memory { allowed_bytes, tolerance_mm, leaf_cells, reachable_mm: 2.0 * tolerance_mm })
+        Err(RefineError::Memory { allowed_bytes, tolerance_mm, leaf_cells })
     }
 }
 

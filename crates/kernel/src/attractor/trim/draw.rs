@@ -79,8 +79,7 @@ fn one(attractor: &Attractor, surface: &TrimmedSurface, tolerance: f64, before: 
     let moved = surface.moved_mm() + attractor.seam_mm;
     let left = (tolerance - moved).max(0.0);
     let allowed = budget.limits.cells.saturating_sub(before);
-    let too_many =
-        || RefineError::Cells { allowed: budget.limits.cells, tolerance_mm: tolerance, reachable_mm: 2.0 * tolerance.max(moved) };
+    let too_many = || RefineError::Cells { allowed: budget.limits.cells, tolerance_mm: tolerance };
     if left == 0.0 {
         return Err(too_many());
     }
@@ -225,16 +224,15 @@ impl Drawer<'_> {
             self.budget.cancel.check()?;
             self.budget.report("refine", 0.0, self.visited);
         }
-        let reachable_mm = (2.0 * error).max(2.0 * self.tolerance_mm);
         let (allowed, tolerance_mm) = (self.budget.limits.cells, self.tolerance_mm);
         if self.visited > allowed {
-            return Err(RefineError::Cells { allowed, tolerance_mm, reachable_mm });
+            return Err(RefineError::Cells { allowed, tolerance_mm });
         }
         // Leaves with their corners on lines, and what is drawn of them.
         let bytes = 700 * self.leaves.len() as u64 + 400 * self.segments as u64;
         let allowed_bytes = self.budget.limits.memory_bytes;
         if bytes > allowed_bytes {
-            return Err(RefineError::Memory { allowed_bytes, tolerance_mm, leaf_cells: self.visited, reachable_mm });
+            return Err(RefineError::Memory { allowed_bytes, tolerance_mm, leaf_cells: self.visited });
         }
         let [low, high] = leaf.bounds;
         for end in [low, high] {
