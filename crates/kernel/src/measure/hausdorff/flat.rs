@@ -7,11 +7,11 @@
 //! the farthest corner has bounds d(., B) on the whole triangle, whatever its size. Only a triangle that needs
 //! several sites, as it lies across an edge of theirs or is nearest to several, is larger than its bound is good.
 //!
-//! Two triangulations of one face agree nowhere along their edges. There a triangle is cut by the plane that passes through
-//! an edge of the other's and is at right angles to it. Either part is on one side, so no edge cuts the same part twice, and
-//! what lies over one triangle is bounded by it without an error.
+//! Two triangulations of one face, or of two that are close, agree nowhere along their edges. So a triangle is laid over those of the other shape near it: planes at
+//! right angles to it through their edges cut it into convex polygons, each over one of them or over none. The planes of two triangles at one edge are the same, however
+//! they are bent, so that a polygon over one of them is bounded by it almost without an error. The bound holds whatever the cuts are, as the polygons fill the triangle.
 
-use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, cross, dot, subtract};
 use crate::measure::contact::corners;
 
 /// How far the farthest point of a site is from another site: at one of its corners, which is told.
@@ -33,42 +33,97 @@ pub(super) fn halves(site: &Site) -> Vec<Site> {
     }
 }
 
-/// Parts of a triangle on the two sides of an edge of another one, if it is within `thin` of that one's plane, and reaches
-/// beyond the edge by more than that on both sides. Edges that are short against the triangle are not cut along, as the parts would be slivers.
-pub(super) fn cut(triangle: &[Point; 3], along: &[Point; 3], thin: f64) -> Option<Vec<Site>> {
-    let [a, b, c] = along;
-    let normal = unit(&cross(&subtract(b, a), &subtract(c, a)))?;
-    if triangle.iter().any(|x| dot(&normal, &subtract(x, a)).abs() > thin) {
-        return None;
-    }
-    let length = |p: &Point, q: &Point| distance_squared(p, q).sqrt();
-    let size = (0..3).map(|k| length(&triangle[k], &triangle[(k + 1) % 3])).fold(0.0, f64::max);
-    (0..3).find_map(|k| {
-        let (from, to) = (&along[k], &along[(k + 1) % 3]);
-        let inward = unit(&cross(&normal, &subtract(to, from)))?;
-        let heights = triangle.map(|x| dot(&inward, &subtract(&x, from)));
-        let divides = heights.iter().any(|h| *h > thin) && heights.iter().any(|h| *h < -thin);
-        (divides && 2.0 * length(from, to) >= size).then(|| parts(triangle, &heights, thin))
-    })
+/// Cosine of the angle between triangles that do not lie along each other any more.
+const ALONG: f64 = 0.7;
+/// Polygons of a triangle, at most.
+const MOST_POLYGONS: usize = 256;
+
+/// A triangle of the other shape, and how far it stands from what it stands for, at most.
+pub(super) struct Below {
+    pub(super) corners: [Point; 3],
+    pub(super) error: f64,
 }
 
-/// The parts of a triangle where a linear function, given at its corners, is positive and where it is negative: values within
-/// `thin` of 0 count as 0, and there are larger ones of both signs.
-fn parts(triangle: &[Point; 3], heights: &[f64; 3], thin: f64) -> Vec<Site> {
-    let zero = |k: usize, l: usize| between(&triangle[k], &triangle[l], heights[k] / (heights[k] - heights[l]));
-    if let Some(on) = (0..3).find(|&k| heights[k].abs() <= thin) {
-        let (next, last) = ((on + 1) % 3, (on + 2) % 3);
-        let across = zero(next, last);
-        return [[triangle[on], triangle[next], across], [triangle[on], across, triangle[last]]].map(Site::Triangle).into();
+/// A triangle laid over others.
+#[derive(Default)]
+pub(super) struct Overlay {
+    /// How far the polygons are that are no farther than is good enough.
+    pub(super) settled: f64,
+    /// All others, and what lies over none, in triangles.
+    pub(super) rest: Vec<Site>,
+}
+
+/// Lays a triangle over others, of which the first that reach below a part are taken for it. Parts within `thin` of an edge may stay on either side of it.
+/// Nothing if that makes too many polygons, or the triangle has no area. Cost: the product of both numbers.
+pub(super) fn over(triangle: &[Point; 3], others: &[Below], thin: f64, good: f64) -> Option<Overlay> {
+    let normal = |[a, b, c]: &[Point; 3]| unit(&cross(&subtract(b, a), &subtract(c, a)));
+    let upright = normal(triangle)?;
+    let mut overlay = Overlay::default();
+    let (mut open, mut left) = (vec![triangle.to_vec()], Vec::new());
+    for Below { corners, error } in others {
+        let Some(cosine) = normal(corners).map(|other| dot(&upright, &other)).filter(|cosine| cosine.abs() >= ALONG) else { continue };
+        // The height of a point over an edge, inwards: the third corner's is positive.
+        let inward =
+            |k: usize| unit(&cross(&upright, &subtract(&corners[(k + 1) % 3], &corners[k]))).map(|n| n.map(|x| x * cosine.signum()));
+        let (Some(first), Some(second), Some(third)) = (inward(0), inward(1), inward(2)) else { continue };
+        let planes = [(corners[0], first), (corners[1], second), (corners[2], third)];
+        for polygon in open.drain(..) {
+            let is_beside = |(from, inward): &(Point, Point)| polygon.iter().all(|x| dot(inward, &subtract(x, from)) <= thin);
+            if planes.iter().any(is_beside) {
+                left.push(polygon);
+                continue;
+            }
+            let mut inside = polygon;
+            for (from, inward) in &planes {
+                if inside.iter().any(|x| dot(inward, &subtract(x, from)) < -thin) {
+                    let (within, beyond) = divided(&inside, from, inward, thin);
+                    left.push(beyond);
+                    inside = within;
+                }
+            }
+            let other = Site::Triangle(*corners);
+            let high = inside.iter().map(|x| other.distance_squared(x)).fold(0.0, f64::max).sqrt() + error;
+            if high <= good { overlay.settled = overlay.settled.max(high) } else { overlay.rest.extend(fan(&inside)) }
+        }
+        std::mem::swap(&mut open, &mut left);
+        if open.is_empty() {
+            break;
+        }
+        if open.len() + overlay.rest.len() > MOST_POLYGONS {
+            return None;
+        }
     }
-    // One corner is alone on its side.
-    let alone = (0..3).find(|&k| (0..3).filter(|&l| (heights[l] > 0.0) == (heights[k] > 0.0)).count() == 1).unwrap_or(0);
-    let (next, last) = ((alone + 1) % 3, (alone + 2) % 3);
-    let (u, v) = (zero(alone, next), zero(alone, last));
-    let (p, q) = (triangle[next], triangle[last]);
-    // The shorter diagonal of the quadrilateral u p q v.
-    let [second, third] = if distance_squared(&u, &q) < distance_squared(&p, &v) { [[u, p, q], [u, q, v]] } else { [[u, p, v], [p, q, v]] };
-    [[triangle[alone], u, v], second, third].map(Site::Triangle).into()
+    overlay.rest.extend(open.iter().flat_map(|polygon| fan(polygon)));
+    Some(overlay)
+}
+
+/// The parts of a convex polygon on both sides of a plane; corners within `thin` of it belong to both.
+fn divided(polygon: &[Point], from: &Point, inward: &Point, thin: f64) -> (Vec<Point>, Vec<Point>) {
+    let height = |x: &Point| Some(dot(inward, &subtract(x, from))).filter(|height| height.abs() > thin).unwrap_or(0.0);
+    let (mut within, mut beyond) = (Vec::with_capacity(polygon.len() + 1), Vec::with_capacity(polygon.len() + 1));
+    let mut last = polygon[polygon.len() - 1];
+    let mut last_height = height(&last);
+    for x in polygon {
+        let own = height(x);
+        if own * last_height < 0.0 {
+            let across = between(&last, x, last_height / (last_height - own));
+            within.push(across);
+            beyond.push(across);
+        }
+        if own >= 0.0 {
+            within.push(*x);
+        }
+        if own <= 0.0 {
+            beyond.push(*x);
+        }
+        (last, last_height) = (*x, own);
+    }
+    (within, beyond)
+}
+
+/// A convex polygon as triangles.
+fn fan(polygon: &[Point]) -> impl Iterator<Item = Site> {
+    polygon[1..].windows(2).map(|pair| Site::Triangle([polygon[0], pair[0], pair[1]]))
 }
 
 fn between(a: &Point, b: &Point, share: f64) -> Point {
@@ -90,9 +145,9 @@ mod tests {
         0.5 * dot(&normal, &normal).sqrt()
     }
 
-    /// Parts fill the triangle and keep to their sides of the edge.
+    /// Polygons fill the triangle, and each is over one of the others alone, or over none.
     #[test]
-    fn cuts_keep_the_area_and_part_at_the_edge() {
+    fn overlays_keep_the_area_and_part_at_the_edges() {
         let mut seed = 9_u64;
         let mut random = || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -100,25 +155,34 @@ mod tests {
         };
         let mut count = 0;
         for _ in 0..2000 {
-            let mut point = || -> Point {
+            let mut point = |lift: f64| -> Point {
                 let (x, y) = (random(), random());
-                [x, y, 0.25 * x - 0.5 * y]
+                [x, y, 0.25 * x - 0.5 * y + lift * random()]
             };
-            let (triangle, along) = ([point(), point(), point()], [point(), point(), point()]);
-            let Some(parts) = cut(&triangle, &along, 1e-9) else { continue };
-            count += 1;
-            let triangles: Vec<[Point; 3]> =
-                parts.iter().map(|part| if let Site::Triangle(corners) = part { *corners } else { panic!("{part:?}") }).collect();
-            assert!((triangles.iter().map(area).sum::<f64>() - area(&triangle)).abs() < 1e-12);
-            let normal = cross(&subtract(&along[1], &along[0]), &subtract(&along[2], &along[0]));
-            let parted = (0..3).any(|k| {
-                let inward = cross(&normal, &subtract(&along[(k + 1) % 3], &along[k]));
-                triangles.iter().all(|part| {
-                    let heights = part.map(|x| dot(&inward, &subtract(&x, &along[k])));
-                    heights.iter().all(|h| *h >= -1e-9) || heights.iter().all(|h| *h <= 1e-9)
-                })
-            });
-            assert!(parted, "{triangle:?} {along:?}");
+            let triangle = [point(0.0), point(0.0), point(0.0)];
+            let others: Vec<Below> = (0..3).map(|_| Below { corners: [point(0.1), point(0.1), point(0.1)], error: 0.0 }).collect();
+            // Nothing is good enough, so that all is told.
+            let Some(Overlay { rest, .. }) = over(&triangle, &others, 1e-9, -1.0) else { continue };
+            let parts: Vec<[Point; 3]> =
+                rest.iter().map(|part| if let Site::Triangle(corners) = part { *corners } else { panic!("{part:?}") }).collect();
+            count += usize::from(parts.len() > 3);
+            assert!((parts.iter().map(area).sum::<f64>() - area(&triangle)).abs() < 1e-9);
+            let upright = cross(&subtract(&triangle[1], &triangle[0]), &subtract(&triangle[2], &triangle[0]));
+            let other = &others[0].corners;
+            let normal = cross(&subtract(&other[1], &other[0]), &subtract(&other[2], &other[0]));
+            if dot(&upright, &normal).abs() < ALONG * (dot(&upright, &upright) * dot(&normal, &normal)).sqrt() {
+                continue;
+            }
+            // No part reaches from within the first to beyond one of its edges.
+            for part in &parts {
+                let heights: [[f64; 3]; 3] = std::array::from_fn(|k| {
+                    let inward = cross(&upright, &subtract(&other[(k + 1) % 3], &other[k])).map(|x| x * dot(&upright, &normal).signum());
+                    part.map(|x| dot(&inward, &subtract(&x, &other[k])))
+                });
+                let within = heights.iter().flatten().all(|height| *height >= -1e-6);
+                let beyond = heights.iter().any(|edge| edge.iter().all(|height| *height <= 1e-6));
+                assert!(within || beyond, "{triangle:?} {other:?} {part:?}");
+            }
         }
         assert!(count > 500, "{count}");
     }

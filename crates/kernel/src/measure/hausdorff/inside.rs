@@ -16,7 +16,9 @@ use super::{NodeId, Search, Which};
 use crate::attractor::cell::{Point, cross, dot, subtract};
 
 /// Triangles that may be nearest, at most.
-const MOST_FACES: usize = 64;
+const MOST_FACES: usize = 256;
+/// A common direction is looked for when so many are known, and whenever they have become twice as many: most cubes with many have none.
+const FIRST_FACES: usize = 8;
 /// A normal is known if the sides' product is this share of the product of their lengths: then it is right to 1e-9.
 const FLATTEST: f64 = 1e-6;
 /// Least u . n, far above what the normals are wrong by.
@@ -51,6 +53,9 @@ impl Search<'_> {
             }
             let Some(normal) = unit(&product) else { return false };
             normals.push(normal);
+            if normals.len() >= FIRST_FACES && normals.len().is_power_of_two() && !has_common_direction(&normals) {
+                return false;
+            }
         }
         has_common_direction(&normals)
     }

@@ -11,7 +11,7 @@
 //!
 //! That alone would split two shapes that share surface into pieces as small as the tolerance all over it. The least, over the sites near a piece, of what its
 //! farthest corner has bounds it as well, and better where one site is the nearest all along it (see `flat`). So pieces are small only near edges of the other's
-//! triangulation, and of two that lie in one plane not even there, as pieces are cut along the edges. Corners are looked at for the lower end, too: where one
+//! triangulation, and not even there where both lie along each other, as pieces are cut along the edges. Corners are looked at for the lower end, too: where one
 //! site is nearest, no other point is farther.
 //!
 //! Simplices that both have are at the distance 0, and so is the inside of a solid that both have: neither is searched (see `same`).
@@ -33,7 +33,7 @@ use crate::budget::Budget;
 use crate::order::ordered_by;
 use crate::solid::{Inside, TriMesh};
 use crate::tolerance::Tolerance;
-use flat::{cut, farthest, halves};
+use flat::{Below, Overlay, farthest, halves, over};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -67,9 +67,10 @@ impl Hausdorff {
     }
 }
 
-/// Nodes to look at, at most, and the memory that cells and pieces may take, in each direction.
+/// Nodes to look at, at most, so many more for each root or group of roots of both shapes, and the memory that cells and pieces may take, in each direction. Both are searched at the same time.
 const MOST_NODES: u64 = 20_000_000;
-const MOST_BYTES: u64 = 512 << 20;
+const MORE_PER_NODE: u64 = 500;
+const MOST_BYTES: u64 = 256 << 20;
 
 /// What a closed surface encloses.
 struct Filled<'a> {
@@ -84,8 +85,8 @@ fn holds(solids: &[Filled<'_>], point: &Point) -> bool {
 
 /// The Hausdorff distance of two shapes, both ways, as intervals no wider than the tolerance unless a limit is hit.
 ///
-/// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Triangles along one triangle of the
-/// other are not split, and those that are the other's own cost nothing; along several that bend, as many pieces as tolerances fit along their edges. Fractals and curved
+/// Cost: proportional to the pieces that may be the farthest, and the cells of the other shape near them. Triangles that the other
+/// shape has as well cost nothing; those along triangles of the other are laid over them once. Fractals and curved
 /// surfaces that are alike everywhere are the slowest: every cell as small as the tolerance is looked at.
 ///
 /// # Errors
@@ -93,8 +94,11 @@ fn holds(solids: &[Filled<'_>], point: &Point) -> bool {
 pub fn hausdorff(a: &Attractor, b: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Hausdorff, ContactError> {
     let surfaces = [a, b].map(Attractor::surfaces);
     let solids = surfaces.each_ref().map(|own| own.iter().map(|mesh| Filled { mesh, inside: Inside::new(mesh) }).collect::<Vec<_>>());
-    let (from_first, first_complete) = directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], tolerance, budget)?;
-    let (from_second, second_complete) = directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], tolerance, budget)?;
+    let (forwards, backwards) = rayon::join(
+        || directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], tolerance, budget),
+        || directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], tolerance, budget),
+    );
+    let ((from_first, first_complete), (from_second, second_complete)) = (forwards?, backwards?);
     Ok(Hausdorff { from_first, from_second, complete: first_complete && second_complete })
 }
 
@@ -131,6 +135,8 @@ struct Search<'a> {
     /// Solids of the first and of the second.
     solids: [&'a [Filled<'a>]; 2],
     budget: &'a Budget,
+    /// Nodes that may be looked at.
+    most: u64,
     slack: f64,
     /// How narrow distances from the second shape need not be: a small share of the tolerance.
     accuracy_mm: f64,
@@ -153,6 +159,9 @@ struct Search<'a> {
 /// Sites that are tried for a piece, at most.
 const MOST_SINGLE: usize = 16;
 
+/// Triangles that a piece is laid over, at most.
+const MOST_BELOW: usize = 96;
+
 fn directed<'a>(
     [mut first, second]: [Tree<'a>; 2],
     solids: [&'a [Filled<'a>]; 2],
@@ -162,6 +171,7 @@ fn directed<'a>(
     let same_solids = same::shared_solids(solids[0], solids[1]);
     let mut search = Search {
         shared: same::shared(&mut first, &second),
+        most: MOST_NODES + MORE_PER_NODE * (first.count() + second.count()) as u64,
         slack: first.slack + second.slack,
         place: first.node(0).body.ball,
         first,
@@ -219,25 +229,28 @@ impl<'a> Search<'a> {
     fn is_exhausted(&self) -> bool {
         let limits = &self.budget.limits;
         let bytes = self.first.bytes + self.second.bytes + self.bytes;
-        self.looked > limits.cells.min(MOST_NODES) || bytes > limits.memory_bytes.min(MOST_BYTES)
+        self.looked > limits.cells.min(self.most) || bytes > (limits.memory_bytes / 2).min(MOST_BYTES)
     }
 
-    /// Puts the parts of a piece into the queue: whether it has any. One as small as what is rounded has none.
+    /// Puts the parts of a piece into the queue that may be too far: whether it can be parted. One as small as what is rounded cannot.
     fn split(&mut self, piece: &Piece) -> bool {
         if self.around(piece.part).1 <= self.slack {
             return false;
         }
         let parts: Vec<Part> = match piece.part {
             Part::Node(id) if self.first.is_splittable(id) => self.first.children(id).map(Part::Node).collect(),
-            Part::Node(id) if self.first.subdivides(id) => Vec::new(),
+            Part::Node(id) if self.first.subdivides(id) => return false,
             Part::Node(_) | Part::Site(_) => {
                 let (sites, _) = self.sites(piece.part);
-                sites.iter().flat_map(|site| self.smaller(site, &piece.near)).map(Part::Site).collect()
+                if sites.iter().all(|site| matches!(site, Site::Point(_))) {
+                    return false;
+                }
+                sites.iter().flat_map(|site| self.smaller(site, piece.high, &piece.near)).map(Part::Site).collect()
             }
             Part::Cube(centre, half) => eighths(&centre, half).map(|centre| Part::Cube(centre, 0.5 * half)).into(),
         };
         parts.iter().for_each(|&part| self.look(part, &piece.near, &piece.own, piece.high));
-        !parts.is_empty()
+        true
     }
 
     /// Encloses the supremum over a part, at most `most`, and puts it into the queue if it may be the largest.
@@ -357,21 +370,56 @@ impl<'a> Search<'a> {
             for along in &body.sites {
                 let (far, corner) = farthest(site, along);
                 if best.as_ref().is_none_or(|best| far + body.error < best.high) {
-                    best = Some(Single { high: far + body.error, corner, along: *along });
+                    best = Some(Single { high: far + body.error, corner });
                 }
             }
         }
         best
     }
 
-    /// Parts of a site: on the two sides of an edge of the triangle that it lies along, or halves.
-    fn smaller(&mut self, site: &Site, near: &[NodeId]) -> Vec<Site> {
+    /// Parts of a site that may be farther than is good enough: of a triangle laid over those of the second shape, or halves.
+    fn smaller(&mut self, site: &Site, high: f64, near: &[NodeId]) -> Vec<Site> {
+        let good = self.low + self.enough_mm - self.slack;
         let thin = self.accuracy_mm.max(4.0 * self.slack);
-        let cut = |single: Single| match (site, &single.along) {
-            (Site::Triangle(triangle), Site::Triangle(along)) => cut(triangle, along, thin),
-            _ => None,
-        };
-        self.single(site, near).and_then(cut).unwrap_or_else(|| halves(site))
+        let Site::Triangle(triangle) = site else { return halves(site) };
+        match self.below(site, high, near).and_then(|others| over(triangle, &others, thin, good)) {
+            // Still whole: it is not over its nearest alone.
+            Some(Overlay { rest, .. }) if rest == [*site] => halves(site),
+            Some(Overlay { settled, rest }) => {
+                self.settled = self.settled.max(settled + self.slack);
+                rest
+            }
+            None => halves(site),
+        }
+    }
+
+    /// The triangles of the second shape near a site no point of which is farther than `high`, the nearest to its middle first; nothing if they are many.
+    fn below(&mut self, site: &Site, high: f64, near: &[NodeId]) -> Option<Vec<Below>> {
+        let (middle, radius, _) = self.around(Part::Site(*site));
+        let reach = high + radius + 2.0 * self.slack;
+        let mut waiting = near.to_vec();
+        let mut found = Vec::new();
+        while let Some(id) = waiting.pop() {
+            let low = self.apart(Which::Second, &middle, id).low;
+            if low > reach {
+                continue;
+            }
+            if self.second.node(id).is_group() {
+                waiting.extend(self.second.children(id));
+                continue;
+            }
+            let body = &self.second.node(id).body;
+            for site in &body.sites {
+                if let Site::Triangle(corners) = site {
+                    found.push((low, id, Below { corners: *corners, error: body.error }));
+                }
+            }
+            if found.len() > MOST_BELOW {
+                return None;
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Some(found.into_iter().map(|(.., below)| below).collect())
     }
 
     /// A point c, how far points of the part are from it at most, and how far the nearest is at most.
@@ -455,7 +503,6 @@ struct Single {
     /// How far the farthest corner is from it, and from the second shape at most.
     high: f64,
     corner: Point,
-    along: Site,
 }
 
 /// Which of two shapes.
