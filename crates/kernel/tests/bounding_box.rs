@@ -190,6 +190,15 @@ fn splines_and_products_reach_as_far_as_a_simple_search_finds() {
         let inner = count - degree;
         (0..=count + degree).map(|k| (k.clamp(degree, count) - degree) as f64 / inner as f64).collect()
     };
+    // Koch's curve with another angle: signed operators, and a box that is flat in space.
+    let koch = |degrees: f64| {
+        let angle = f64::to_radians(degrees);
+        let ratio = 0.5 / (1.0 + angle.cos());
+        let map =
+            |angle: f64, x: f64, y: f64| AffineMap { linear: DMat3::from_rotation_z(angle) * ratio, translation: DVec3::new(x, y, 0.0) };
+        let top = [ratio * (1.0 + angle.cos()), ratio * angle.sin()];
+        vec![map(0.0, 0.0, 0.0), map(angle, ratio, 0.0), map(-angle, top[0], top[1]), map(0.0, 1.0 - ratio, 0.0)]
+    };
     let schemes: Vec<(CurveScheme, usize)> = vec![
         (CurveScheme::Nurbs { degree: 2, knots: clamped(2, 5) }, 5),
         (CurveScheme::Nurbs { degree: 3, knots: clamped(3, 6) }, 6),
@@ -198,10 +207,12 @@ fn splines_and_products_reach_as_far_as_a_simple_search_finds() {
         (CurveScheme::CatmullRom { parametrization: Parametrization::Uniform, closed: true }, 5),
         (CurveScheme::CornerCutting { a: 0.3, b: 0.2, closed: false }, 5),
         (CurveScheme::Interpolation { vertical_scaling: vec![0.5, 0.3] }, 3),
+        (CurveScheme::Ifs { maps: koch(60.0) }, 4),
+        (CurveScheme::Ifs { maps: koch(37.0) }, 4),
     ];
-    for round in 0..24 {
-        // The last one is the graph of a function as a curve alone: it asks for increasing x.
-        let (u, rows) = schemes[random.below(schemes.len() - usize::from(round % 2 == 0))].clone();
+    for round in 0..48 {
+        // The last ones are no curves alone, or the graphs of functions, which ask for increasing x.
+        let (u, rows) = schemes[random.below(schemes.len() - if round % 2 == 0 { 3 } else { 0 })].clone();
         let shape = if round % 2 == 0 {
             let weights = matches!(u, CurveScheme::Nurbs { .. }).then(|| (0..rows).map(|_| random.between(0.3, 3.0)).collect());
             let points = random.points(rows);

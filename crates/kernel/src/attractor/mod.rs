@@ -10,9 +10,11 @@ mod connected;
 mod cover;
 mod defect;
 mod early;
+mod hull;
 mod invariant;
 mod near;
 mod needle;
+mod polytope;
 mod precision;
 mod radii;
 mod refine;
@@ -34,6 +36,8 @@ pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
 use glam::DVec3;
+use hull::Hulls;
+pub(crate) use hull::StateHull;
 pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
 pub use precision::LinearPrecision;
 pub use radii::OwnRadius;
@@ -85,6 +89,9 @@ pub struct Attractor {
     covers: OnceLock<Vec<Option<PointCover>>>,
     /// Of every state, when first asked for.
     attained: Vec<OnceLock<Vec<AttainedPoint>>>,
+    hulls: Hulls,
+    /// Of every state, when first asked for.
+    state_hulls: Vec<OnceLock<Option<StateHull>>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
     precisions: Vec<Option<LinearPrecision>>,
@@ -225,7 +232,8 @@ impl Attractor {
         }
         defect::measure_drawings(&mut automaton, &bounds);
         let connected = connected::connected(&automaton, &bounds, &contraction);
-        let precisions = precision::precisions(&automaton, &bounds);
+        let hulls = Hulls::new(&automaton, &contraction);
+        let precisions = precision::precisions(&automaton, &bounds, &hulls);
         let count = automaton.states().len();
         let attractor = Self {
             automaton,
@@ -234,6 +242,8 @@ impl Attractor {
             bounds,
             covers: OnceLock::new(),
             attained: vec![OnceLock::new(); count],
+            hulls,
+            state_hulls: vec![OnceLock::new(); count],
             connected,
             precisions,
             contraction,
@@ -412,6 +422,13 @@ impl Attractor {
     /// Some points of a state's attractor.
     pub(crate) fn attained(&self, state: StateId) -> &[AttainedPoint] {
         self.attained[state.index()].get_or_init(|| attained::attained(&self.automaton, &self.contraction, state))
+    }
+
+    /// Points in whose hull a state's attractor lies, other than its control points; those of children have them too.
+    pub(crate) fn hull(&self, state: StateId) -> Option<&StateHull> {
+        // Weights have to be positive at the points, too.
+        let fits = |hull: &StateHull| !hull.is_signed || self.roots.iter().all(|root| !root.rational);
+        self.state_hulls[state.index()].get_or_init(|| self.hulls.of(&self.automaton, state).filter(fits)).as_ref()
     }
 
     /// Parameters of a state's points, where its curves or faces are proven to have linear precision.

@@ -24,7 +24,8 @@
 
 use super::StateBound;
 use super::cell::MOST_MEASURED;
-use crate::automaton::{Automaton, Hull, LeafPrimitive, Smooth, StateId, SubdivisionOperator};
+use super::hull::Hulls;
+use crate::automaton::{Automaton, LeafPrimitive, Smooth, StateId, SubdivisionOperator};
 
 /// Parameters of a state's points.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,11 +83,6 @@ pub(super) const MISS: f64 = 1e-10;
 pub(super) const SAME: f64 = 1e-12;
 /// Ratios of parameter maps at most.
 const MOST_RATIO: f64 = 0.99;
-/// Entries by which hulls may miss their children's: operators are rounded to fractions.
-const HULL: f64 = 1e-13;
-/// Every step of a path misses by the entries of a column, and what is missed contracts: ten entries of every point of
-/// the state, and paths of which the first ten steps count.
-const HULL_CHARGE: f64 = 1e3;
 /// Children of a face whose overlaps are examined.
 const MOST_CHILDREN: usize = 64;
 
@@ -94,10 +90,10 @@ const MOST_CHILDREN: usize = 64;
 type Solution = Vec<Vec<f64>>;
 
 /// The precision of every state that has it: curves with proven ends, and faces with corners.
-pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
+pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound], hulls: &Hulls) -> Vec<Option<LinearPrecision>> {
     let states = automaton.states();
     let found = super::invariant::precisions(automaton, bounds);
-    let mut result: Vec<_> = claimed(automaton, bounds).into_iter().zip(found).map(|(claimed, found)| claimed.or(found)).collect();
+    let mut result: Vec<_> = claimed(automaton, bounds, hulls).into_iter().zip(found).map(|(claimed, found)| claimed.or(found)).collect();
     for component in components(automaton) {
         // What holds for all descendants of a state holds for none that has others.
         if component.iter().any(|&index| result[index].is_some()) {
@@ -172,33 +168,29 @@ fn product(leaf: &LeafPrimitive, factors: [&Option<LinearPrecision>; 2], margin:
 struct Checked {
     miss: f64,
     ratio: f64,
-    /// How far hulls miss their children's; `None` if they do.
-    hull: Option<f64>,
 }
 
 /// The precision of curves whose model claims parameters, where the claims hold for them and all their descendants. The
 /// ratios of their parameter maps may differ: nothing but their being below 1 matters.
-fn claimed(automaton: &Automaton, bounds: &[StateBound]) -> Vec<Option<LinearPrecision>> {
+fn claimed(automaton: &Automaton, bounds: &[StateBound], hulls: &Hulls) -> Vec<Option<LinearPrecision>> {
     let (states, claims) = (automaton.states(), automaton.claimed_smooth());
     let mut checked: Vec<Option<Checked>> = (0..states.len()).map(|index| check(automaton, index)).collect();
     let holds = automaton.hereditary(checked.iter().map(Option::is_some).collect());
     checked.iter_mut().zip(&holds).for_each(|(own, &holds)| *own = own.take().filter(|_| holds));
-    let hulls = automaton.hereditary(checked.iter().map(|own| own.as_ref().is_some_and(|own| own.hull.is_some())).collect());
-    let off = checked.iter().flatten().filter_map(|own| own.hull).fold(f64::EPSILON, f64::max);
     let known = || checked.iter().flatten();
     let (miss, ratio) = (known().map(|own| own.miss).fold(0.0, f64::max), known().map(|own| own.ratio).fold(0.0, f64::max));
     let margin = (0..states.len()).filter(|&index| checked[index].is_some()).map(|index| bounds[index].margin()).fold(0.0, f64::max);
     let precision = |index: usize| {
         checked[index].as_ref()?;
-        let Smooth { parameters, hull } = claims.get(&StateId::new(index))?;
+        let Smooth { parameters, .. } = claims.get(&StateId::new(index))?;
         let raw: Vec<[f64; 2]> = parameters.iter().map(|&u| [u, 0.0]).collect();
         let domain: Vec<[f64; 2]> = corners(&states[index].leaf)?.iter().map(|corner| evaluate(&raw, corner)).collect();
         let residual = (1.0 + 2.0 * margin) * (miss + 1e-15) / (1.0 - ratio);
         let mut precision = scaled(&raw, &domain, residual, bounds[index].margin())?;
         precision.residual += 4.0 * SAME / (1.0 - ratio);
-        if let Some(hull) = hull.as_ref().filter(|_| hulls[index]) {
+        if let Some(hull) = hulls.claimed(automaton, StateId::new(index)) {
             precision.measure_at(&hull.points)?;
-            precision.residual += HULL_CHARGE * off * precision.parameters.iter().fold(1.0_f64, |a, u| a.max(u[0].abs()));
+            precision.residual += hulls.miss() * precision.parameters.iter().fold(1.0_f64, |a, u| a.max(u[0].abs()));
         }
         Some(precision)
     };
@@ -216,9 +208,9 @@ fn check(automaton: &Automaton, index: usize) -> Option<Checked> {
     let (own, ends) = claim(StateId::new(index))?;
     let parameter = |point: &[f64]| at(&own.parameters, point);
     let [low, high] = [parameter(&ends.start), parameter(&ends.end)];
-    let mut checked = Checked { miss: 0.0, ratio: 0.0, hull: own.hull.as_ref().map(|_| 0.0) };
+    let mut checked = Checked { miss: 0.0, ratio: 0.0 };
     let transitions = &automaton.state(StateId::new(index)).transitions;
-    for (position, transition) in transitions.iter().enumerate() {
+    for transition in transitions {
         let (child, ends) = claim(transition.to)?;
         let [start, end] = [&ends.start, &ends.end].map(|end| (at(&child.parameters, end), parameter(&transition.operator.apply(end))));
         let ratio = (end.1 - start.1) / (end.0 - start.0);
@@ -230,23 +222,9 @@ fn check(automaton: &Automaton, index: usize) -> Option<Checked> {
         if !(inside(start.1) && inside(end.1)) {
             return None;
         }
-        let off = hull_off(own.hull.as_ref(), position, child.hull.as_ref(), &transition.operator);
-        checked.hull = checked.hull.zip(off).map(|(a, b)| a.max(b)).filter(|&off| off <= HULL);
     }
     // Written so that what is not a number fails.
     (!transitions.is_empty() && checked.miss <= MISS && checked.ratio <= MOST_RATIO && high != low).then_some(checked)
-}
-
-/// The largest entry of T H' - H K; `None` where K or H has negative entries.
-fn hull_off(own: Option<&Hull>, position: usize, child: Option<&Hull>, operator: &SubdivisionOperator) -> Option<f64> {
-    let (own, child) = (own?, child?);
-    let inner = own.children.get(position)?;
-    let fits = inner.rows() == own.points.columns() && inner.columns() == child.points.columns();
-    if !fits || !inner.is_nonnegative() || !own.points.is_nonnegative() {
-        return None;
-    }
-    let (left, right) = (operator.times(&child.points), own.points.times(inner));
-    Some(left.entries().iter().zip(right.entries()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
 }
 
 /// States joined by transitions.

@@ -1,5 +1,6 @@
 //! Matrices between barycentric spaces.
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// A matrix T whose columns are points of the parent's barycentric space: column j holds the
@@ -262,26 +263,36 @@ fn kronecker(factors: &[SubdivisionOperator]) -> Vec<f64> {
 
 /// (T_u x T_v) x, direction after direction; or `back`, x^T (T_u x T_v).
 fn through_factors(factors: &[SubdivisionOperator], values: &[f64], back: bool) -> Vec<f64> {
-    let mut current = values.to_vec();
+    let mut current = Cow::Borrowed(values);
     let (mut outer, mut inner) = (1, values.len());
     for factor in factors {
         let (from, to) = if back { (factor.rows, factor.columns) } else { (factor.columns, factor.rows) };
         inner /= from;
-        let mut image = vec![0.0; outer * to * inner];
-        for block in 0..outer {
-            for column in 0..factor.columns {
-                for (row, &entry) in factor.column(column).iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
-                    let (source, target) = if back { (row, column) } else { (column, row) };
-                    let source = &current[(block * from + source) * inner..][..inner];
-                    let target = &mut image[(block * to + target) * inner..][..inner];
-                    target.iter_mut().zip(source).for_each(|(sum, &x)| *sum += entry * x);
+        let image = if back && inner == 1 {
+            // The last direction: values to be combined stand side by side, as entries of a column do.
+            let mut image = Vec::with_capacity(outer * to);
+            for source in current.chunks_exact(from) {
+                image.extend(factor.entries().chunks_exact(from).map(|column| product_sum(column, source)));
+            }
+            image
+        } else {
+            let mut image = vec![0.0; outer * to * inner];
+            for block in 0..outer {
+                for column in 0..factor.columns {
+                    for (row, &entry) in factor.column(column).iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
+                        let (source, target) = if back { (row, column) } else { (column, row) };
+                        let source = &current[(block * from + source) * inner..][..inner];
+                        let target = &mut image[(block * to + target) * inner..][..inner];
+                        target.iter_mut().zip(source).for_each(|(sum, &x)| *sum += entry * x);
+                    }
                 }
             }
-        }
+            image
+        };
         outer *= to;
-        current = image;
+        current = Cow::Owned(image);
     }
-    current
+    current.into_owned()
 }
 
 /// The sum of products, in four sums side by side: one alone would wait for every addition.

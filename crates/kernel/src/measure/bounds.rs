@@ -3,6 +3,7 @@
 use super::support::{Extent, Search};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point};
+use crate::attractor::trim::Rim;
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
 use glam::DVec3;
@@ -82,12 +83,12 @@ pub(crate) fn dilated_box(attractor: &Attractor, budget: &Budget) -> Result<Axis
 }
 
 fn box_of_roots(attractor: &Attractor, dilated: bool, budget: &Budget) -> Result<(AxisBox, u64), Stopped> {
-    let extent = Extent::of(attractor);
+    let (extent, rim) = (Extent::of(attractor), Rim::of(attractor));
     let (mut low, mut high, mut most) = ([Interval { low: 0.0, high: 0.0 }; 3], [Interval { low: 0.0, high: 0.0 }; 3], 0);
     for axis in 0..3 {
         for (end, sign) in [(&mut low[axis], -1.0), (&mut high[axis], 1.0)] {
             let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-            let (support, bytes) = Search::new(attractor, &extent, &direction).with_roots(dilated, budget)?.run(budget)?;
+            let (support, bytes) = Search::new(attractor, &extent, &rim, &direction).with_roots(dilated, budget)?.run(budget)?;
             *end = Interval::new(sign * support.low, sign * support.high);
             most = most.max(bytes);
         }
@@ -100,8 +101,8 @@ fn box_of_roots(attractor: &Attractor, dilated: bool, budget: &Budget) -> Result
 /// # Errors
 /// [`Stopped`] when the budget's token was fired.
 pub fn extent_along(attractor: &Attractor, direction: DVec3, budget: &Budget) -> Result<[Interval; 2], Stopped> {
-    let extent = Extent::of(attractor);
-    let support = |direction: DVec3| Search::new(attractor, &extent, &direction.to_array()).with_roots(false, budget)?.run(budget);
+    let (extent, rim) = (Extent::of(attractor), Rim::of(attractor));
+    let support = |direction: DVec3| Search::new(attractor, &extent, &rim, &direction.to_array()).with_roots(false, budget)?.run(budget);
     let (least, largest) = (support(-direction)?.0, support(direction)?.0);
     Ok([Interval::new(-least.high, -least.low), largest])
 }
@@ -114,5 +115,5 @@ pub(super) fn support_of_cell(
     direction: &Point,
     budget: &Budget,
 ) -> Result<Interval, Stopped> {
-    Ok(Search::new(attractor, &Extent::of_cell(&cell), direction).with_cell(&cell, points).run(budget)?.0)
+    Ok(Search::new(attractor, &Extent::of_cell(&cell), &Rim::default(), direction).with_cell(&cell, points).run(budget)?.0)
 }

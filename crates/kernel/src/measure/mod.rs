@@ -4,6 +4,7 @@ pub mod bounds;
 pub mod contact;
 pub mod dimension;
 pub mod enclosed;
+mod functional;
 pub mod hausdorff;
 pub mod mass;
 pub mod oriented_box;

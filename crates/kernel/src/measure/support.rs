@@ -15,11 +15,21 @@
 //! h(d) + e, so the first may go if the second takes over its slack: every kept cell i carries s_i, and always h <= max(reached, max_i (h(c_i) + s_i)).
 //! A cell only goes for another that stays, so no argument is circular. Extremes along a line, a face or a Cantor set then cost as much as one point; so
 //! do smooth ones under schemes with negative weights, whose bounds shrink with the first power of the size only.
+//!
+//! *Hulls.* Where a state has points in whose hull its attractor lies (`attractor::hull`), functionals are kept by their values at these, and pulled back
+//! to those of children. Splines are searched as Bezier patches: their corners are attained, and sides that are level stay so.
+//!
+//! *Loops.* Let f = x . u be a function of the parameters of a trimmed surface, and x where it is largest in the closed region that is kept. If x is on a
+//! loop, one of the curves that the loops are in space attains f(x): these are searched too, each as a Bezier curve. Otherwise x is in the region's inside.
+//! If f rises towards a side on a whole cell, x is on that side, as f would rise on within the surface's span; and not even there unless the side is on
+//! the span's border: otherwise, f being smooth, it rises beyond. At the border of the domain x would be on a loop. So cells that loops cross are let go
+//! when f rises towards any side that is not on another span's border. Near a loop all are, but for those where f is level; there bounds are good.
 
+use super::functional::Functional;
 use crate::attractor::cell::{Cell, ControlPoint, Point, dot};
-use crate::attractor::trim::{TrimmedSurface, Window};
-use crate::attractor::{AttainedPoint, Attractor, OwnRadius, StateBound};
-use crate::automaton::{LeafPrimitive, StateId, SubdivisionOperator};
+use crate::attractor::trim::{Rim, TrimmedSurface, Window};
+use crate::attractor::{Attractor, OwnRadius, StateBound};
+use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
 
@@ -77,121 +87,14 @@ impl Extent {
     }
 }
 
-/// x -> (values . x) / (weights . x) on a barycentric space; without weights, values . x.
-#[derive(Clone)]
-struct Functional {
-    values: Vec<f64>,
-    weights: Option<Vec<f64>>,
-}
+/// The bound of functionals that are kept by their values at points in whose hull an attractor lies.
+static IN_HULL: StateBound = StateBound::Hull { centre: Vec::new(), margin: 0.0 };
 
-impl Functional {
-    /// x . direction + offset, as seen from a cell with these control points.
-    fn of(points: &[ControlPoint], rational: bool, direction: &Point, offset: f64) -> Self {
-        let value = |point: &ControlPoint| {
-            let weight = if rational { point[3] } else { 1.0 };
-            dot(direction, &[point[0], point[1], point[2]]) + offset * weight
-        };
-        Self { values: points.iter().map(value).collect(), weights: rational.then(|| points.iter().map(|point| point[3]).collect()) }
-    }
-
-    /// As seen from the child with this operator.
-    fn pulled_back(&self, operator: &SubdivisionOperator) -> Self {
-        Self { values: operator.pull_back(&self.values), weights: self.weights.as_ref().map(|weights| operator.pull_back(weights)) }
-    }
-
-    fn at(&self, point: &[f64]) -> f64 {
-        let sum = |factors: &[f64]| factors.iter().zip(point).map(|(factor, x)| factor * x).sum::<f64>();
-        self.weights.as_ref().map_or(sum(&self.values), |weights| sum(&self.values) / sum(weights))
-    }
-
-    /// What it is at least at a point of the attractor that is so near: let y be that point and v the value at x. Then that at y is
-    /// v + (values - v weights) . (y - x) / (weights . y), and y - x sums to 0.
-    fn near(&self, near: &AttainedPoint) -> f64 {
-        let value = self.at(&near.point);
-        let ([least, most], weight) = match &self.weights {
-            None => (extremes(self.values.iter().copied()), 1.0),
-            Some(weights) => {
-                let differences = self.values.iter().zip(weights).map(|(own, weight)| own - value * weight);
-                (extremes(differences), extremes(weights.iter().copied())[0])
-            }
-        };
-        value - 0.5 * near.off * (most - least) / weight
-    }
-
-    /// Whether this one's supremum h on a state's attractor is at most max(reached, that of `other` + slack): the slack, if it is within what is allowed.
-    fn slack_under(
-        &self,
-        other: &Self,
-        bound: &StateBound,
-        reached: f64,
-        ceiling: f64,
-        allowed: f64,
-        difference: &mut Vec<f64>,
-    ) -> Option<f64> {
-        difference.clear();
-        match (&self.weights, &other.weights) {
-            (None, None) => {
-                difference.extend(other.values.iter().zip(&self.values).map(|(other, own)| other - own));
-                let lower = range(bound, difference)[0];
-                (lower >= -allowed).then_some((-lower).max(0.0))
-            }
-            // With t = max(reached, h(other) + e) for e = `allowed`, suppose h > t, which is between `reached` and `ceiling`: somewhere
-            // (values - t weights) . x > 0. If this is at most a positive multiple of the other's (values - (t - e) weights) . x, then h(other) > t - e,
-            // which it is not. Both are linear in t, so that the ends of t tell; barycentric coordinates are not negative here, so that each tells.
-            (Some(own_weights), Some(other_weights)) if reached.is_finite() => {
-                let scale = own_weights.iter().sum::<f64>() / other_weights.iter().sum::<f64>();
-                let holds = |t: f64| {
-                    let mut all = self.values.iter().zip(own_weights).zip(other.values.iter().zip(other_weights));
-                    all.all(|((value, weight), (other, other_weight))| value - t * weight <= scale * (other - (t - allowed) * other_weight))
-                };
-                (holds(reached) && holds(ceiling)).then_some(allowed)
-            }
-            _ => None,
-        }
-    }
-
-    /// Bounds of its values on a state's attractor.
-    fn range(&self, bound: &StateBound) -> [f64; 2] {
-        match &self.weights {
-            None => range(bound, &self.values),
-            // Operators without negative entries, and positive weights: a mean of the control points' quotients.
-            Some(weights) => extremes(self.values.iter().zip(weights).map(|(value, weight)| value / weight)),
-        }
-    }
-}
-
-fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(value), most.max(value)])
-}
-
-/// Bounds of values . x over the attractor of a state with that bound.
-fn range(bound: &StateBound, values: &[f64]) -> [f64; 2] {
-    match bound {
-        StateBound::Hull { margin, .. } => {
-            let [least, most] = extremes(values.iter().copied());
-            let beyond = if *margin > 0.0 { margin * (most - least) } else { 0.0 };
-            [least - beyond, most + beyond]
-        }
-        StateBound::Frame { low, high, centre, reach, .. } => {
-            let slopes: Point = std::array::from_fn(|j| values[j + 1] - values[0]);
-            let (mut least, mut most) = (values[0], values[0]);
-            for j in 0..3 {
-                let (a, b) = (slopes[j] * low[j], slopes[j] * high[j]);
-                least += a.min(b);
-                most += a.max(b);
-            }
-            // The ellipsoid's support: the image of the unit ball under its matrix.
-            let middle = values[0] + dot(&slopes, centre);
-            let radius = reach.iter().map(|column| dot(&slopes, column).powi(2)).sum::<f64>().sqrt();
-            [least.max(middle - radius), most.min(middle + radius)]
-        }
-    }
-}
-
-/// A cell that may attain the supremum.
+/// A cell, or a curve of a loop, that may attain the supremum.
 struct Candidate {
     root: u32,
-    state: StateId,
+    /// Absent for curves.
+    state: Option<StateId>,
     functional: Functional,
     /// Bounds its supremum, without regard to loops that cut the cell.
     bound: f64,
@@ -218,10 +121,14 @@ impl Candidate {
 /// The search for the supremum of x . direction.
 pub(super) struct Search<'a> {
     attractor: &'a Attractor,
+    rim: &'a Rim,
     direction: Point,
     /// Wanted width of the interval.
     width: f64,
     rounding: f64,
+    /// The largest terms of sums, and the share of them by which the hulls that were met miss the attractors.
+    largest: f64,
+    missed: f64,
     /// Some point of the shape attains this, or more.
     reached: f64,
     /// What was left alone, because its supremum is higher by less than the width, has none above this.
@@ -232,16 +139,19 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// The search through cells in that extent.
-    pub(super) fn new(attractor: &'a Attractor, extent: &Extent, direction: &Point) -> Self {
+    /// The search through cells in that extent, and through the loops of trimmed surfaces.
+    pub(super) fn new(attractor: &'a Attractor, extent: &Extent, rim: &'a Rim, direction: &Point) -> Self {
         let moved = attractor.trimmed().iter().map(TrimmedSurface::moved_mm).fold(0.0, f64::max);
-        let rounding = ROUNDING * extent.largest_term(direction);
+        let largest = extent.largest_term(direction);
         Self {
             attractor,
+            rim,
             direction: *direction,
             // Functionals are not known better than to their rounding.
-            width: RELATIVE_WIDTH * extent.along(direction) + 0.1 * rounding,
-            rounding: rounding + moved,
+            width: RELATIVE_WIDTH * extent.along(direction) + 0.1 * ROUNDING * largest,
+            largest,
+            missed: 0.0,
+            rounding: ROUNDING * largest + moved + rim.moved_mm,
             reached: f64::NEG_INFINITY,
             left: f64::NEG_INFINITY,
             candidates: Vec::new(),
@@ -252,17 +162,23 @@ impl<'a> Search<'a> {
 
     /// Begins with all roots, each dilated by the ball of its own constant radius if `dilated`.
     pub(super) fn with_roots(mut self, dilated: bool, budget: &Budget) -> Result<Self, Stopped> {
-        let ends = self.attractor.trimmed().iter().flat_map(TrimmedSurface::loop_points);
-        self.reached = ends.map(|point| dot(&self.direction, &point)).fold(f64::NEG_INFINITY, f64::max);
-        for (index, root) in self.attractor.roots().iter().enumerate() {
+        let attractor = self.attractor;
+        let offset = |root: usize| match attractor.own_radius(root) {
+            Some(OwnRadius::Constant(radius)) if dilated => *radius,
+            _ => 0.0,
+        };
+        for (index, (root, points)) in self.rim.curves.iter().enumerate() {
             if index % 4096 == 0 {
                 budget.cancel.check()?;
             }
-            let offset = match self.attractor.own_radius(index) {
-                Some(OwnRadius::Constant(radius)) if dilated => *radius,
-                _ => 0.0,
-            };
-            self.begin(index as u32, root.state, &root.points, offset, self.attractor.root_window(index));
+            let functional = Functional::of(points, true, &self.direction, offset(*root as usize));
+            self.consider(Candidate { root: *root, state: None, functional, bound: f64::INFINITY, slack: 0.0, window: None });
+        }
+        for (index, root) in attractor.roots().iter().enumerate() {
+            if index % 4096 == 0 {
+                budget.cancel.check()?;
+            }
+            self.begin(index as u32, root.state, &root.points, offset(index), attractor.root_window(index));
         }
         Ok(self)
     }
@@ -287,36 +203,71 @@ impl<'a> Search<'a> {
             self.reached = points.iter().map(along).fold(self.reached, f64::max);
             return;
         }
-        let functional = Functional::of(points, rational, &self.direction, offset);
-        self.consider(Candidate { root, state, functional, bound: f64::INFINITY, slack: 0.0, window: window.map(Box::new) });
+        let functional = self.at_hull(state, Functional::of(points, rational, &self.direction, offset));
+        self.consider(Candidate { root, state: Some(state), functional, bound: f64::INFINITY, slack: 0.0, window: window.map(Box::new) });
     }
 
-    /// Keeps a cell, bounded here and by its parent, if it may be higher than what is reached.
-    fn consider(&mut self, mut cell: Candidate) {
-        let attractor = self.attractor;
-        let [floor, bound] = cell.functional.range(attractor.bound(cell.state));
-        cell.bound = bound.min(cell.bound);
-        self.reached = match &cell.window {
-            Some(window) if !window.is_inside() => {
-                let points = attractor.window_points(cell.root as usize, window);
-                points.map(|point| dot(&self.direction, &point)).fold(self.reached, f64::max)
-            }
-            _ => match &attractor.automaton().state(cell.state).leaf {
-                // The hull of its control points.
-                LeafPrimitive::Simplex => self.reached.max(cell.bound),
-                LeafPrimitive::Chord(ends) => {
-                    self.reached.max(floor).max(cell.functional.at(&ends.start)).max(cell.functional.at(&ends.end))
-                }
-                _ if self.splits >= LONG && cell.bound > self.reached => {
-                    let points = attractor.attained(cell.state).iter();
-                    points.map(|near| cell.functional.near(near)).fold(self.reached.max(floor), f64::max)
-                }
-                _ => self.reached.max(floor),
-            },
-        };
-        if cell.ceiling() > self.reached {
-            self.candidates.push(cell);
+    /// The functional by its values at the points in whose hull the state's attractor lies.
+    fn at_hull(&mut self, state: StateId, functional: Functional) -> Functional {
+        let Some(hull) = self.attractor.hull(state) else { return functional };
+        self.missed = self.missed.max(hull.miss);
+        match &hull.points {
+            Some(points) => functional.pulled_back(points),
+            None => functional,
         }
+    }
+
+    /// Bounds functionals of a state as they are kept.
+    fn bound_of(&self, state: StateId) -> &'a StateBound {
+        if self.attractor.hull(state).is_some() { &IN_HULL } else { self.attractor.bound(state) }
+    }
+
+    /// Keeps a candidate, bounded here and by its parent, if it may be higher than what is reached.
+    fn consider(&mut self, mut candidate: Candidate) {
+        let [floor, bound] = candidate.functional.range(candidate.state.map_or(&IN_HULL, |state| self.bound_of(state)));
+        candidate.bound = bound.min(candidate.bound);
+        if candidate.ceiling() <= self.reached {
+            return;
+        }
+        if !candidate.is_cut() {
+            self.reached = self.reached.max(floor).max(self.attained_by(&candidate));
+        }
+        if candidate.ceiling() > self.reached && !self.is_beside_highest(&candidate) {
+            self.candidates.push(candidate);
+        }
+    }
+
+    /// What points of a candidate attain that are known to be on the shape; it is not cut.
+    fn attained_by(&self, candidate: &Candidate) -> f64 {
+        let functional = &candidate.functional;
+        let Some(state) = candidate.state else {
+            return functional.at_shares(&[(0, 1.0)]).max(functional.at_shares(&[(functional.values.len() - 1, 1.0)]));
+        };
+        let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
+        if let Some(hull) = self.attractor.hull(state) {
+            return most(&mut hull.attained.iter().map(|shares| functional.at_shares(shares)));
+        }
+        match &self.attractor.automaton().state(state).leaf {
+            // The hull of its control points.
+            LeafPrimitive::Simplex => candidate.bound,
+            LeafPrimitive::Chord(ends) => functional.at(&ends.start).max(functional.at(&ends.end)),
+            LeafPrimitive::Polygon(corners) => most(&mut corners.iter().map(|corner| functional.at(corner))),
+            _ if self.splits >= LONG => most(&mut self.attractor.attained(state).iter().map(|near| functional.near(near))),
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Whether a cell that loops cross is lower than they are, or than its neighbours; see the module's comment.
+    fn is_beside_highest(&self, candidate: &Candidate) -> bool {
+        let (Some(window), Some(state)) = (&candidate.window, candidate.state) else { return false };
+        let root = candidate.root as usize;
+        let known = self.attractor.trim_of(root).is_some_and(|surface| self.rim.is_whole.get(surface) == Some(&true));
+        if window.is_inside() || !known || !self.reached.is_finite() || self.attractor.hull(state).is_none() {
+            return false;
+        }
+        let Some((orders, on_border)) = self.attractor.window_sides(root, window) else { return false };
+        let rises = candidate.functional.rises(orders, [self.reached, candidate.bound], self.rounding);
+        rises.as_flattened().iter().zip(on_border.as_flattened()).any(|(rises, on_border)| *rises && !on_border)
     }
 
     /// The supremum, and the bytes that the search held.
@@ -347,21 +298,32 @@ impl<'a> Search<'a> {
                 self.split(&cell);
             }
         }
+        self.bytes += self.rim.bytes();
         let high = self.candidates.iter().map(Candidate::ceiling).fold(self.left.max(self.reached), f64::max);
-        Ok((Interval { low: self.reached - self.rounding, high: high + self.rounding }, self.bytes as u64))
+        let rounding = self.rounding + self.missed * self.largest;
+        Ok((Interval { low: self.reached - rounding, high: high + rounding }, self.bytes as u64))
     }
 
-    /// Considers the children instead of a cell.
-    fn split(&mut self, cell: &Candidate) {
+    /// Considers the children instead of a candidate.
+    fn split(&mut self, candidate: &Candidate) {
+        let &Candidate { root, state, ref functional, bound, slack, ref window } = candidate;
         let attractor = self.attractor;
-        for (index, transition) in attractor.automaton().state(cell.state).transitions.iter().enumerate() {
-            let window = cell.window.as_ref().and_then(|window| attractor.child_window(cell.root as usize, window, index));
+        let Some(state) = state else {
+            for functional in functional.halves() {
+                self.consider(Candidate { root, state: None, functional, bound, slack, window: None });
+            }
+            return;
+        };
+        for (index, transition) in attractor.automaton().state(state).transitions.iter().enumerate() {
+            let window = window.as_ref().and_then(|window| attractor.child_window(root as usize, window, index));
             if window.as_ref().is_some_and(Window::is_outside) {
                 continue;
             }
-            let functional = cell.functional.pulled_back(&transition.operator);
-            let window = window.map(Box::new);
-            self.consider(Candidate { root: cell.root, state: transition.to, functional, bound: cell.bound, slack: cell.slack, window });
+            let functional = match attractor.hull(state) {
+                Some(hull) => functional.pulled_back(&hull.children[index]),
+                None => self.at_hull(transition.to, functional.pulled_back(&transition.operator)),
+            };
+            self.consider(Candidate { root, state: Some(transition.to), functional, bound, slack, window: window.map(Box::new) });
         }
     }
 
@@ -394,11 +356,15 @@ impl<'a> Search<'a> {
         let mut kept: Vec<Vec<usize>> = vec![Vec::new(); attractor.automaton().states().len()];
         let mut difference = Vec::new();
         for cell in cells {
-            let own = &mut kept[cell.state.index()];
+            let Some(state) = cell.state else {
+                self.candidates.push(cell);
+                continue;
+            };
+            let own = &mut kept[state.index()];
             let (first, rest) = own.split_at(own.len().min(COMPARISONS / 2));
             let near = rest.len().saturating_sub(COMPARISONS / 2);
             let found = rest[near..].iter().rev().chain(first).find_map(|&index| {
-                let (other, bound) = (&self.candidates[index].functional, attractor.bound(cell.state));
+                let (other, bound) = (&self.candidates[index].functional, self.bound_of(state));
                 let slack = cell.functional.slack_under(other, bound, self.reached, cell.bound, allowed, &mut difference)?;
                 let slack = cell.slack + slack;
                 (slack <= most).then_some((index, slack))

@@ -88,6 +88,10 @@ impl Arc {
         self.points.len() == 2
     }
 
+    pub(super) fn homogeneous(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
     pub(super) fn control_points(&self) -> impl Iterator<Item = Parameter> {
         self.points.iter().map(place)
     }

@@ -27,11 +27,13 @@ mod fill;
 mod pairs;
 mod rays;
 mod region;
+mod rim;
 mod window;
 
 pub(crate) use arc::Arc;
 pub(crate) use draw::refine;
 pub(crate) use region::{CurvePlace, GAP, Region, RegionFault};
+pub(crate) use rim::Rim;
 pub(crate) use window::Window;
 
 use super::cell::Point;
@@ -111,14 +113,18 @@ impl TrimmedSurface {
         bounds
     }
 
-    /// Bounds how far closing gaps and snapping to the border moved points of the surface.
-    pub(crate) fn moved_mm(&self) -> f64 {
-        let moved = self.region.moved;
-        if moved == [0.0; 2] {
+    /// Bounds the way on the surface between parameters that differ by no more than this.
+    fn length_of(&self, difference: [f64; 2]) -> f64 {
+        if difference == [0.0; 2] {
             return 0.0;
         }
         let scale = self.derivatives();
-        2.0_f64.sqrt() * (scale[0] * moved[0] + scale[1] * moved[1])
+        2.0_f64.sqrt() * (scale[0] * difference[0] + scale[1] * difference[1])
+    }
+
+    /// Bounds how far closing gaps and snapping to the border moved points of the surface.
+    pub(crate) fn moved_mm(&self) -> f64 {
+        self.length_of(self.region.moved)
     }
 
     /// Maps the surface by x -> map(x w, w), homogeneous points to homogeneous points.
@@ -144,15 +150,15 @@ impl TrimmedSurface {
         Some([index / self.intervals[1].len(), index % self.intervals[1].len()])
     }
 
-    /// Points on the loops, from the start of every arc.
-    pub(crate) fn loop_points(&self) -> impl Iterator<Item = Point> {
-        self.region.corners().map(|parameter| {
-            let span = |k: usize| {
-                let spans = &self.intervals[k];
-                spans.partition_point(|&[_, high]| high < parameter[k]).min(spans.len() - 1)
-            };
-            self.point([span(0), span(1)], parameter)
-        })
+    /// The parameter rectangle of all spans.
+    fn domain(&self) -> [Parameter; 2] {
+        let [first, last] = [[0; 2], [0, 1].map(|k| self.intervals[k].len() - 1)].map(|spans| self.span_box(spans));
+        [first[0], last[1]]
+    }
+
+    /// Of u and v, whether the sides of a pair of spans are in the domain's inside.
+    fn inner_sides(&self, spans: [usize; 2]) -> [[bool; 2]; 2] {
+        [0, 1].map(|k| [spans[k] > 0, spans[k] + 1 < self.intervals[k].len()])
     }
 
     /// The parameter rectangle of a pair of spans.

@@ -120,11 +120,6 @@ impl Region {
         Ok(Self { loops, domain, boxes, rays, moved })
     }
 
-    /// Where arcs start.
-    pub(super) fn corners(&self) -> impl Iterator<Item = Parameter> {
-        self.loops.iter().flatten().map(|arc| self.inside(arc.start()))
-    }
-
     /// Arcs whose boxes meet a rectangle.
     pub(super) fn arcs_near(&self, bounds: [Parameter; 2]) -> impl Iterator<Item = Arc> {
         let mut found = Vec::new();

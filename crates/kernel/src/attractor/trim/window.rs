@@ -3,7 +3,6 @@
 use super::TrimmedSurface;
 use super::arc::{Arc, Parameter};
 use crate::attractor::Attractor;
-use crate::attractor::cell::Point;
 
 /// A cell of a trimmed surface.
 #[derive(Clone, Debug)]
@@ -62,13 +61,13 @@ impl Attractor {
         Some(Window::new(surface, bounds, surface.region.arcs_near(bounds)))
     }
 
-    /// Points on the loops of a crossed cell below that root.
-    pub(crate) fn window_points(&self, root: usize, window: &Window) -> impl Iterator<Item = Point> {
-        let surface = self.trim_of(root).map(|index| &self.trimmed()[index]);
-        let spans = surface.and_then(|surface| surface.spans_of(root));
-        let within = |p: &Parameter| (0..2).all(|k| window.bounds[0][k] <= p[k] && p[k] <= window.bounds[1][k]);
-        let ends = window.arcs.iter().map(Arc::start).filter(within);
-        ends.filter_map(move |parameter| Some(surface?.point(spans?, parameter)))
+    /// Bezier points in u and in v of that root's surface; and of u and v, whether a cell's sides lie on other spans' border.
+    pub(crate) fn window_sides(&self, root: usize, window: &Window) -> Option<([usize; 2], [[bool; 2]; 2])> {
+        let surface = &self.trimmed()[self.trim_of(root)?];
+        let spans = surface.spans_of(root)?;
+        let (inner, rectangle) = (surface.inner_sides(spans), surface.span_box(spans));
+        let on_border = |k: usize, end: usize| inner[k][end] && window.bounds[end][k] == rectangle[end][k];
+        Some((surface.orders, [0, 1].map(|k| [0, 1].map(|end| on_border(k, end)))))
     }
 
     /// The window of child `index` of a cell below that root.
