@@ -62,9 +62,7 @@ const PROCESS_BYTES: f64 = 18e6;
 
 /// Peak memory of a dilation. Blocks that are simplified shrink before they are joined: then what is held is the lattice once, and what simplification takes.
 pub(crate) fn held_bytes(prediction: &Prediction, simplify: bool) -> f64 {
-    let surface =
-        if simplify { prediction.memory_bytes + THREADS * prediction.simplifying_bytes } else { HELD_PER_BYTE * prediction.memory_bytes };
-    surface.max(prediction.box_bytes)
+    if simplify { prediction.memory_bytes + THREADS * prediction.simplifying_bytes } else { HELD_PER_BYTE * prediction.memory_bytes }
 }
 
 /// Bytes that an evaluation holds for each leaf cell that is drawn by itself, and for each that becomes part of a conforming complex. Found on the fixtures, too.

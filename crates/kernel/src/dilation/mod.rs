@@ -172,8 +172,6 @@ pub struct Prediction {
     pub memory_bytes: f64,
     /// Memory that the simplification takes for each thread, in bytes; 0 without it.
     pub simplifying_bytes: f64,
-    /// Memory that the search for the box takes, before all else, in bytes.
-    pub box_bytes: f64,
     /// a, in mm.
     pub pitch_mm: f64,
 }

@@ -13,7 +13,7 @@ use crate::attractor::Attractor;
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::automaton::LeafPrimitive;
 use crate::budget::Budget;
-use crate::measure::bounds::{AxisBox, searched_box};
+use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::mend::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
 use crate::tolerance::Tolerance;
@@ -246,8 +246,6 @@ pub(super) struct Plan<'a> {
     /// Lengths beyond the lattice's own bounds: rounding to single precision, the unit of values and double precision.
     extra: f64,
     bounds: AxisBox,
-    /// What the search for them held.
-    box_bytes: u64,
     rule: SiteRule<'a>,
     clean_only: bool,
 }
@@ -260,7 +258,7 @@ impl<'a> Plan<'a> {
         simplify: bool,
         budget: &Budget,
     ) -> Result<Self, DilationError> {
-        let (bounds, box_bytes) = searched_box(attractor, budget)?;
+        let bounds = bounding_box(attractor, budget)?;
         let radius = balls.most;
         // A tolerance of the radius' order would allow an empty result.
         let of_least = tolerance.mm().min(0.5 * balls.least);
@@ -281,7 +279,7 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, box_bytes, rule, clean_only: !simplify })
+        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -334,7 +332,6 @@ impl<'a> Plan<'a> {
             triangles: expected.triangles,
             memory_bytes,
             simplifying_bytes: expected.simplifying,
-            box_bytes: self.box_bytes as f64,
             pitch_mm: self.pitch,
         })
     }

@@ -58,19 +58,6 @@ impl AxisBox {
 /// # Errors
 /// [`Stopped`] when the budget's token was fired.
 pub fn bounding_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, Stopped> {
-    Ok(searched_box(attractor, budget)?.0)
-}
-
-/// Bytes that [`bounding_box`] holds at most: shapes that are nearly flat where they reach farthest keep many cells. Cost: that of the box.
-///
-/// # Errors
-/// As [`bounding_box`].
-pub fn bounding_box_memory(attractor: &Attractor, budget: &Budget) -> Result<u64, Stopped> {
-    Ok(searched_box(attractor, budget)?.1)
-}
-
-/// The box, and the most bytes that a search held.
-pub(crate) fn searched_box(attractor: &Attractor, budget: &Budget) -> Result<(AxisBox, u64), Stopped> {
     box_of_roots(attractor, false, budget)
 }
 
@@ -79,21 +66,20 @@ pub(crate) fn searched_box(attractor: &Attractor, budget: &Budget) -> Result<(Ax
 /// # Errors
 /// [`Stopped`] when the budget's token was fired.
 pub(crate) fn dilated_box(attractor: &Attractor, budget: &Budget) -> Result<AxisBox, Stopped> {
-    Ok(box_of_roots(attractor, true, budget)?.0)
+    box_of_roots(attractor, true, budget)
 }
 
-fn box_of_roots(attractor: &Attractor, dilated: bool, budget: &Budget) -> Result<(AxisBox, u64), Stopped> {
+fn box_of_roots(attractor: &Attractor, dilated: bool, budget: &Budget) -> Result<AxisBox, Stopped> {
     let (extent, rim) = (Extent::of(attractor), Rim::of(attractor));
-    let (mut low, mut high, mut most) = ([Interval { low: 0.0, high: 0.0 }; 3], [Interval { low: 0.0, high: 0.0 }; 3], 0);
+    let (mut low, mut high) = ([Interval { low: 0.0, high: 0.0 }; 3], [Interval { low: 0.0, high: 0.0 }; 3]);
     for axis in 0..3 {
         for (end, sign) in [(&mut low[axis], -1.0), (&mut high[axis], 1.0)] {
             let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-            let (support, bytes) = Search::new(attractor, &extent, &rim, &direction).with_roots(dilated, budget)?.run(budget)?;
+            let support = Search::new(attractor, &extent, &rim, &direction).with_roots(dilated, budget)?.run(budget)?;
             *end = Interval::new(sign * support.low, sign * support.high);
-            most = most.max(bytes);
         }
     }
-    Ok((AxisBox { low, high }, most))
+    Ok(AxisBox { low, high })
 }
 
 /// [least, largest] of x . direction over the attractor, each an interval that contains it, in mm for a direction of length 1.
@@ -103,7 +89,7 @@ fn box_of_roots(attractor: &Attractor, dilated: bool, budget: &Budget) -> Result
 pub fn extent_along(attractor: &Attractor, direction: DVec3, budget: &Budget) -> Result<[Interval; 2], Stopped> {
     let (extent, rim) = (Extent::of(attractor), Rim::of(attractor));
     let support = |direction: DVec3| Search::new(attractor, &extent, &rim, &direction.to_array()).with_roots(false, budget)?.run(budget);
-    let (least, largest) = (support(-direction)?.0, support(direction)?.0);
+    let (least, largest) = (support(-direction)?, support(direction)?);
     Ok([Interval::new(-least.high, -least.low), largest])
 }
 
@@ -115,5 +101,5 @@ pub(super) fn support_of_cell(
     direction: &Point,
     budget: &Budget,
 ) -> Result<Interval, Stopped> {
-    Ok(Search::new(attractor, &Extent::of_cell(&cell), &Rim::default(), direction).with_cell(&cell, points).run(budget)?.0)
+    Search::new(attractor, &Extent::of_cell(&cell), &Rim::default(), direction).with_cell(&cell, points).run(budget)
 }

@@ -13,7 +13,7 @@ mod support;
 pub mod thickness;
 pub mod triangle;
 
-pub use bounds::{AxisBox, bounding_box, bounding_box_memory, extent_along};
+pub use bounds::{AxisBox, bounding_box, extent_along};
 pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive, intersect_self};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use enclosed::{NotEnclosed, enclosed_volume};

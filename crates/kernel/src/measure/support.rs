@@ -112,10 +112,6 @@ impl Candidate {
     fn is_cut(&self) -> bool {
         self.window.as_ref().is_some_and(|window| !window.is_inside())
     }
-
-    fn bytes(&self) -> usize {
-        size_of::<Self>() + size_of::<f64>() * self.functional.values.len() * (1 + usize::from(self.functional.weights.is_some()))
-    }
 }
 
 /// The search for the supremum of x . direction.
@@ -135,7 +131,6 @@ pub(super) struct Search<'a> {
     left: f64,
     candidates: Vec<Candidate>,
     splits: usize,
-    bytes: usize,
 }
 
 impl<'a> Search<'a> {
@@ -156,7 +151,6 @@ impl<'a> Search<'a> {
             left: f64::NEG_INFINITY,
             candidates: Vec::new(),
             splits: 0,
-            bytes: 0,
         }
     }
 
@@ -270,12 +264,10 @@ impl<'a> Search<'a> {
         rises.as_flattened().iter().zip(on_border.as_flattened()).any(|(rises, on_border)| *rises && !on_border)
     }
 
-    /// The supremum, and the bytes that the search held.
-    pub(super) fn run(mut self, budget: &Budget) -> Result<(Interval, u64), Stopped> {
+    /// The supremum.
+    pub(super) fn run(mut self, budget: &Budget) -> Result<Interval, Stopped> {
         let mut rounds = 0;
         loop {
-            let bytes = self.candidates.iter().map(Candidate::bytes).sum();
-            self.bytes = self.bytes.max(bytes);
             budget.cancel.check()?;
             self.leave();
             self.merge();
@@ -298,10 +290,9 @@ impl<'a> Search<'a> {
                 self.split(&cell);
             }
         }
-        self.bytes += self.rim.bytes();
         let high = self.candidates.iter().map(Candidate::ceiling).fold(self.left.max(self.reached), f64::max);
         let rounding = self.rounding + self.missed * self.largest;
-        Ok((Interval { low: self.reached - rounding, high: high + rounding }, self.bytes as u64))
+        Ok(Interval { low: self.reached - rounding, high: high + rounding })
     }
 
     /// Considers the children instead of a candidate.

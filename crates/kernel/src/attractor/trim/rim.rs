@@ -55,11 +55,6 @@ impl Rim {
         }
         rim
     }
-
-    /// Its size in memory.
-    pub(crate) fn bytes(&self) -> usize {
-        self.curves.iter().map(|(_, points)| size_of::<(u32, Vec<ControlPoint>)>() + size_of_val(points.as_slice())).sum()
-    }
 }
 
 impl TrimmedSurface {
