@@ -368,11 +368,16 @@ fn what_cannot_be_made_is_refused_with_what_can() {
     solid(far(), dilated(1.0, reachable));
     // A radius below what single precision tells apart there.
     assert_eq!(solidify(far(), dilated(1e-4, 1e-5)).unwrap_err().code, "tolerance-unreachable");
-    // Some 10^10 triangles: refused before they are made, with a tolerance that would do.
-    let error = solidify(cube(1000.0), Params { simplify: false, ..dilated(1.0, 2e-3) }).unwrap_err();
-    assert!(["limit-triangles", "limit-memory"].contains(&error.code), "{error:?}");
-    let reachable = error.limit.unwrap().remedy.unwrap().1;
-    assert!(reachable > 2e-3 && reachable < 1.0, "{reachable}");
+    // Some 10^10 triangles, and 10^8 at the largest tolerance: only the limit helps. A smaller cube has a tolerance that would do (`plans.rs` tries such ones).
+    let refused = |size: f64| {
+        let error = solidify(cube(size), Params { simplify: false, ..dilated(1.0, 2e-3) }).unwrap_err();
+        assert_eq!(error.code, "limit-triangles", "{error:?}");
+        error.limit.unwrap().remedy.unwrap()
+    };
+    let (name, enough) = refused(1000.0);
+    assert!(name == "triangles" && enough > 1e8, "{name} {enough}");
+    let (name, reachable) = refused(60.0);
+    assert!(name == "tolerance_mm" && reachable > 2e-3 && reachable < 0.5, "{name} {reachable}");
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
         .map_err(|error| Problem::io("no threads for the workers", &error))?;
     let sweeper = tokio::spawn(sweep(state.clone()));
     told(address);
-    tracing::info!(%address, role = %state.config.role, workers = workers.len(), "serving");
+    tracing::info!(%address, role = %state.config.role, workers = count, "serving");
 
     let connections = GracefulShutdown::new();
     let app = if state.config.role.answers() { router(state.clone()) } else { probes(state.clone()) };

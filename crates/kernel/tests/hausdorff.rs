@@ -9,7 +9,7 @@ use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::measure::triangle::closest_on_triangle;
-use lacuna_kernel::measure::{Directed, Hausdorff, hausdorff};
+use lacuna_kernel::measure::{Directed, Hausdorff, Interval, hausdorff};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::Tolerance;
 use oracle::Random;
@@ -239,5 +239,68 @@ fn what_both_have_costs_nothing() {
         let found = far(&level, &mesh(&coarse, interior), 0.05, 4_000_000);
         holds(found.from_first, 25.0);
         holds(found.from_second, 0.0);
+    }
+}
+
+/// A graph over a square of side 2, by a function of the place and of the corner's number, in `cells` times `cells` rectangles of uneven sizes.
+fn graph(cells: u32, other_diagonal: bool, height: impl Fn(f64, f64) -> f64) -> Vec<Triangle> {
+    // Even steps of a cubic, so that no edges of two graphs lie along each other.
+    let step = |k: u32| {
+        let t = 2.0 * f64::from(k) / f64::from(cells) - 1.0;
+        0.5 * (t + t.powi(3))
+    };
+    let at = |i: u32, j: u32| DVec3::new(step(i), step(j), height(step(i), step(j)));
+    let corners = |i: u32, j: u32| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+    let two = |[a, b, c, d]: [DVec3; 4]| if other_diagonal { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] };
+    (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))).flat_map(|(i, j)| two(corners(i, j))).collect()
+}
+
+#[test]
+fn near_copies_are_laid_over_each_other_once() {
+    // A paraboloid of two triangulations: everywhere as far as chords are from it, so that nothing but the cuts keeps pieces large.
+    let bowl = |x: f64, y: f64| 0.3 * (x * x + y * y);
+    let (coarse, fine) = (graph(24, false, bowl), graph(61, true, bowl));
+    let [a, b] = [&coarse, &fine].map(|triangles| mesh(triangles, Interior::Surface));
+    let tolerance = 2e-5;
+    let found = far(&a, &b, tolerance, 3_000_000);
+    // Corners and middles are a sample. No triangle is farther from the bowl than 0.3 times the square of the circle's radius that its rectangle has.
+    let sample = |from: &[Triangle], to: &[Triangle]| {
+        let points = from.iter().flat_map(|[a, b, c]| [*a, *b, *c, (*a + *b + *c) / 3.0]);
+        points.map(|x| distance(x, to)).fold(0.0, f64::max)
+    };
+    let off = |triangles: &[Triangle]| {
+        let sides = triangles.iter().flat_map(|[a, b, c]| [*b - *a, *c - *b, *a - *c]);
+        0.3 * sides.map(|side| 0.25 * side.truncate().length_squared()).fold(0.0, f64::max)
+    };
+    let most = off(&coarse) + off(&fine);
+    for (directed, least) in [(found.from_first, sample(&coarse, &fine)), (found.from_second, sample(&fine, &coarse))] {
+        let Interval { low, high } = directed.distance_mm;
+        assert!(high >= least && low <= most && least > 50.0 * tolerance, "{directed:?} {least} {most}");
+    }
+}
+
+#[test]
+fn rough_near_copies_against_fine_samples() {
+    let mut random = Random(77);
+    for round in 0..12 {
+        // Folds, holes and steep places: what lies over nothing, or over the wrong triangle, is searched as before.
+        let rough = 0.02 + 0.3 * random.unit();
+        let mut noisy = |cells: u32, other: bool| {
+            let mut triangles = graph(cells, other, |x, y| 0.3 * x * y);
+            for corner in triangles.iter_mut().flatten() {
+                // The same corner moves the same way, wherever it is met.
+                let turn = 1e4 * (corner.x * 12.9898 + corner.y * 78.233 + f64::from(round)).sin();
+                corner.z += rough * (turn - turn.floor() - 0.5);
+            }
+            triangles.retain(|_| random.unit() < 0.95);
+            triangles
+        };
+        let (first, second) = (noisy(7, false), noisy(9, true));
+        let [a, b] = [&first, &second].map(|triangles| mesh(triangles, Interior::Surface));
+        let found = far(&a, &b, 0.005, u64::MAX);
+        for (directed, from, to) in [(found.from_first, &first, &second), (found.from_second, &second, &first)] {
+            let (least, error) = sampled(from, |x| distance(x, to));
+            assert!(directed.distance_mm.high >= least - 1e-9 && directed.distance_mm.low <= least + error, "{round} {directed:?} {least}");
+        }
     }
 }

@@ -81,6 +81,10 @@ pub(super) fn over(triangle: &[Point; 3], others: &[Below], thin: f64, good: f64
                     inside = within;
                 }
             }
+            // What the planes together leave beside the other triangle, though none does alone.
+            if inside.len() < 3 {
+                continue;
+            }
             let other = Site::Triangle(*corners);
             let high = inside.iter().map(|x| other.distance_squared(x)).fold(0.0, f64::max).sqrt() + error;
             if high <= good { overlay.settled = overlay.settled.max(high) } else { overlay.rest.extend(fan(&inside)) }
@@ -123,7 +127,8 @@ fn divided(polygon: &[Point], from: &Point, inward: &Point, thin: f64) -> (Vec<P
 
 /// A convex polygon as triangles.
 fn fan(polygon: &[Point]) -> impl Iterator<Item = Site> {
-    polygon[1..].windows(2).map(|pair| Site::Triangle([polygon[0], pair[0], pair[1]]))
+    let (first, others) = polygon.split_at(polygon.len().min(1));
+    others.windows(2).map(|pair| Site::Triangle([first[0], pair[0], pair[1]]))
 }
 
 fn between(a: &Point, b: &Point, share: f64) -> Point {
