@@ -69,7 +69,7 @@ fn limited(kind: &str, model: &str, params: &Value, limits: &Value, remedy: &'st
     (json!({ "lacuna": 1, "kind": kind, "model": model, "params": params, "limits": limits, "outputs": ["obj"] }), remedy)
 }
 
-/// Jobs that exceed a limit far; some with a tolerance so large already that only the limit helps: half the radius and more is the same to a dilation.
+/// Jobs that exceed a limit far; some so far that no tolerance helps, but only the limit: half the radius and more is the same to a dilation.
 fn beyond() -> Vec<(Value, &'static str)> {
     let triangles = |allowed: u32| json!({ "triangles": allowed });
     let plain = |tolerance: f64, radius: f64| json!({ "tolerance_mm": tolerance, "radius_mm": radius });
@@ -78,6 +78,7 @@ fn beyond() -> Vec<(Value, &'static str)> {
     vec![
         limited("solidify", "curves/circle", &plain(0.002, 1.0), &triangles(300_000), "tolerance_mm"),
         limited("solidify", "ifs/koch_curve", &plain(0.9, 0.6), &triangles(3000), "triangles"),
+        limited("solidify", "curves/circle", &plain(0.02, 0.5), &triangles(1000), "triangles"),
         limited("solidify", "meshes/cube_open", &lattice, &triangles(40_000), "tolerance_mm"),
         limited("evaluate", "nurbs/torus", &evaluated(0.0005), &json!({ "cells": 20_000 }), "tolerance_mm"),
         limited("evaluate", "ifs/sierpinski_tetrahedron", &evaluated(0.05), &json!({ "cells": 5000 }), "tolerance_mm"),

@@ -128,10 +128,11 @@ fn remedy(job: &Job, plan: Option<Plan>, limit: &'static str, budget: &Budget) -
     };
     let passes = |plan: &Plan| plan.counts(kind, &budget.limits).iter().all(|(_, asked, allowed)| CERTAIN * asked <= *allowed);
     let asked = |plan: &Plan| plan.counts(kind, &budget.limits).iter().find(|(name, ..)| *name == limit).map(|(_, asked, _)| *asked);
-    let mut needed = match plan {
+    let needed = match plan {
         Some(plan) => asked(&plan),
         None => at(fails)?.as_ref().and_then(asked),
     };
+    let mut last = needed;
     for _ in 0..STEPS {
         let tolerance_mm = STEP * fails;
         let found = at(tolerance_mm)?;
@@ -143,12 +144,12 @@ fn remedy(job: &Job, plan: Option<Plan>, limit: &'static str, budget: &Budget) -
             }
             return Some(("tolerance_mm", enough));
         }
-        let (before, now) = (needed, found.as_ref().and_then(asked));
-        (fails, needed) = (tolerance_mm, now.or(needed));
+        let now = found.as_ref().and_then(asked);
         // Beyond the size of the ball, or of the shape, a tolerance changes nothing.
-        if now.is_some() && now == before {
+        if now.is_some() && now == last {
             break;
         }
+        (fails, last) = (tolerance_mm, now.or(last));
     }
     needed.map(|asked| (limit, CERTAIN * asked))
 }

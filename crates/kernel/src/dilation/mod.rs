@@ -3,7 +3,8 @@
 //! In every tetrahedron of the lattice the solid is a union of half-spaces, one for every site near: where the affine
 //! function with the values of the site's squared distance at the four vertices is below theta. Creases between sites are
 //! cut where those functions meet; so, with R a tetrahedron's circumradius, D(sqrt(theta - R^2)) subset solid subset D(sqrt(theta))
-//! for the sites (see `block`). theta = r^2, and R^2 = r^2 - (r - e)^2 is a pitch of sqrt(r e), whatever the shape.
+//! for the sites (see `block`). theta = r^2, and R^2 = r^2 - (r - e)^2 is a pitch of some 2.5 sqrt(r e), whatever the shape, and
+//! 0.65 r at most: above that, which is where e is larger than r / 14, surfaces take longer for more triangles (see `plan`).
 //!
 //! Where the solid leaves out a critical point of the distance below r, the lattice is refined until it does not: by Morse
 //! theory the solid then has all of D(r)'s topology (see `block`). Where no level is fine enough, that is counted as uncertain.
