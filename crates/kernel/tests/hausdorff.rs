@@ -242,9 +242,9 @@ fn what_both_have_costs_nothing() {
     }
 }
 
-/// A graph over a square of side 2, by a function of the place and of the corner's number, in `cells` times `cells` rectangles of uneven sizes.
+/// The graph of a function over a square of side 2, in `cells` times `cells` rectangles of uneven sizes.
 fn graph(cells: u32, other_diagonal: bool, height: impl Fn(f64, f64) -> f64) -> Vec<Triangle> {
-    // Even steps of a cubic, so that no edges of two graphs lie along each other.
+    // Values of a cubic at even steps: hardly any edges of two graphs lie along each other.
     let step = |k: u32| {
         let t = 2.0 * f64::from(k) / f64::from(cells) - 1.0;
         0.5 * (t + t.powi(3))

@@ -11,7 +11,7 @@
 //! right angles to it through their edges cut it into convex polygons, each over one of them or over none. The planes of two triangles at one edge are the same, however
 //! they are bent, so that a polygon over one of them is bounded by it almost without an error. The bound holds whatever the cuts are, as the polygons fill the triangle.
 
-use crate::attractor::cell::{Point, Site, cross, dot, subtract};
+use crate::attractor::cell::{Point, Site, between, cross, dot, subtract};
 use crate::measure::contact::corners;
 
 /// How far the farthest point of a site is from another site: at one of its corners, which is told.
@@ -129,10 +129,6 @@ fn divided(polygon: &[Point], from: &Point, inward: &Point, thin: f64) -> (Vec<P
 fn fan(polygon: &[Point]) -> impl Iterator<Item = Site> {
     let (first, others) = polygon.split_at(polygon.len().min(1));
     others.windows(2).map(|pair| Site::Triangle([first[0], pair[0], pair[1]]))
-}
-
-fn between(a: &Point, b: &Point, share: f64) -> Point {
-    std::array::from_fn(|axis| (1.0 - share) * a[axis] + share * b[axis])
 }
 
 /// The vector at length 1; `None` of one without length.
