@@ -158,3 +158,23 @@ fn the_service_refuses_what_a_plan_says_is_beyond_the_limits() {
         assert_eq!(service.get("/v1/jobs").json()["items"].as_array().unwrap().len(), before + 1);
     }
 }
+
+#[test]
+fn a_mesh_with_more_faces_than_are_counted_is_planned() {
+    const SIDE: usize = 460;
+    let scratch = Scratch::new();
+    let faces = 2 * (SIDE - 1) * (SIDE - 1);
+    let mut mesh = format!("OFF\n{} {faces} 0\n", SIDE * SIDE);
+    (0..SIDE * SIDE).for_each(|k| mesh.push_str(&format!("{} {} 0\n", k / SIDE, k % SIDE)));
+    for (i, j) in (0..SIDE - 1).flat_map(|i| (0..SIDE - 1).map(move |j| (i, j))) {
+        let [a, b, c, d] = [i * SIDE + j, i * SIDE + j + 1, (i + 1) * SIDE + j + 1, (i + 1) * SIDE + j];
+        mesh.push_str(&format!("3 {a} {b} {c}\n3 {a} {c} {d}\n"));
+    }
+    std::fs::write(scratch.join("mesh.off"), mesh).unwrap();
+    let model = json!({ "lacuna": 1, "shape": { "family": "mesh", "file": "mesh.off", "interior": "surface" } });
+    let job = json!({ "lacuna": 1, "kind": "evaluate", "model": model, "params": { "tolerance_mm": 0.1 }, "outputs": ["obj"] });
+    let file = scratch.join("job.json");
+    std::fs::write(&file, job.to_string()).unwrap();
+    let plan: Value = serde_json::from_slice(&succeed(["plan".as_ref(), file.as_os_str()])).unwrap();
+    assert_eq!((&plan["leaf_cells"], plan.get("exceeds")), (&json!(faces as f64), None), "{plan}");
+}

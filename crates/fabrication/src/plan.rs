@@ -84,7 +84,7 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     let plan = planned(&job, budget).map_err(|error| with_remedy(&job, error, budget))?;
     let exceeds = plan.counts(job.kind, &budget.limits).into_iter().find(|(_, asked, allowed)| *asked > CERTAIN * allowed);
     let exceeds = exceeds.map(|(limit, asked, allowed)| {
-        let remedy = remedy(&job, Some(plan.clone()), limit, budget).map(|(name, value)| (name.to_owned(), value));
+        let remedy = remedy(&job, Some(&plan), limit, budget).map(|(name, value)| (name.to_owned(), value));
         Excess { limit: limit.to_owned(), asked, allowed, remedy: remedy.into_iter().collect() }
     });
     let memory_bytes = if plan.memory_bytes > 0.0 { PROCESS_BYTES + plan.memory_bytes } else { 0.0 };
@@ -117,7 +117,7 @@ impl Plan {
 
 /// A value that would pass where a plan, or the job itself, exceeds a limit: of the tolerance, or of the limit where no tolerance is enough. `None` when
 /// somebody stops the search, or there is no plan.
-fn remedy(job: &Job, plan: Option<Plan>, limit: &'static str, budget: &Budget) -> Option<(&'static str, f64)> {
+fn remedy(job: &Job, plan: Option<&Plan>, limit: &'static str, budget: &Budget) -> Option<(&'static str, f64)> {
     let quiet = Budget { progress: None, ..budget.clone() };
     let (mut job, kind, mut fails) = (job.clone(), job.kind, job.params.tolerance_mm);
     let mut at = |tolerance_mm: f64| {
@@ -129,7 +129,7 @@ fn remedy(job: &Job, plan: Option<Plan>, limit: &'static str, budget: &Budget) -
     let passes = |plan: &Plan| plan.counts(kind, &budget.limits).iter().all(|(_, asked, allowed)| CERTAIN * asked <= *allowed);
     let asked = |plan: &Plan| plan.counts(kind, &budget.limits).iter().find(|(name, ..)| *name == limit).map(|(_, asked, _)| *asked);
     let needed = match plan {
-        Some(plan) => asked(&plan),
+        Some(plan) => asked(plan),
         None => at(fails)?.as_ref().and_then(asked),
     };
     let mut last = needed;
@@ -215,7 +215,9 @@ const COUNTED_CELLS: u64 = 400_000;
 /// Leaf cells at a tolerance: counted when few, else extrapolated by the growth between two coarser
 /// tolerances, N ~ tolerance^-dimension.
 fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<f64, JobError> {
-    let limits = Limits { cells: COUNTED_CELLS, ..budget.limits };
+    // A tolerance larger than the shape leaves the roots.
+    let roots = attractor.roots().len();
+    let limits = Limits { cells: COUNTED_CELLS + roots as u64, ..budget.limits };
     let counted = Budget { limits, progress: None, ..budget.clone() };
     let mut coarse = tolerance.mm();
     let mut known: Vec<(f64, f64)> = Vec::new();
@@ -234,5 +236,5 @@ fn predict_cells(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -
             _ => coarse *= 2.0,
         }
     }
-    Ok(known.first().map_or(f64::INFINITY, |(_, count)| *count))
+    Ok(known.first().map_or(roots as f64, |(_, count)| *count))
 }
