@@ -1,17 +1,14 @@
 //! From the surfaces of blocks to one: the octree is walked once more, and every node simplifies what its children leave.
 
 use super::DilationError;
-use super::block::{BlockSurface, SIDE};
+use super::block::SIDE;
 use super::octree::{Node, Pass};
 use super::simplify::{Core, Simplifier};
 use super::stitch;
+use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::sync::Mutex;
-
-/// Surfaces by the index of the block.
-pub(super) type Blocks = BTreeMap<[i64; 3], Mutex<BlockSurface>>;
 
 /// Share of the pitch that keeps a node's core from its neighbours' surfaces: far above rounding, which moves these.
 const MARGIN: f64 = 0.01;

@@ -17,14 +17,13 @@ use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
+use super::surface::{BlockSurface, NameMap, UNNAMED, VertexName};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
-use crate::attractor::sites::{SiteError, SiteRule};
+use crate::attractor::sites::SiteRule;
 use crate::measure::triangle::{Feature, closest_feature};
 use crate::split_mix::mix;
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
 
 /// Cubes along a block's side.
 pub(super) const SIDE: usize = 16;
@@ -42,70 +41,6 @@ const FAR: f64 = f64::INFINITY;
 /// On which side of the surface a vertex is; both where a gap was closed there.
 const OPEN: u8 = 1;
 const COVERED: u8 = 2;
-
-/// The surface in one block, ready to be joined with its neighbours.
-#[derive(Debug, Default)]
-pub(super) struct BlockSurface {
-    /// Index of the block's first cube.
-    pub(super) first_cube: [i64; 3],
-    /// Vertices in mm.
-    pub(super) vertices: Vec<Point>,
-    /// Corners.
-    pub(super) triangles: Vec<[u32; 3]>,
-    /// Whether a vertex was tried by the simplification with all of its star; empty before.
-    pub(super) settled: Vec<bool>,
-    /// Names of vertices that other blocks may have too.
-    pub(super) shared: Vec<(VertexName, u32)>,
-    /// Leaf cells met.
-    pub(super) leaves: u64,
-    /// Largest errors of leaves met.
-    pub(super) site_error: SiteError,
-    /// Cubes to subdivide: the distance may have a critical point on the wrong side there, or, among dense sites, what would be filled is not near a site.
-    pub(super) critical: Vec<Cube>,
-    /// Places where no level tells it.
-    pub(super) uncertain: Vec<Cube>,
-}
-
-/// What a vertex on an edge or a face of the lattice is called by every tetrahedron there.
-pub(super) type VertexName = u128;
-
-/// Mixes names, and coordinates of vertices and cubes, which nobody can choose to collide.
-#[derive(Clone, Debug, Default)]
-pub(super) struct NameHasher(u64);
-
-/// A hash map by names or coordinates.
-pub(super) type NameMap<K, V> = HashMap<K, V, BuildHasherDefault<NameHasher>>;
-
-impl Hasher for NameHasher {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-    fn write(&mut self, bytes: &[u8]) {
-        for part in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..part.len()].copy_from_slice(part);
-            self.write_u64(u64::from_le_bytes(word));
-        }
-    }
-    fn write_u128(&mut self, name: u128) {
-        self.0 = mix(self.0 ^ name as u64 ^ mix((name >> 64) as u64));
-    }
-    fn write_u64(&mut self, part: u64) {
-        self.0 = mix(self.0.rotate_left(21) ^ part);
-    }
-    fn write_i64(&mut self, part: i64) {
-        self.write_u64(part as u64);
-    }
-    fn write_u32(&mut self, part: u32) {
-        self.write_u64(u64::from(part));
-    }
-    fn write_i32(&mut self, part: i32) {
-        self.write_u64(u64::from(part as u32));
-    }
-    fn write_usize(&mut self, length: usize) {
-        self.write_u64(length as u64);
-    }
-}
 
 /// The four vertices of a tetrahedron in the order of their numbers.
 pub(super) struct Frame {
@@ -199,9 +134,6 @@ pub(super) struct Workshop<'a> {
     corners: Vec<u32>,
     numbers: Vec<u32>,
     critical: Critical,
-    /// Whether critical points are looked for, and the surface is made.
-    searches: bool,
-    emits: bool,
     /// Middle of the sub-block, and how far around it all sites are known.
     known: (Point, f64),
     /// The cubes of the sub-block that are looked at, by their offset from its first.
@@ -246,8 +178,6 @@ impl<'a> Workshop<'a> {
             corners: Vec::new(),
             numbers: Vec::new(),
             critical: Critical::default(),
-            searches: true,
-            emits: true,
             known: ([0.0; 3], 0.0),
             cubes: Vec::new(),
             leaves: Vec::new(),
@@ -255,23 +185,23 @@ impl<'a> Workshop<'a> {
         }
     }
 
-    /// The surface in the block whose first cube is given; `open` lists the solids whose surface meets it.
-    pub(super) fn surface(
+    /// Completes the surface in a block, of which all is there but the tetrahedra that the task is about; `open` lists the solids whose surface meets it.
+    pub(super) fn complete(
         &mut self,
         setting: &Setting,
         grading: &Grading,
         task: Task<'_>,
-        first_cube: [i64; 3],
+        surface: &mut BlockSurface,
         candidates: &Candidates,
         open: &[u32],
-    ) -> BlockSurface {
+    ) {
         self.values.iter_mut().for_each(|values| values.fill(NOTHING));
         self.fine.clear();
         self.names.clear();
+        self.names.extend(surface.names.iter().zip(0..).filter(|&(&name, _)| name != UNNAMED).map(|(&name, number)| (name, number)));
         self.seed = None;
-        (self.searches, self.emits) = (task.searches(), task.emits());
         let starts = self.tree.reset(candidates);
-        let mut surface = BlockSurface { first_cube, ..BlockSurface::default() };
+        let first_cube = surface.first_cube;
         for k in (0..SIDE).step_by(SUB) {
             for j in (0..SIDE).step_by(SUB) {
                 for i in (0..SIDE).step_by(SUB) {
@@ -279,7 +209,7 @@ impl<'a> Workshop<'a> {
                     self.cubes.clear();
                     self.cubes.extend(cubes(SUB).filter(|&local| task.is_about(&moved(first, local))));
                     if !self.cubes.is_empty() {
-                        self.sub_block(setting, grading, &starts, open, first, &mut surface);
+                        self.sub_block(setting, grading, task, &starts, open, first, surface);
                     }
                 }
             }
@@ -289,9 +219,8 @@ impl<'a> Workshop<'a> {
         surface.critical.dedup();
         surface.uncertain.sort_unstable();
         surface.uncertain.dedup();
-        surface.leaves = self.tree.leaves;
-        surface.site_error = self.tree.largest_error;
-        surface
+        surface.leaves = surface.leaves.max(self.tree.leaves);
+        surface.site_error = surface.site_error.max(self.tree.largest_error);
     }
 
     /// Whether the last block needed more cells than allowed: its surface is then incomplete.
@@ -300,10 +229,12 @@ impl<'a> Workshop<'a> {
     }
 
     /// The chosen cubes of a sub-block: skipped when its middle is too far from the surface for any of its tetrahedra.
+    #[allow(clippy::too_many_arguments)]
     fn sub_block(
         &mut self,
         setting: &Setting,
         grading: &Grading,
+        task: Task<'_>,
         starts: &[NodeId],
         open: &[u32],
         first: [i64; 3],
@@ -330,14 +261,18 @@ impl<'a> Workshop<'a> {
         let plain = if setting.dense { grading.plain(first, SUB) } else { Plain::default() };
         for &local in &chosen {
             let cube = Cube { level: 0, index: moved(first, local) };
-            if plain.contains(local) {
-                self.plain_cube(setting, cube, surface);
-                continue;
-            }
             leaves.clear();
             grading.leaves(cube, &mut leaves);
-            for &leaf in &leaves {
-                grading.tetrahedra(leaf, &mut |numbers| self.tetrahedron(setting, numbers, leaf.level, surface));
+            for &leaf in leaves.iter().filter(|&&leaf| task.is_new(leaf)) {
+                let made = surface.triangles.len();
+                if plain.contains(local) {
+                    self.plain_cube(setting, leaf, surface);
+                } else {
+                    grading.tetrahedra(leaf, &mut |numbers| self.tetrahedron(setting, numbers, leaf.level, surface));
+                }
+                if surface.triangles.len() > made {
+                    surface.pieces.push((leaf, made as u32));
+                }
             }
         }
         (self.cubes, self.leaves) = (chosen, leaves);
@@ -533,22 +468,18 @@ impl<'a> Workshop<'a> {
         let whole = smooth >> WHOLE & 1 == 1;
         if whole && frame.covered != 0 {
             // What one site leaves has no critical point: see `is_steep`.
-            if self.emits {
-                self.march(&frame, surface);
-            }
+            self.march(&frame, surface);
             return;
         }
         if self.cut_sites(setting, &frame) == Cut::Empty {
             // The solid's other parts lie in what sites cover.
             return;
         }
-        if self.searches {
-            let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
-            if !self.has_witness(setting, &frame, &rest) {
-                self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
-            }
+        let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
+        if !self.has_witness(setting, &frame, &rest) {
+            self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
         }
-        if frame.covered == 0 || !self.emits {
+        if frame.covered == 0 {
             return;
         }
         for simplex in smooth::largest(smooth, frame.covered) {
@@ -609,13 +540,10 @@ impl<'a> Workshop<'a> {
         if frame.covered == 0 {
             return;
         }
-        if !self.searches || frame.is_close(setting, &self.tree) || self.is_served(setting, frame) {
-            if self.emits {
-                self.march(frame, surface);
-            }
-        } else {
+        if !frame.is_close(setting, &self.tree) && !self.is_served(setting, frame) {
             surface.critical.extend(frame.cubes());
         }
+        self.march(frame, surface);
     }
 
     /// Whether a site serves the whole tetrahedron: the nearest to a vertex, or to the middle of what is filled.
@@ -711,6 +639,7 @@ impl<'a> Workshop<'a> {
         let mut weights = [0.0; 4];
         (weights[p], weights[q]) = (1.0 - t, t);
         surface.vertices.push(place(&frame.positions, &weights));
+        surface.names.push(name);
         let number = surface.vertices.len() as u32 - 1;
         self.names.insert(name, number);
         let faces = WHOLE & !(1 << p | 1 << q);
@@ -826,13 +755,14 @@ impl<'a> Workshop<'a> {
     /// The number of a corner in the block's list, made when first met.
     fn vertex(&mut self, outside: &Outside, frame: &Frame, index: usize, surface: &mut BlockSurface) -> u32 {
         let corner = &outside.corners()[index];
-        let make = |surface: &mut BlockSurface| {
+        let make = |name: VertexName, surface: &mut BlockSurface| {
             surface.vertices.push(place(&frame.positions, &corner.weights));
+            surface.names.push(name);
             surface.vertices.len() as u32 - 1
         };
         let faces = corner.facets.iter().filter(|&&facet| facet < FACES).fold(0_u8, |bits, facet| bits | 1 << facet);
         if faces == 0 {
-            return make(surface);
+            return make(UNNAMED, surface);
         }
         let on = |k: &usize| faces >> k & 1 == 0;
         if let Some((from, to)) = coincidence(outside, corner, faces) {
@@ -859,7 +789,7 @@ impl<'a> Workshop<'a> {
         if let Some(&known) = self.names.get(&name) {
             return known;
         }
-        let number = make(surface);
+        let number = make(name, surface);
         self.names.insert(name, number);
         if Self::is_shared(frame, faces, surface) {
             surface.shared.push((name, number));

@@ -1,6 +1,6 @@
 //! The certificate of a changed surface: which sites are near, how far it stays from them, and that they cover what it swept.
 
-use super::block::NameHasher;
+use super::surface::NameHasher;
 use super::tree::{NodeId, SiteId, Tree, Weighted, in_space};
 use crate::attractor::cell::{Point, Site, between, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_on_triangle;

@@ -5,12 +5,13 @@
 //! space", 2009). The solid lies between D(s) and D(outer). It has the topology of D(r) where every critical point of a value in (s, r] is inside and
 //! every one of a value in (r, outer] is outside. Both kinds lie in what the sites leave of a tetrahedron.
 
-use super::block::{BlockSurface, Frame, Nearby, place};
+use super::block::{Frame, Nearby, place};
 use super::certificate::highest;
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
 use super::plan::Setting;
 use super::smooth;
+use super::surface::BlockSurface;
 use super::tree::Tree;
 use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
 use crate::measure::triangle::{Feature, closest_feature};

@@ -7,8 +7,8 @@
 //! A shell no longer than rounding may move what it bounds, see [`NUDGE`], has no volume to speak of, nor a sign of it: it goes, and the bound for rounding covers that. As a void
 //! of D(r) it would have held a critical point of the distance, which has two sites at one distance at least; where there is one site alone, there was none.
 
-use super::block::BlockSurface;
 use super::plan::Setting;
+use super::surface::BlockSurface;
 use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, cross, distance_squared, dot};
 use crate::attractor::sites::SiteRule;
@@ -57,7 +57,7 @@ pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candid
     if fates.iter().any(|&fate| fate != Fate::Stays) {
         let mut kept = numbers.iter().map(|&number| fates[number as usize] == Fate::Stays);
         surface.triangles.retain(|_| kept.next().unwrap_or(true));
-        drop_unused(surface);
+        surface.drop_unused();
     }
     fates.iter().filter(|&&fate| fate == Fate::GoesInDoubt).count()
 }
@@ -115,18 +115,4 @@ fn shells(surface: &BlockSurface) -> (Vec<u32>, Vec<Shell>) {
         numbers.push(*name);
     }
     (numbers, vec![EMPTY; count as usize])
-}
-
-fn drop_unused(surface: &mut BlockSurface) {
-    let mut numbers = vec![u32::MAX; surface.vertices.len()];
-    let mut vertices = Vec::with_capacity(surface.vertices.len());
-    for corner in surface.triangles.iter_mut().flatten() {
-        let number = &mut numbers[*corner as usize];
-        if *number == u32::MAX {
-            *number = vertices.len() as u32;
-            vertices.push(surface.vertices[*corner as usize]);
-        }
-        *corner = *number;
-    }
-    surface.vertices = vertices;
 }

@@ -7,7 +7,7 @@
 //! Shewchuk, "Isosurface stuffing", 2007). The smallest ball around each of these tetrahedra has radius sqrt(5)/4 of the larger leaf's edge
 //! at most.
 
-use super::block::NameHasher;
+use super::surface::NameHasher;
 use crate::attractor::cell::Point;
 use std::collections::HashSet;
 use std::hash::BuildHasherDefault;
@@ -51,7 +51,7 @@ impl Cube {
         Self { level: self.level, index: std::array::from_fn(|axis| self.index[axis] + offset[axis]) }
     }
 
-    fn parent(self) -> Option<Self> {
+    pub(super) fn parent(self) -> Option<Self> {
         (self.level > 0).then(|| Self { level: self.level - 1, index: self.index.map(|x| x >> 1) })
     }
 

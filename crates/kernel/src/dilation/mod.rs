@@ -32,6 +32,7 @@ mod simplify;
 mod smooth;
 mod stability;
 mod stitch;
+mod surface;
 mod tree;
 mod wall;
 

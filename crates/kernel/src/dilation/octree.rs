@@ -2,9 +2,10 @@
 //! their cells, cells are expanded only as far as the cube's size asks.
 
 use super::DilationError;
-use super::block::{BlockSurface, NameHasher, SIDE, Workshop, signed_side};
+use super::block::{SIDE, Workshop, signed_side};
 use super::lattice::{Cube, Grading, around};
 use super::plan::Setting;
+use super::surface::{BlockSurface, Blocks, NameHasher};
 use super::tree::{Candidate, Candidates, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, child_points, distance_squared};
@@ -19,30 +20,40 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Where the lattice has changed.
 #[derive(Debug, Default)]
 pub(super) struct Changed {
-    /// The cubes of level 0 whose tetrahedra are others now.
-    pub(super) cubes: HashSet<[i64; 3], BuildHasherDefault<NameHasher>>,
-    /// The blocks that hold them, by their place in units of blocks.
-    pub(super) blocks: BTreeSet<[i64; 3]>,
+    /// The cubes that were subdivided.
+    subdivided: HashSet<Cube, BuildHasherDefault<NameHasher>>,
+    /// The cubes of level 0 that hold them, or touch these.
+    cubes: HashSet<[i64; 3], BuildHasherDefault<NameHasher>>,
+    /// The blocks that hold those, by their place in units of blocks.
+    blocks: BTreeSet<[i64; 3]>,
 }
 
 impl Changed {
-    /// Those that hold one of the cubes that were subdivided, or touch it.
-    pub(super) fn around(subdivided: &[Cube]) -> Self {
+    pub(super) fn new(subdivided: &[Cube]) -> Self {
         let cubes: HashSet<_, _> = subdivided.iter().flat_map(|cube| around(cube.base())).collect();
         let blocks = cubes.iter().map(|cube: &[i64; 3]| cube.map(|x| x.div_euclid(SIDE as i64))).collect();
-        Self { cubes, blocks }
+        Self { subdivided: subdivided.iter().copied().collect(), cubes, blocks }
+    }
+
+    /// Whether a cube's tetrahedra are not what they were: it is subdivided now, or half of a cube that is, or touches one or the halves of one. What
+    /// [`Grading::tetrahedra`] asks of a leaf's neighbours is whether they and the cubes above them are subdivided.
+    pub(super) fn is_new(&self, cube: Cube) -> bool {
+        let is_subdivided = |cube: Cube| self.subdivided.contains(&cube);
+        let touches = |index: [i64; 3]| {
+            let near = Cube { index, ..cube };
+            is_subdivided(near) || near.parent().is_some_and(is_subdivided)
+        };
+        around(cube.index).any(touches)
     }
 }
 
 /// What a pass asks of the blocks.
 #[derive(Clone, Copy)]
 pub(super) enum Task<'a> {
-    /// The surface, and the search for critical points in all tetrahedra.
+    /// The surface, and the search for critical points, in all tetrahedra.
     Whole,
-    /// The search where the lattice has changed, and no surface.
-    Search(&'a Changed),
-    /// The surface in these blocks, all of whose tetrahedra were searched.
-    Surface(&'a BTreeSet<[i64; 3]>),
+    /// The same in those that are new where the lattice has changed. The other ones' surface is taken from what was made before.
+    Changed(&'a Changed, &'a Blocks),
 }
 
 impl Task<'_> {
@@ -50,25 +61,39 @@ impl Task<'_> {
     fn blocks(&self) -> Option<&BTreeSet<[i64; 3]>> {
         match self {
             Self::Whole => None,
-            Self::Search(changed) => Some(&changed.blocks),
-            Self::Surface(blocks) => Some(blocks),
+            Self::Changed(changed, _) => Some(&changed.blocks),
         }
     }
 
     /// Whether the tetrahedra of a cube of level 0 are to be looked at.
     pub(super) fn is_about(&self, cube: &[i64; 3]) -> bool {
         match self {
-            Self::Search(changed) => changed.cubes.contains(cube),
-            Self::Whole | Self::Surface(_) => true,
+            Self::Whole => true,
+            Self::Changed(changed, _) => changed.cubes.contains(cube),
         }
     }
 
-    pub(super) fn searches(&self) -> bool {
-        !matches!(self, Self::Surface(_))
+    /// Whether the tetrahedra of a leaf are.
+    pub(super) fn is_new(&self, leaf: Cube) -> bool {
+        match self {
+            Self::Whole => true,
+            Self::Changed(changed, _) => changed.is_new(leaf),
+        }
     }
 
-    pub(super) fn emits(&self) -> bool {
-        !matches!(self, Self::Search(_))
+    /// What is there already of a block's surface.
+    fn begun(&self, block: [i64; 3]) -> BlockSurface {
+        let mut surface = match self {
+            Self::Whole => BlockSurface::default(),
+            Self::Changed(changed, blocks) => {
+                let before = blocks.get(&block).and_then(|before| before.lock().ok()).map(|mut before| std::mem::take(&mut *before));
+                let mut before = before.unwrap_or_default();
+                before.drop_changed(changed);
+                before
+            }
+        };
+        surface.first_cube = block.map(|x| x * SIDE as i64);
+        surface
     }
 }
 
@@ -331,15 +356,16 @@ impl<'a> Pass<'a> {
         candidates: &Candidates,
         open: &[u32],
     ) -> Result<Option<BlockSurface>, DilationError> {
-        let first_cube = node.first_block.map(|block| block * SIDE as i64);
-        let surface = workshop.surface(self.setting, self.grading, self.task, first_cube, candidates, open);
+        let mut surface = self.task.begun(node.first_block);
+        let kept = surface.triangles.len();
+        workshop.complete(self.setting, self.grading, self.task, &mut surface, candidates, open);
         if workshop.is_exhausted() {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }
         if surface.triangles.is_empty() && surface.critical.is_empty() && surface.uncertain.is_empty() {
             return Ok(None);
         }
-        let made = surface.triangles.len() as u64;
+        let made = (surface.triangles.len() - kept) as u64;
         let total = self.triangles.fetch_add(made, Ordering::Relaxed) + made;
         let allowed = self.budget.limits.triangles;
         if total > allowed {

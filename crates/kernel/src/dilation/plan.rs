@@ -1,12 +1,13 @@
 //! Pitch, thresholds and bounds of a dilation.
 
-use super::assemble::{Assembly, Blocks};
-use super::block::{self, BlockSurface, WITNESS};
+use super::assemble::Assembly;
+use super::block::{self, WITNESS};
 use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Changed, Node, Pass, Task};
 use super::outside::MOST;
 use super::smooth::MOST_NOISE;
+use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
 use crate::attractor::Attractor;
@@ -18,7 +19,7 @@ use crate::solid::mend::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
 use crate::tolerance::Tolerance;
 use glam::DVec3;
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashSet};
 use std::sync::Mutex;
 
 /// Numbers that all blocks share, in mm or mm^2.
@@ -344,9 +345,10 @@ impl<'a> Plan<'a> {
         let mut grading = Grading::default();
         let mut made = self.surfaces(&setting, &space, &grading, Task::Whole, budget)?;
         let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
-        let (mut refined, mut affected, mut uncertain) = (0, BTreeSet::new(), BTreeSet::new());
+        let (mut refined, mut uncertain) = (0, BTreeSet::new());
         let mut critical = noted(&mut made, &mut uncertain);
-        let mut blocks: BTreeMap<[i64; 3], BlockSurface> = made.into_iter().map(|surface| (surface.first_cube, surface)).collect();
+        let mut blocks = Blocks::default();
+        add(&mut blocks, made);
         while !critical.is_empty() {
             let (mut finer, mut new) = (grading.clone(), Vec::new());
             critical.iter().for_each(|&cube| finer.subdivide(cube, &mut new));
@@ -355,13 +357,14 @@ impl<'a> Plan<'a> {
                 break;
             }
             grading = finer;
-            let changed = Changed::around(&new);
-            critical = noted(&mut self.surfaces(&setting, &space, &grading, Task::Search(&changed), budget)?, &mut uncertain);
-            affected.extend(changed.blocks);
+            let task = Task::Changed(&Changed::new(&new), &blocks);
+            let mut made = self.surfaces(&setting, &space, &grading, task, budget)?;
+            critical = noted(&mut made, &mut uncertain);
+            let total = add(&mut blocks, made);
+            if total > budget.limits.triangles {
+                return Err(DilationError::Triangles { tolerance_mm: self.aimed, made: total, allowed: budget.limits.triangles });
+            }
         }
-        affected.iter().for_each(|block| drop(blocks.remove(&block.map(|x| x * block::SIDE as i64))));
-        let remade = self.surfaces(&setting, &space, &grading, Task::Surface(&affected), budget)?;
-        blocks.extend(remade.into_iter().map(|surface| (surface.first_cube, surface)));
         let uncertain = uncertain.len() + critical.len();
         let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
         let uncertain = uncertain + dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
@@ -392,16 +395,19 @@ impl<'a> Plan<'a> {
         setting: &Setting,
         space: &Space,
         grading: &Grading,
-        made: BTreeMap<[i64; 3], BlockSurface>,
+        mut blocks: Blocks,
         budget: &Budget,
     ) -> Result<BlockSurface, DilationError> {
         let pass = self.pass(setting, grading, Task::Whole, budget, space.blocks);
-        let site_error = made.values().map(|surface| surface.site_error).fold(SiteError::default(), SiteError::max);
-        let leaves = made.values().map(|surface| surface.leaves).sum();
-        let block = |(cube, surface): ([i64; 3], BlockSurface)| (cube.map(|x| x / block::SIDE as i64), Mutex::new(surface));
-        let surfaces: Blocks = made.into_iter().map(block).collect();
+        let (mut site_error, mut leaves) = (SiteError::default(), 0);
+        for surface in blocks.values_mut().filter_map(|surface| surface.get_mut().ok()) {
+            site_error = site_error.max(surface.site_error);
+            leaves += surface.leaves;
+            // They are of no use any more.
+            (surface.names, surface.pieces) = (Vec::new(), Vec::new());
+        }
         let solids: Vec<u32> = (0..self.rule.attractor().solids().len() as u32).collect();
-        let assembly = Assembly { pass: &pass, blocks: &surfaces, idle: Mutex::new(Vec::new()) };
+        let assembly = Assembly { pass: &pass, blocks: &blocks, idle: Mutex::new(Vec::new()) };
         let root = assembly.node(Node { first_block: [0; 3], blocks: space.blocks }, &space.candidates, &solids)?.unwrap_or_default();
         Ok(BlockSurface { leaves, site_error: root.site_error.max(site_error), ..root })
     }
@@ -467,6 +473,12 @@ impl<'a> Plan<'a> {
             uncertain,
         })
     }
+}
+
+/// Adds surfaces to those of blocks, in the place of what was there; returns how many triangles there are.
+fn add(blocks: &mut Blocks, made: Vec<BlockSurface>) -> u64 {
+    blocks.extend(made.into_iter().map(|surface| (surface.first_cube.map(|x| x / block::SIDE as i64), Mutex::new(surface))));
+    blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum()
 }
 
 /// What blocks have noted: the cubes to subdivide, and those where no level tells it, which are added to `uncertain`.

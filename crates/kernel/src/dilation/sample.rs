@@ -11,11 +11,11 @@ use super::lattice::Grading;
 use super::octree::{Changed, Node, Pass, Task};
 use super::plan::Setting;
 use super::simplify::Simplifier;
+use super::surface::Blocks;
 use super::tree::Candidates;
 use crate::split_mix;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Nodes of a level that are followed: enough for an error of some ten per cent.
 const FOLLOWED: usize = 48;
@@ -127,20 +127,16 @@ impl Pass<'_> {
         let (candidates, open) = (&inherited.0, &inherited.1);
         let Some(mut surface) = self.block(node, candidates, open)? else { return Ok(Made::default()) };
         let (made, leaves) = (surface.triangles.len() as u64, surface.leaves);
-        let (mut grading, mut affected) = (Grading::default(), BTreeSet::new());
-        let mut critical = std::mem::take(&mut surface.critical);
+        let mut grading = Grading::default();
         loop {
             let mut new = Vec::new();
-            critical.into_iter().for_each(|cube| grading.subdivide(cube, &mut new));
+            std::mem::take(&mut surface.critical).into_iter().for_each(|cube| grading.subdivide(cube, &mut new));
             if new.is_empty() {
                 break;
             }
-            let changed = Changed::around(&new);
-            critical = self.graded(&grading, Task::Search(&changed)).block(node, candidates, open)?.unwrap_or_default().critical;
-            affected.extend(changed.blocks);
-        }
-        if !affected.is_empty() {
-            surface = self.graded(&grading, Task::Surface(&affected)).block(node, candidates, open)?.unwrap_or_default();
+            let blocks = Blocks::from([(node.first_block, Mutex::new(surface))]);
+            let task = Task::Changed(&Changed::new(&new), &blocks);
+            surface = self.graded(&grading, task).block(node, candidates, open)?.unwrap_or_default();
         }
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let core = self.core(node);

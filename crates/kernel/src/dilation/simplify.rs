@@ -13,9 +13,9 @@
 //! no other node's triangles are; the hull of the star holds all that moves. Positions are single-precision numbers from the start, so
 //! that what is checked is what is written.
 
-use super::block::BlockSurface;
 use super::certificate::{Nearby, Places};
 use super::plan::Setting;
+use super::surface::BlockSurface;
 use super::tree::{Candidates, Tree, in_space};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;

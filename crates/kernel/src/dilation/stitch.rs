@@ -1,6 +1,6 @@
 //! Joining block surfaces into one: vertices that several blocks made are found by their names, never by their position.
 
-use super::block::{BlockSurface, VertexName};
+use super::surface::{BlockSurface, VertexName};
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 

@@ -1,0 +1,126 @@
+//! The piece of surface in one block of the lattice, and how it follows a lattice that is refined: what belongs to leaves that are no more, or that have
+//! other neighbours now, is dropped, and made anew; all else stays.
+
+use super::lattice::Cube;
+use super::octree::Changed;
+use crate::attractor::cell::Point;
+use crate::attractor::sites::SiteError;
+use crate::split_mix::mix;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{BuildHasherDefault, Hasher};
+use std::sync::Mutex;
+
+/// The surface in one block, ready to be joined with its neighbours.
+#[derive(Debug, Default)]
+pub(super) struct BlockSurface {
+    /// Index of the block's first cube.
+    pub(super) first_cube: [i64; 3],
+    /// Vertices in mm.
+    pub(super) vertices: Vec<Point>,
+    /// Corners.
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Whether a vertex was tried by the simplification with all of its star; empty before.
+    pub(super) settled: Vec<bool>,
+    /// Names of vertices that other blocks may have too.
+    pub(super) shared: Vec<(VertexName, u32)>,
+    /// Names of all vertices, [`UNNAMED`] for those inside a tetrahedron; empty once the lattice is as fine as it will be.
+    pub(super) names: Vec<VertexName>,
+    /// The leaves whose tetrahedra have some of the surface, in the triangles' order, and the first triangle of each; empty with `names`.
+    pub(super) pieces: Vec<(Cube, u32)>,
+    /// Leaf cells met.
+    pub(super) leaves: u64,
+    /// Largest errors of leaves met.
+    pub(super) site_error: SiteError,
+    /// Cubes to subdivide: the distance may have a critical point on the wrong side there, or, among dense sites, what would be filled is not near a site.
+    pub(super) critical: Vec<Cube>,
+    /// Places where no level tells it.
+    pub(super) uncertain: Vec<Cube>,
+}
+
+/// Surfaces by the index of the block.
+pub(super) type Blocks = BTreeMap<[i64; 3], Mutex<BlockSurface>>;
+
+impl BlockSurface {
+    /// Drops the triangles of leaves whose tetrahedra are others now.
+    pub(super) fn drop_changed(&mut self, changed: &Changed) {
+        let mut kept = Vec::with_capacity(self.triangles.len());
+        let mut pieces = Vec::with_capacity(self.pieces.len());
+        let mut ends = self.pieces.iter().skip(1).map(|&(_, first)| first as usize).chain([self.triangles.len()]);
+        for &(leaf, first) in &self.pieces {
+            let end = ends.next().unwrap_or(self.triangles.len());
+            if !changed.is_new(leaf) {
+                pieces.push((leaf, kept.len() as u32));
+                kept.extend_from_slice(&self.triangles[first as usize..end]);
+            }
+        }
+        (self.triangles, self.pieces) = (kept, pieces);
+        self.drop_unused();
+    }
+
+    /// Drops the vertices that no triangle has; the others are numbered as triangles meet them.
+    pub(super) fn drop_unused(&mut self) {
+        let mut numbers = vec![NONE; self.vertices.len()];
+        let mut used = Vec::with_capacity(self.vertices.len());
+        for corner in self.triangles.iter_mut().flatten() {
+            let number = &mut numbers[*corner as usize];
+            if *number == NONE {
+                *number = used.len() as u32;
+                used.push(*corner as usize);
+            }
+            *corner = *number;
+        }
+        self.vertices = used.iter().map(|&old| self.vertices[old]).collect();
+        if !self.names.is_empty() {
+            self.names = used.iter().map(|&old| self.names[old]).collect();
+        }
+        self.shared.iter_mut().for_each(|(_, number)| *number = numbers[*number as usize]);
+        self.shared.retain(|&(_, number)| number != NONE);
+    }
+}
+
+/// No vertex.
+const NONE: u32 = u32::MAX;
+
+/// What a vertex on an edge or a face of the lattice is called by every tetrahedron there.
+pub(super) type VertexName = u128;
+
+/// What vertices inside a tetrahedron are called, which no other has.
+pub(super) const UNNAMED: VertexName = 0;
+
+/// Mixes names, and coordinates of vertices and cubes, which nobody can choose to collide.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NameHasher(u64);
+
+/// A hash map by names or coordinates.
+pub(super) type NameMap<K, V> = HashMap<K, V, BuildHasherDefault<NameHasher>>;
+
+impl Hasher for NameHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+    fn write(&mut self, bytes: &[u8]) {
+        for part in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..part.len()].copy_from_slice(part);
+            self.write_u64(u64::from_le_bytes(word));
+        }
+    }
+    fn write_u128(&mut self, name: u128) {
+        self.0 = mix(self.0 ^ name as u64 ^ mix((name >> 64) as u64));
+    }
+    fn write_u64(&mut self, part: u64) {
+        self.0 = mix(self.0.rotate_left(21) ^ part);
+    }
+    fn write_i64(&mut self, part: i64) {
+        self.write_u64(part as u64);
+    }
+    fn write_u32(&mut self, part: u32) {
+        self.write_u64(u64::from(part));
+    }
+    fn write_i32(&mut self, part: i32) {
+        self.write_u64(u64::from(part as u32));
+    }
+    fn write_usize(&mut self, length: usize) {
+        self.write_u64(length as u64);
+    }
+}
