@@ -9,6 +9,7 @@ use super::block::{Frame, Nearby, place};
 use super::certificate::highest;
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
+use super::parting::parting;
 use super::plan::Setting;
 use super::smooth;
 use super::surface::BlockSurface;
@@ -18,8 +19,8 @@ use crate::measure::triangle::{Feature, closest_feature};
 
 /// Boxes that the search in a tetrahedron may look at.
 const MOST_WORK: usize = 4000;
-/// Steps of the searches for a plane.
-const STEPS: usize = 6;
+/// Boxes are halved down to so many binary places below a cube's edge: where no critical point is they are settled long before, and a finer lattice costs far more than a smaller box.
+const SMALLEST: u32 = 12;
 /// Boxes are halved along axes across which distances hardly vary, too, when they are so many times as long.
 const LEAST_SLOPE: f64 = 0.15;
 
@@ -151,7 +152,7 @@ impl Critical {
     fn refine(&mut self, setting: &Setting, tree: &Tree<'_>, frame: &Frame, nearby: &[Nearby], surface: &mut BlockSurface) {
         let low: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
         let high: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
-        let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + 5));
+        let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + SMALLEST));
         let mut open = std::mem::take(&mut self.open);
         open.clear();
         self.active.clear();
@@ -303,49 +304,87 @@ fn add_closest(site: &Site, positions: &[Point; 4], closest: &mut Vec<Point>) {
 /// Whether a point is surely farther than `distance` from the convex hull of others.
 fn is_farther(x: &Point, others: &[Point], distance: f64) -> bool {
     let Some(first) = others.first() else { return true };
-    // The shortest vector found so far from the hull to x.
-    let mut shortest = subtract(x, first);
-    for _ in 0..STEPS {
-        let square = dot(&shortest, &shortest);
-        if square <= distance * distance {
-            return false;
-        }
-        let along = |point: &&Point| dot(&shortest, point);
-        let Some(farthest) = others.iter().max_by(|a, b| along(a).total_cmp(&along(b))) else { return true };
-        let support = subtract(x, farthest);
-        let product = dot(&shortest, &support);
-        if product > 0.0 && product * product > distance * distance * square {
-            return true;
-        }
-        let step = subtract(&support, &shortest);
-        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
-    }
-    false
+    let lowest = |direction: &Point| subtract(x, farthest(others, direction).unwrap_or(first));
+    parting(subtract(x, first), distance, lowest, |direction, lowest| is_above(direction, lowest, distance)).is_some()
 }
 
-/// Whether a plane was found that parts two sets of points: Gilbert's search for the shortest difference (1966). When it gives up, there may be one yet.
+/// Whether a plane surely parts two sets of points.
 fn are_parted(points: &[Point], others: &[Point]) -> bool {
-    let mean = |points: &[Point]| -> Point {
-        std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / points.len().max(1) as f64)
+    let (Some(point), Some(other)) = (points.first(), others.first()) else { return true };
+    let lowest = |direction: &Point| {
+        let backwards = direction.map(|part| -part);
+        subtract(farthest(points, &backwards).unwrap_or(point), farthest(others, direction).unwrap_or(other))
     };
-    let mut shortest = subtract(&mean(points), &mean(others));
-    for _ in 0..STEPS {
-        let along = |point: &&Point| dot(&shortest, point);
-        let first = points.iter().min_by(|a, b| along(a).total_cmp(&along(b)));
-        let second = others.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
-        let (Some(first), Some(second)) = (first, second) else { return true };
-        let support = subtract(first, second);
-        let square = dot(&shortest, &shortest);
-        if dot(&shortest, &support) > 1e-9 * square {
-            return true;
+    parting(subtract(point, other), 0.0, lowest, |direction, lowest| is_above(direction, lowest, 0.0)).is_some()
+}
+
+/// Whether a point is surely higher than `distance` along a direction.
+fn is_above(direction: &Point, point: &Point, distance: f64) -> bool {
+    let square = dot(direction, direction);
+    dot(direction, point) > (distance * square.sqrt()).max(1e-9 * square)
+}
+
+/// The point that is farthest along a direction.
+fn farthest<'a>(points: &'a [Point], direction: &Point) -> Option<&'a Point> {
+    points.iter().max_by(|a, b| dot(direction, a).total_cmp(&dot(direction, b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::split_mix;
+
+    /// The distance of the origin from the hull of points: from the nearest of their triangles, unless it is in one of their tetrahedra.
+    fn distance_from_hull(points: &[Point]) -> f64 {
+        let count = points.len();
+        let mut least = f64::INFINITY;
+        for i in 0..count {
+            for j in i..count {
+                for k in j..count {
+                    let (a, b, c) = (points[i], points[j], points[k]);
+                    let nearest = closest_feature(&[0.0; 3], &a, &b, &c).0;
+                    least = least.min(dot(&nearest, &nearest).sqrt());
+                    for d in &points[k..] {
+                        let volume =
+                            |p: &Point, q: &Point, r: &Point, s: &Point| dot(&subtract(q, p), &cross(&subtract(r, p), &subtract(s, p)));
+                        let all = volume(&a, &b, &c, d);
+                        let zero = [0.0; 3];
+                        let parts =
+                            [volume(&zero, &b, &c, d), volume(&a, &zero, &c, d), volume(&a, &b, &zero, d), volume(&a, &b, &c, &zero)];
+                        if all.abs() > 1e-12 && parts.iter().all(|part| part * all > 0.0) {
+                            return 0.0;
+                        }
+                    }
+                }
+            }
         }
-        let step = subtract(&support, &shortest);
-        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
-        if dot(&shortest, &shortest) <= 1e-18 * dot(&support, &support) {
-            return false;
-        }
+        least
     }
-    false
+
+    #[test]
+    fn hulls_are_apart_where_all_their_simplices_are() {
+        let mut seed = 11_u64;
+        let mut next = || {
+            seed = seed.wrapping_add(split_mix::STEP);
+            (split_mix::number(seed) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        let (mut apart, mut missed) = (0, 0);
+        for round in 0..20_000_u32 {
+            let count = 1 + round as usize % 7;
+            // About the origin or beside it, as a cloud, nearly in a plane, or nearly on a line.
+            let (flat, thin) = ([1.0, 1e-3][round as usize / 7 % 2], [1.0, 1e-2][round as usize / 14 % 2]);
+            let offset = 1.2 * next();
+            let points: Vec<Point> = (0..count).map(|_| [next() + offset, thin * next() + 0.3 * offset, flat * next()]).collect();
+            let (true_distance, distance) = (distance_from_hull(&points), 0.4 * next().abs());
+            let found = is_farther(&[0.0; 3], &points, distance);
+            assert!(!found || true_distance > distance * (1.0 - 1e-9), "{points:?}: {true_distance} {distance}");
+            let parted = are_parted(&[[0.0; 3]], &points);
+            assert!(!parted || true_distance > 0.0, "{points:?}: {true_distance}");
+            if true_distance > 1.001 * distance + 1e-6 {
+                apart += 1;
+                missed += usize::from(!found) + usize::from(!parted);
+            }
+        }
+        assert!(apart > 5_000 && missed * 1_000 < apart, "{missed} of {apart}");
+    }
 }

@@ -26,6 +26,7 @@ mod error;
 mod lattice;
 mod octree;
 mod outside;
+mod parting;
 mod plan;
 mod sample;
 mod simplify;

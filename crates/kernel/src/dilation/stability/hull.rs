@@ -1,37 +1,29 @@
 //! Convex hulls of closest points: whether one stays clear of a ball, and its smallest enclosing ball.
 
+use super::super::parting::parting;
 use super::cells::Near;
 use crate::attractor::cell::{Point, distance_squared, dot, subtract};
 
-/// Steps of the search for a plane.
-const STEPS: usize = 64;
 /// Points that are exchanged in the search for a ball.
 const EXCHANGES: usize = 40;
 
 /// A unit vector n with n.(y - a) > 0 for all y within h of x and all a within `wander` of the closest points: then no y is in the hull of
-/// its closest points. Gilbert's search for the point of the hull closest to x (1966); when it gives up there may be a vector yet.
+/// its closest points. When it is not found there may be a vector yet.
 pub(super) fn separation(x: &Point, near: &[Near], h: f64) -> Option<Point> {
-    let mut shortest = subtract(x, &near.first()?.closest);
-    for _ in 0..STEPS {
-        let length = dot(&shortest, &shortest).sqrt();
-        if length <= h {
-            return None;
-        }
-        let ahead = |near: &Near| dot(&shortest, &subtract(x, &near.closest));
-        let margin = near.iter().map(|near| ahead(near) - near.wander * length).fold(f64::INFINITY, f64::min);
-        if margin > h * length * (1.0 + 1e-9) {
-            return Some(shortest.map(|x| x / length));
-        }
-        let support = near.iter().min_by(|a, b| ahead(a).total_cmp(&ahead(b)))?;
-        let support = subtract(x, &support.closest);
-        let step = subtract(&support, &shortest);
-        let share = (-dot(&shortest, &step) / dot(&step, &step).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        if share == 0.0 {
-            return None;
-        }
-        shortest = std::array::from_fn(|axis| shortest[axis] + share * step[axis]);
-    }
-    None
+    let first = subtract(x, &near.first()?.closest);
+    let ahead = |direction: &Point, near: &Near| dot(direction, &subtract(x, &near.closest));
+    let lowest = |direction: &Point| {
+        let lowest = near.iter().min_by(|a, b| ahead(direction, a).total_cmp(&ahead(direction, b)));
+        lowest.map_or(first, |near| subtract(x, &near.closest))
+    };
+    let parts = |direction: &Point, _: &Point| {
+        let length = dot(direction, direction).sqrt();
+        let margin = near.iter().map(|near| ahead(direction, near) - near.wander * length).fold(f64::INFINITY, f64::min);
+        margin > h * length * (1.0 + 1e-9)
+    };
+    let shortest = parting(first, h, lowest, parts)?;
+    let length = dot(&shortest, &shortest).sqrt();
+    Some(shortest.map(|x| x / length))
 }
 
 /// Points whose simplices are all looked at, at most.
