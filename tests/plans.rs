@@ -170,16 +170,50 @@ fn what_a_plan_offers_passes() {
 }
 
 #[test]
+fn the_command_line_refuses_what_a_plan_says_is_beyond_the_limits() {
+    let scratch = Scratch::new();
+    refused_and_mended(&scratch, beyond(), true);
+    // Limits that are given as options count as those in the document.
+    let circle = cases::named("curves/circle").model();
+    let options = ["--tolerance", "0.002", "--radius", "1", "--limit-triangles", "300000", "-o"];
+    let all = ["solidify".as_ref(), circle.as_os_str()].into_iter().chain(options.iter().map(std::ffi::OsStr::new));
+    let file = scratch.join("refused.stl");
+    let ended = run(all.chain([file.as_os_str()]));
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert!(ended.status.code() == Some(4) && said.contains("[plan-exceeds-limit]") && !file.exists(), "{said}");
+}
+
+#[test]
 fn the_command_line_names_what_passes_when_a_limit_ends_the_work() {
     let scratch = Scratch::new();
+    // What a plan is not certain of.
+    let narrowly = |kind: &str, model: &str, tolerance: f64, limit: &str, counted: &str| {
+        let mut params = json!({ "tolerance_mm": tolerance });
+        if kind == "solidify" {
+            params["radius_mm"] = json!(0.5);
+        }
+        let (mut job, name) = limited(kind, model, &params, &json!({}), "tolerance_mm");
+        let asked = planned(&scratch, &job)[counted].as_f64().unwrap();
+        job["limits"] = json!({ limit: (asked / 1.5) as u64 });
+        (job, name)
+    };
+    let jobs = vec![
+        narrowly("solidify", "curves/circle", 0.002, "triangles", "counted_triangles"),
+        narrowly("evaluate", "nurbs/torus", 0.005, "cells", "leaf_cells"),
+    ];
+    refused_and_mended(&scratch, jobs, false);
+}
+
+/// Runs jobs that exceed a limit, by their plan or by what the work finds, and then each with what the command line offers.
+fn refused_and_mended(scratch: &Scratch, jobs: Vec<(Value, &'static str)>, by_plan: bool) {
     let file = scratch.join("job.json");
-    // Memory is held by the operating system to what the service allows, and by nobody here.
-    for (job, name) in beyond().into_iter().filter(|(job, _)| job["limits"].get("memory_bytes").is_none()) {
+    for (number, (job, name)) in jobs.into_iter().enumerate() {
         std::fs::write(&file, job.to_string()).unwrap();
-        let made = scratch.join("made");
+        let made = scratch.join(&format!("made-{number}"));
         let ended = run(["run".as_ref(), file.as_os_str(), "-o".as_ref(), made.as_os_str(), "--quiet".as_ref()]);
         let said = String::from_utf8(ended.stderr).unwrap();
         assert_eq!(ended.status.code(), Some(4), "{said}");
+        assert_eq!((said.contains("[plan-exceeds-limit]"), std::fs::read_dir(&made).unwrap().count()), (by_plan, 0), "{said}");
         let offer = format!("this would pass: {name} = ");
         let value: f64 =
             said.lines().find_map(|line| line.trim().strip_prefix(&offer)).unwrap_or_else(|| panic!("{said}")).parse().unwrap();
