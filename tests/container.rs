@@ -112,7 +112,6 @@ fn closed(name: &str, more: &[&str]) {
     said("security_opt: [\"no-new-privileges:true\"]");
     said("dockerfile: docker/Dockerfile");
     assert!(!text.contains('\t'), "YAML has no tabs");
-    assert!(!text.contains("uid="), "Podman refuses a volume in memory with an owner");
     for line in text.lines().filter(|line| !line.trim().is_empty()) {
         let spaces = line.len() - line.trim_start().len();
         assert_eq!(spaces % 2, 0, "odd indentation: {line:?}");
