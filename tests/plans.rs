@@ -50,7 +50,58 @@ fn triangles_and_bytes_are_within_a_factor_of_two() {
         let (name, output) = (&job["model"]["name"], &done["outputs"][0]);
         near(&plan["triangles"], &done["certificate"]["triangles"], &format!("triangles of {name}, {}", job["params"]));
         near(&plan["output_bytes"], &output["bytes"], &format!("bytes of {name}, {}", job["params"]));
+        assert!(plan["cpu_seconds"].as_f64().unwrap() > 0.0, "{plan}");
+        // A boolean may leave features as thin as it likes.
+        let thin = (plan["smallest_feature_mm"].as_f64(), done["certificate"]["thickness_min_mm"].as_f64());
+        match (job["kind"] == "solidify", thin) {
+            (true, (Some(promised), Some(proven))) => assert!(0.0 < promised && promised <= proven * (1.0 + 1e-9), "{thin:?}"),
+            (dilated, thin) => assert!(!dilated && thin.0.is_none(), "{name}: {thin:?}"),
+        }
     }
+}
+
+fn planned(scratch: &Scratch, job: &Value) -> Value {
+    let file = scratch.join("planned.json");
+    std::fs::write(&file, job.to_string()).unwrap();
+    serde_json::from_slice(&succeed(["plan".as_ref(), file.as_os_str()])).unwrap()
+}
+
+#[test]
+fn seconds_follow_the_work_and_are_left_out_where_they_are_not_known() {
+    let scratch = Scratch::new();
+    let seconds = |job: &Value| planned(&scratch, job)["cpu_seconds"].as_f64();
+    let of = |tolerance: f64| seconds(&order("curves/circle", tolerance, 0.5)).unwrap();
+    // The number of triangles goes with the inverse of the tolerance.
+    assert!(of(0.01) > 1.5 * of(0.02), "{} and {}", of(0.01), of(0.02));
+    let mut job = order("curves/circle", 0.02, 0.5);
+    let bare = seconds(&job).unwrap();
+    job["params"]["simplify"] = json!(true);
+    assert!(seconds(&job).unwrap() > bare);
+    for (name, value) in [("stability", json!(true)), ("closing_mm", json!(0.2))] {
+        let mut job = job.clone();
+        job["params"][name] = value;
+        assert_eq!(seconds(&job), None, "{name}");
+    }
+    let model = json!({ "shape": { "family": "mesh", "interior": "surface", "vertices": [[0, 0, 0], [9, 0, 0], [0, 9, 0]], "faces": [[0, 1, 2]] } });
+    let measure = json!({ "lacuna": 1, "kind": "measure", "model": model, "params": { "tolerance_mm": 0.1 } });
+    assert_eq!(seconds(&measure), None);
+}
+
+#[test]
+fn the_smallest_feature_is_proven_before_the_work() {
+    let scratch = Scratch::new();
+    let smallest = |job: &Value| planned(&scratch, job)["smallest_feature_mm"].as_f64();
+    assert_eq!(smallest(&order("curves/circle", 0.02, 0.5)), Some(2.0 * (0.5 - 0.02)));
+    // A tolerance beyond half the radius is taken for that.
+    assert_eq!(smallest(&order("curves/circle", 2.0, 0.5)), Some(0.5));
+    let segment = |x: f64, radius: f64| json!({ "radius_mm": radius, "shape": { "family": "mesh", "vertices": [[x, 0, 0], [x, 9, 0]], "faces": [[0, 1]] } });
+    let mut job = order("curves/circle", 0.05, 1.0);
+    job["model"] = json!({ "lacuna": 1, "shape": { "family": "group", "parts": [segment(0.0, 2.0), segment(5.0, 0.6)] } });
+    let least = smallest(&job).unwrap();
+    // Of the thinner of the two.
+    assert!((2.0 * (0.6 - 0.05)..2.0 * 0.6).contains(&least), "{least}");
+    job["params"]["closing_mm"] = json!(0.2);
+    assert_eq!(smallest(&job), None);
 }
 
 #[test]
@@ -119,16 +170,50 @@ fn what_a_plan_offers_passes() {
 }
 
 #[test]
+fn the_command_line_refuses_what_a_plan_says_is_beyond_the_limits() {
+    let scratch = Scratch::new();
+    refused_and_mended(&scratch, beyond(), true);
+    // Limits that are given as options count as those in the document.
+    let circle = cases::named("curves/circle").model();
+    let options = ["--tolerance", "0.002", "--radius", "1", "--limit-triangles", "300000", "-o"];
+    let all = ["solidify".as_ref(), circle.as_os_str()].into_iter().chain(options.iter().map(std::ffi::OsStr::new));
+    let file = scratch.join("refused.stl");
+    let ended = run(all.chain([file.as_os_str()]));
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert!(ended.status.code() == Some(4) && said.contains("[plan-exceeds-limit]") && !file.exists(), "{said}");
+}
+
+#[test]
 fn the_command_line_names_what_passes_when_a_limit_ends_the_work() {
     let scratch = Scratch::new();
+    // What a plan is not certain of.
+    let narrowly = |kind: &str, model: &str, tolerance: f64, limit: &str, counted: &str| {
+        let mut params = json!({ "tolerance_mm": tolerance });
+        if kind == "solidify" {
+            params["radius_mm"] = json!(0.5);
+        }
+        let (mut job, name) = limited(kind, model, &params, &json!({}), "tolerance_mm");
+        let asked = planned(&scratch, &job)[counted].as_f64().unwrap();
+        job["limits"] = json!({ limit: (asked / 1.5) as u64 });
+        (job, name)
+    };
+    let jobs = vec![
+        narrowly("solidify", "curves/circle", 0.002, "triangles", "counted_triangles"),
+        narrowly("evaluate", "nurbs/torus", 0.005, "cells", "leaf_cells"),
+    ];
+    refused_and_mended(&scratch, jobs, false);
+}
+
+/// Runs jobs that exceed a limit, by their plan or by what the work finds, and then each with what the command line offers.
+fn refused_and_mended(scratch: &Scratch, jobs: Vec<(Value, &'static str)>, by_plan: bool) {
     let file = scratch.join("job.json");
-    // Memory is held by the operating system to what the service allows, and by nobody here.
-    for (job, name) in beyond().into_iter().filter(|(job, _)| job["limits"].get("memory_bytes").is_none()) {
+    for (number, (job, name)) in jobs.into_iter().enumerate() {
         std::fs::write(&file, job.to_string()).unwrap();
-        let made = scratch.join("made");
+        let made = scratch.join(&format!("made-{number}"));
         let ended = run(["run".as_ref(), file.as_os_str(), "-o".as_ref(), made.as_os_str(), "--quiet".as_ref()]);
         let said = String::from_utf8(ended.stderr).unwrap();
         assert_eq!(ended.status.code(), Some(4), "{said}");
+        assert_eq!((said.contains("[plan-exceeds-limit]"), std::fs::read_dir(&made).unwrap().count()), (by_plan, 0), "{said}");
         let offer = format!("this would pass: {name} = ");
         let value: f64 =
             said.lines().find_map(|line| line.trim().strip_prefix(&offer)).unwrap_or_else(|| panic!("{said}")).parse().unwrap();

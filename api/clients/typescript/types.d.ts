@@ -879,11 +879,13 @@ export interface PlaceStatement {
 /** What a job is predicted to cost. */
 export interface Plan {
   /** Triangles against which the limit of triangles is held: those of the lattices as they are first made. */ counted_triangles?: number;
+  /** Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan takes as long for, are not in it. `null` where they are not predicted: comparisons, sections, and what is searched for besides (`stability`, `thickness`, `oriented_box`, the other surface of a wall, the closing of gaps). */ cpu_seconds?: number | null;
   exceeds?: Excess | null;
   /** Edge of the lattice's cubes. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
   /** Peak memory of the process that does the job, in bytes. 0 where nothing is predicted. */ memory_bytes: number;
   /** Bytes of a binary STL file with so many `triangles`. */ output_bytes: number;
+  /** The result is nowhere thinner than this, in mm: of a dilation 2 (r - tolerance) with the least radius r, and never less than r; of a wall its thickness less the tolerance. The certificate's `thickness_min_mm` is this or more. `null` where nothing is proven before the work: meshes as they are, booleans, levels, closed gaps. */ smallest_feature_mm?: number | null;
   /** Triangles of the result without simplification, which leaves a tenth to a hundredth of them. Of an operation on solids: those of its result. */ triangles: number;
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use lacuna_exchange::format::{self, Format, ReadLimits};
 use lacuna_fabrication::{
-    Certificate, CutPlane, Input, Job, JobKind, Operation, Outcome, Params, Planes, Split, SplitKey, WallOrder, WallSide,
+    Certificate, CutPlane, Input, Job, JobKind, Operation, Outcome, Params, Plan, Planes, Split, SplitKey, WallOrder, WallSide,
 };
 use lacuna_kernel::budget::{Budget, CancelToken, Limits};
 use lacuna_kernel::model::{Model, PolygonMesh, Shape};
@@ -351,7 +351,23 @@ fn watched<T>(
     stop::on_signals(&budget.cancel)?;
     let _watchdog =
         Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
-    work(&budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
+    refuse_by_plan(job, &budget).and_then(|()| work(&budget)).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
+}
+
+/// Refuses, as a service does, what exceeds a limit for certain, before the work begins.
+///
+/// A plan takes 0.65 of the seconds of its job in the median of the fixtures that take 20 ms or more, 0.03 to 0.45 of those that take more than a second. So it is made only where somebody has set a
+/// limit below the usual one, which is there to be met soon. The usual ones are so far away that most jobs would pay for nothing; whoever meets one is told what would pass when the work ends.
+fn refuse_by_plan(job: &Job, budget: &Budget) -> Result<(), Problem> {
+    let (asked, usual) = (&job.limits, Limits::default());
+    if asked.triangles >= usual.triangles && asked.memory_bytes >= usual.memory_bytes && asked.cells >= usual.cells {
+        return Ok(());
+    }
+    match production::plan(job, &Budget { progress: None, ..budget.clone() }) {
+        Ok(Plan { exceeds: Some(excess), .. }) => Err(excess.into()),
+        // What else is wrong the work says in its place.
+        Ok(_) | Err(_) => Ok(()),
+    }
 }
 
 /// Sets the number of threads of this process's computations.

@@ -9,7 +9,7 @@ use lacuna_kernel::tolerance::Tolerance;
 
 use crate::plan::{Plan, stl_bytes};
 use crate::run::{Geometry, JobError, Outcome, not_carried};
-use crate::{Job, certificate};
+use crate::{Job, certificate, effort};
 
 /// The polygons of a job whose one input is nothing but polygons: everything else is evaluated.
 pub(crate) fn polygons(job: &Job) -> Option<&PolygonMesh> {
@@ -63,5 +63,6 @@ pub(crate) fn plan(mesh: &PolygonMesh) -> Plan {
     let (count, vertices) = (triangles(mesh) as f64, mesh.vertices.len() as f64);
     // Coordinates twice, triangles, and the edges that are counted.
     let memory_bytes = 48.0 * vertices + 36.0 * count;
-    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: stl_bytes(count), ..Plan::default() }
+    let cpu_seconds = Some(effort::of_conversion(count));
+    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: stl_bytes(count), cpu_seconds, ..Plan::default() }
 }

@@ -8,7 +8,7 @@ use lacuna_kernel::model::{Ifs, Shape};
 
 use crate::plan::{Plan, stl_bytes};
 use crate::run::{JobError, Outcome, lower};
-use crate::{Geometry, Job, certificate};
+use crate::{Geometry, Job, certificate, effort};
 
 /// What was copied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,5 +83,6 @@ pub(crate) fn plan(job: &Job, level: u32, budget: &Budget) -> Result<Plan, JobEr
     let bounds = bounding_box(&lower(job, budget)?.attractor, budget)?;
     let predicted = predict(ifs, &bounds, level, budget)?;
     let (triangles, memory_bytes) = (predicted.triangles, predicted.memory_bytes);
-    Ok(Plan { triangles, counted_triangles: triangles, memory_bytes, output_bytes: stl_bytes(triangles), ..Plan::default() })
+    let cpu_seconds = Some(effort::of_level(triangles));
+    Ok(Plan { triangles, counted_triangles: triangles, memory_bytes, output_bytes: stl_bytes(triangles), cpu_seconds, ..Plan::default() })
 }

@@ -4,6 +4,7 @@ mod boolean;
 pub mod certificate;
 mod contact;
 mod convert;
+mod effort;
 pub mod job;
 pub mod level;
 mod operand;

@@ -13,11 +13,11 @@ use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use std::f64::consts::PI;
 
-use crate::Job;
 use crate::certificate::OperandStatement;
 use crate::job::Input;
 use crate::plan::{Plan, held_bytes, stl_bytes};
 use crate::run::{JobError, lower_all, not_carried, wrong_inputs};
+use crate::{Job, effort};
 
 /// An input as a solid.
 pub(crate) struct Operand {
@@ -211,18 +211,22 @@ pub(crate) fn rounded(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, JobErr
 /// Predicts the cost of making solids of the inputs.
 pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
     let share = share(sources, tolerance)?;
-    let mut plan = Plan::default();
+    let (mut plan, mut seconds) = (Plan::default(), 0.0);
     for source in sources {
         if source.radius_mm > 0.0 {
             let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, true, budget)?;
             plan.triangles += prediction.triangles;
             plan.counted_triangles += prediction.counted_triangles;
+            seconds += effort::of_dilated_operand(&prediction);
             // One is made after the other.
             plan.memory_bytes = plan.memory_bytes.max(held_bytes(&prediction, true));
         } else {
-            plan.triangles += source.attractor.roots().len() as f64;
+            let triangles = source.attractor.roots().len() as f64;
+            plan.triangles += triangles;
+            seconds += effort::of_operand(triangles);
         }
     }
     plan.output_bytes = stl_bytes(plan.triangles);
+    plan.cpu_seconds = Some(seconds);
     Ok(plan)
 }

@@ -1,5 +1,6 @@
 //! What a job costs, before it is done: from the automaton and a sample of the lattice. A plan that exceeds the limits for certain says so, with what would pass.
 
+use crate::effort;
 use crate::repair::repaired;
 use crate::run::{JobError, lower, radius, split_of};
 use crate::{Job, JobKind, Operation, boolean, convert, level, slice, split};
@@ -28,6 +29,13 @@ pub struct Plan {
     pub output_bytes: f64,
     /// Edge of the lattice's cubes.
     pub lattice_pitch_mm: Option<f64>,
+    /// Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan
+    /// takes as long for, are not in it. `null` where they are not predicted: comparisons, sections, and what is searched for besides (`stability`, `thickness`, `oriented_box`, the other surface of
+    /// a wall, the closing of gaps).
+    pub cpu_seconds: Option<f64>,
+    /// The result is nowhere thinner than this, in mm: of a dilation 2 (r - tolerance) with the least radius r, and never less than r; of a wall its thickness less the tolerance. The certificate's
+    /// `thickness_min_mm` is this or more. `null` where nothing is proven before the work: meshes as they are, booleans, levels, closed gaps.
+    pub smallest_feature_mm: Option<f64>,
     /// The limit of the job that it exceeds for certain: estimates are within a factor of 2, so one that is more than twice the limit. A service refuses such a job.
     #[cfg_attr(feature = "wire", serde(default, skip_serializing_if = "Option::is_none"))]
     pub exceeds: Option<Excess>,
@@ -193,7 +201,9 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         let counted = if matches!(job.kind, JobKind::Evaluate | JobKind::Convert) { leaf_cells } else { 0.0 };
         let joined = (0..attractor.roots().len()).any(|root| attractor.has_brep(root));
         let memory_bytes = counted * if joined { BYTES_PER_FACE } else { BYTES_PER_CELL };
-        return Ok(Plan { leaf_cells, memory_bytes, ..Plan::default() });
+        let evaluated = matches!(job.kind, JobKind::Evaluate | JobKind::Convert);
+        let cpu_seconds = evaluated.then(|| effort::of_cells(leaf_cells, joined));
+        return Ok(Plan { leaf_cells, memory_bytes, cpu_seconds, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
     let simplify = job.kind == JobKind::Solidify && job.params.simplify;
@@ -205,8 +215,20 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         memory_bytes: held_bytes(&prediction, simplify),
         output_bytes: stl_bytes(prediction.triangles),
         lattice_pitch_mm: Some(prediction.pitch_mm),
+        cpu_seconds: (!searches_more(job)).then(|| effort::of_dilation(&prediction, simplify)),
+        smallest_feature_mm: match job.params.wall {
+            // The wall's bounds are those of a dilation by its thickness.
+            Some(wall) => Some(wall.thickness_mm - tolerance.mm().min(0.5 * wall.thickness_mm)),
+            None => job.params.closing_mm.is_none().then_some(prediction.least_thickness_mm),
+        },
         exceeds: None,
     })
+}
+
+/// Whether a job with a ball does more than to dilate: searches, which take as long as they take, and surfaces after the first.
+fn searches_more(job: &Job) -> bool {
+    let params = &job.params;
+    params.stability || params.thickness || params.oriented_box || params.wall.is_some() || params.closing_mm.is_some()
 }
 
 /// Leaf cells that a prediction visits at most.

@@ -121,5 +121,6 @@ fn offsets(planes: &Planes, solid: &Solid, frame: &PlaneFrame) -> Result<Vec<f64
 pub(crate) fn plan(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Plan, JobError> {
     planes(job)?;
     let source = Source::only(job, budget)?;
-    crate::operand::predicted(std::slice::from_ref(&source), tolerance, budget)
+    // How many planes there are, and what they meet, shows on the solid.
+    Ok(Plan { cpu_seconds: None, ..crate::operand::predicted(std::slice::from_ref(&source), tolerance, budget)? })
 }

@@ -634,11 +634,13 @@ PlaceStatement = TypedDict('PlaceStatement', {
 
 Plan = TypedDict('Plan', {
     'counted_triangles': 'NotRequired[float]',
+    'cpu_seconds': 'NotRequired[float | None]',
     'exceeds': 'NotRequired[Excess | None]',
     'lattice_pitch_mm': 'NotRequired[float | None]',
     'leaf_cells': 'float',
     'memory_bytes': 'float',
     'output_bytes': 'float',
+    'smallest_feature_mm': 'NotRequired[float | None]',
     'triangles': 'float',
 })
 

@@ -14,6 +14,7 @@ use std::time::Duration;
 use tokio::runtime::Handle;
 use tokio::sync::Notify;
 use tokio_postgres::error::SqlState;
+use tokio_postgres::types::{ToSql, Type};
 
 use super::desk::{DeskLimits, Gauges, JobFilter};
 use super::live::LiveJob;
@@ -129,7 +130,7 @@ impl Shared {
 
     async fn known_answer(&self, record: &JobRecord) -> Result<Option<Answer>, Failure> {
         let client = self.pool.get().await?;
-        let row = client.query_opt("SELECT answer FROM lacuna_answers WHERE work = $1", &[&record.work.hex()]).await?;
+        let row = client.query_typed_opt("SELECT answer FROM lacuna_answers WHERE work = $1", &[(&record.work.hex(), Type::TEXT)]).await?;
         client.done();
         Ok(row.map(|row| serde_json::from_str(row.get(0))).transpose()?)
     }
@@ -138,10 +139,12 @@ impl Shared {
         let mut client = self.pool.get().await?;
         let transaction = client.transaction().await?;
         // One submission of an owner at a time: keys are used once, and shares are counted exactly.
-        transaction.execute("SELECT pg_advisory_xact_lock(hashtextextended('lacuna owner ' || $1, 0))", &[&record.owner]).await?;
+        let lock = "SELECT pg_advisory_xact_lock(hashtextextended('lacuna owner ' || $1, 0))::text";
+        transaction.query_typed(lock, &[(&record.owner, Type::TEXT)]).await?;
         if let Some(used) = &record.idempotency {
             let question = format!("SELECT {} FROM lacuna_jobs WHERE owner = $1 AND idempotency_key = $2", rows::COLUMNS);
-            if let Some(row) = transaction.query_opt(&question, &[&record.owner, &used.key.hex()]).await? {
+            if let Some(row) = transaction.query_typed_opt(&question, &[(&record.owner, Type::TEXT), (&used.key.hex(), Type::TEXT)]).await?
+            {
                 let (first, revision) = rows::read(&row)?;
                 if first.idempotency.as_ref().map(|first| first.body) != Some(used.body) {
                     return Err(refusal::key_used_otherwise().into());
@@ -153,13 +156,13 @@ impl Shared {
         }
         // Nobody sweeps the answer's files before this job, which names them, is committed.
         let question = "SELECT answer FROM lacuna_answers WHERE work = $1 FOR KEY SHARE";
-        let kept = transaction.query_opt(question, &[&record.work.hex()]).await?.is_some();
+        let kept = transaction.query_typed_opt(question, &[(&record.work.hex(), Type::TEXT)]).await?.is_some();
         match known.filter(|_| kept) {
             Some(answer) => record.view.finish(answer, true),
             None => {
                 let question = "SELECT count(*) FILTER (WHERE owner = $1), count(*) FILTER (WHERE state = 'queued')
                     FROM lacuna_jobs WHERE state IN ('queued', 'running', 'cancelling')";
-                let row = transaction.query_one(question, &[&record.owner]).await?;
+                let row = transaction.query_typed_one(question, &[(&record.owner, Type::TEXT)]).await?;
                 let (theirs, waiting): (i64, i64) = (row.get(0), row.get(1));
                 let reached = |count: i64, limit: usize| usize::try_from(count).is_ok_and(|count| count >= limit);
                 if reached(theirs, self.limits.per_owner) {
@@ -194,7 +197,7 @@ impl Shared {
         let asked = async {
             let client = self.pool.get().await?;
             let question = format!("SELECT {} FROM lacuna_jobs WHERE id = $1 AND owner = $2", rows::COLUMNS);
-            let row = client.query_opt(&question, &[&id, &owner]).await?;
+            let row = client.query_typed_opt(&question, &[(&id, Type::TEXT), (&owner, Type::TEXT)]).await?;
             client.done();
             row.map(|row| rows::read(&row)).transpose()
         };
@@ -211,7 +214,9 @@ impl Shared {
             );
             let (state, kind) = (filter.state.map(JobState::word), filter.kind.map(kind_word));
             let length = i64::try_from(length).unwrap_or(i64::MAX);
-            let rows = client.query(&question, &[&owner, &state, &kind, &filter.before, &length]).await?;
+            let values: [(&(dyn ToSql + Sync), Type); 5] =
+                [(&owner, Type::TEXT), (&state, Type::TEXT), (&kind, Type::TEXT), (&filter.before, Type::TEXT), (&length, Type::INT8)];
+            let rows = client.query_typed(&question, &values).await?;
             client.done();
             rows.iter().map(|row| rows::read(row).map(|(record, _)| record.view)).collect()
         };
@@ -225,7 +230,7 @@ impl Shared {
                 "SELECT {} FROM lacuna_jobs WHERE owner = $1 AND results @> ARRAY[$2::text] ORDER BY id DESC LIMIT 1",
                 rows::COLUMNS
             );
-            let row = client.query_opt(&question, &[&owner, &digest.hex()]).await?;
+            let row = client.query_typed_opt(&question, &[(&owner, Type::TEXT), (&digest.hex(), Type::TEXT)]).await?;
             client.done();
             row.map(|row| rows::read(&row)).transpose()
         };
@@ -238,7 +243,7 @@ impl Shared {
             let client = self.pool.get().await?;
             let question = "SELECT count(*) FILTER (WHERE state = 'queued'), count(*) FILTER (WHERE state IN ('running', 'cancelling')),
                 count(*) FROM lacuna_jobs";
-            let row = client.query_one(question, &[]).await?;
+            let row = client.query_typed_one(question, &[]).await?;
             client.done();
             let count = |place: usize| u64::try_from(row.get::<_, i64>(place)).unwrap_or(0);
             Ok(Gauges { queued: count(0), running: count(1), kept: count(2) })
@@ -278,8 +283,8 @@ impl Shared {
         let asked = async {
             let client = self.pool.get().await?;
             let statement = "WITH gone AS (DELETE FROM lacuna_jobs WHERE id = $1 RETURNING id)
-                SELECT pg_notify($2, 'gone ' || id) FROM gone";
-            client.query(statement, &[&id, &rows::CHANNEL]).await?;
+                SELECT pg_notify($2, 'gone ' || id)::text FROM gone";
+            client.query_typed(statement, &[(&id, Type::TEXT), (&rows::CHANNEL, Type::TEXT)]).await?;
             client.done();
             Ok(())
         };
@@ -322,7 +327,7 @@ impl Shared {
                 ORDER BY number LIMIT 1 FOR UPDATE OF job SKIP LOCKED",
                 rows::COLUMNS
             );
-            let Some(row) = transaction.query_opt(&question, &[]).await? else {
+            let Some(row) = transaction.query_typed_opt(&question, &[]).await? else {
                 drop(transaction);
                 client.done();
                 return Ok(None);
@@ -362,7 +367,7 @@ impl Shared {
         if let Ending::Done(answer) = ending {
             rows::keep_answer(&transaction, &record, answer).await?;
             let question = format!("SELECT {} FROM lacuna_jobs WHERE state = 'queued' AND work = $1 FOR UPDATE SKIP LOCKED", rows::COLUMNS);
-            for row in transaction.query(&question, &[&record.work.hex()]).await? {
+            for row in transaction.query_typed(&question, &[(&record.work.hex(), Type::TEXT)]).await? {
                 let (mut follower, _) = rows::read(&row)?;
                 follower.view.finish((**answer).clone(), true);
                 rows::update(&transaction, &follower, self.lease).await?;
@@ -376,7 +381,7 @@ impl Shared {
     pub(super) fn probe(&self) -> Result<(), Problem> {
         let asked = async {
             let client = self.pool.get().await?;
-            client.query_one("SELECT 1", &[]).await?;
+            client.query_typed_one("SELECT 1", &[]).await?;
             client.done();
             Ok(())
         };

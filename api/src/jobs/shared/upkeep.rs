@@ -5,6 +5,7 @@ use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use tokio::time::Instant;
+use tokio_postgres::types::{ToSql, Type};
 
 use super::Shared;
 use super::pool::Failure;
@@ -75,7 +76,7 @@ async fn refresh(shared: Arc<Shared>, job: Arc<LiveJob>) {
     let asked = async {
         let client = shared.pool.get().await?;
         let question = format!("SELECT {} FROM lacuna_jobs WHERE id = $1", rows::COLUMNS);
-        let row = client.query_opt(&question, &[&job.id()]).await?;
+        let row = client.query_typed_opt(&question, &[(&job.id(), Type::TEXT)]).await?;
         client.done();
         row.map(|row| rows::read(&row)).transpose()
     };
@@ -122,7 +123,7 @@ async fn take_up(shared: &Shared, judges: bool) -> Result<(), Failure> {
         ORDER BY number LIMIT 32 FOR UPDATE SKIP LOCKED",
         rows::COLUMNS
     );
-    for row in transaction.query(&question, &[&judges]).await? {
+    for row in transaction.query_typed(&question, &[(&judges, Type::BOOL)]).await? {
         let (mut record, _) = rows::read(&row)?;
         record.view.take_up();
         tracing::warn!(job = %record.view.id, attempt = record.view.attempt, state = record.view.state.word(), "a worker was lost");
@@ -183,7 +184,15 @@ async fn beat(shared: &Shared, view: &JobView, news: bool) -> Result<Option<JobS
     let progress = view.progress.as_ref().map(serde_json::to_string).transpose()?;
     let client = shared.pool.get().await?;
     let lease = shared.lease.as_secs_f64();
-    let row = client.query_opt(statement, &[&view.id, &rows::attempt(view), &lease, &news, &progress, &CHANNEL]).await?;
+    let values: [(&(dyn ToSql + Sync), Type); 6] = [
+        (&view.id, Type::TEXT),
+        (&rows::attempt(view), Type::INT4),
+        (&lease, Type::FLOAT8),
+        (&news, Type::BOOL),
+        (&progress, Type::TEXT),
+        (&CHANNEL, Type::TEXT),
+    ];
+    let row = client.query_typed_opt(statement, &values).await?;
     client.done();
     Ok(row.and_then(|row| JobState::of_word(row.get(0))))
 }

@@ -173,8 +173,14 @@ pub struct Prediction {
     pub triangles: f64,
     /// Memory that the surface takes at its peak, in bytes.
     pub memory_bytes: f64,
+    /// Leaf cells that the blocks of the lattice meet, as [`Dilation::leaf_cells`] counts them.
+    pub leaf_cells: f64,
     /// Memory that the simplification takes for each thread, in bytes; 0 without it.
     pub simplifying_bytes: f64,
+    /// That of all blocks together, in bytes: what the simplification looks at, and so a measure of its work.
+    pub looked_at_bytes: f64,
+    /// The result is nowhere thinner: 2 (r - i), with the least radius r and the most that the inner bound i may be.
+    pub least_thickness_mm: f64,
     /// a, in mm.
     pub pitch_mm: f64,
 }
@@ -190,9 +196,10 @@ pub fn predict(
     simplify: bool,
     budget: &Budget,
 ) -> Result<Prediction, DilationError> {
-    let resolved = resolve(attractor, radius, tolerance, budget)?;
-    let one = Balls { least: radius.mm(), most: radius.mm() };
-    let (attractor, balls, tolerance) =
-        resolved.as_ref().map_or((attractor, one, tolerance), |resolved| (&resolved.attractor, resolved.balls, resolved.rest));
-    Plan::new(attractor, balls, tolerance, simplify, budget)?.predict(budget)
+    let Some(Resolved { attractor: changed, balls, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
+        return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.predict(budget);
+    };
+    let prediction = Plan::new(&changed, balls, rest, simplify, budget)?.predict(budget)?;
+    // As `run` adds the deviation to both bounds.
+    Ok(Prediction { least_thickness_mm: (prediction.least_thickness_mm - 2.0 * deviation_mm).max(0.0), ..prediction })
 }

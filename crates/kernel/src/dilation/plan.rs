@@ -332,7 +332,11 @@ impl<'a> Plan<'a> {
             counted_triangles: expected.made,
             triangles: expected.triangles,
             memory_bytes,
+            leaf_cells: expected.leaves,
             simplifying_bytes: expected.simplifying,
+            looked_at_bytes: expected.looked_at,
+            // `run` gives bounds of at most this length.
+            least_thickness_mm: 2.0 * (self.balls.least - self.aimed),
             pitch_mm: self.pitch,
         })
     }

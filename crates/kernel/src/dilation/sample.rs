@@ -33,8 +33,12 @@ pub(super) struct Expected {
     pub(super) made: f64,
     /// Triangles after the refinement that the topology asks for, without those that are no more than rounding.
     pub(super) triangles: f64,
+    /// Leaf cells that the blocks meet, each once in every block.
+    pub(super) leaves: f64,
     /// Most bytes that the simplification of a block holds besides.
     pub(super) simplifying: f64,
+    /// Those of all blocks together: what it looks at.
+    pub(super) looked_at: f64,
 }
 
 /// What was made of a block.
@@ -44,6 +48,8 @@ struct Made {
     triangles: u64,
     leaves: u64,
     simplifying: usize,
+    /// Triangles of a block whose simplification was tried.
+    tried: u64,
 }
 
 /// What an octree's nodes share with the halves of it: the cells that may matter in them, and the solids whose surface may meet them.
@@ -97,7 +103,7 @@ impl Pass<'_> {
         }
         let mut cleaning = self.setting.clone();
         cleaning.clean_only = true;
-        let (mut sum, mut done) = (Made::default(), 0);
+        let (mut sum, mut done, mut looked_at) = (Made::default(), 0, 0);
         for (round, some) in blocks.chunks(AT_A_TIME).enumerate() {
             // What simplification holds differs little from block to block; to find it takes as long as all the rest.
             let simplify = simplify && round == 0;
@@ -105,11 +111,13 @@ impl Pass<'_> {
                 some.par_iter().with_max_len(1).map(|(node, inherited)| self.made(*node, inherited, &cleaning, simplify)).collect();
             for made in made {
                 let made = made?;
+                looked_at += made.simplifying;
                 sum = Made {
                     made: sum.made + made.made,
                     triangles: sum.triangles + made.triangles,
                     leaves: sum.leaves + made.leaves,
                     simplifying: sum.simplifying.max(made.simplifying),
+                    tried: sum.tried + made.tried,
                 };
             }
             done += some.len();
@@ -118,7 +126,15 @@ impl Pass<'_> {
             }
         }
         let each = stands_for * blocks.len() as f64 / done.max(1) as f64;
-        Ok(Expected { made: sum.made as f64 * each, triangles: sum.triangles as f64 * each, simplifying: sum.simplifying as f64 * GROWN })
+        let triangles = sum.triangles as f64 * each;
+        Ok(Expected {
+            made: sum.made as f64 * each,
+            triangles,
+            leaves: sum.leaves as f64 * each,
+            simplifying: sum.simplifying as f64 * GROWN,
+            // As many to a triangle everywhere as where it was tried.
+            looked_at: looked_at as f64 * triangles / sum.tried.max(1) as f64,
+        })
     }
 
     /// A block as it is made at first, and as it is when it has been refined by itself and cleaned.
@@ -142,14 +158,14 @@ impl Pass<'_> {
         let core = self.core(node);
         Simplifier::new(self.rule, cleaning).run(cleaning, &core, candidates, &mut surface);
         let triangles = surface.triangles.len() as u64;
-        let mut simplifying = 0;
+        let (mut simplifying, mut tried) = (0, 0);
         if simplify {
             surface.settled.clear();
             let mut simplifier = Simplifier::new(self.rule, self.setting);
             simplifier.run(self.setting, &core, candidates, &mut surface);
-            simplifying = simplifier.bytes();
+            (simplifying, tried) = (simplifier.bytes(), triangles);
         }
-        Ok(Made { made, triangles, leaves, simplifying })
+        Ok(Made { made, triangles, leaves, simplifying, tried })
     }
 
     /// Another task of the same pass over a lattice that is graded otherwise.

@@ -1,0 +1,60 @@
+//! How long the things take that a plan counts, in seconds of one core.
+//!
+//! Measured, not proven: a release build did every case of `fixtures/` on one of two shared cores of a virtual machine (AMD EPYC at 2.6 GHz), with simplification and without. The constants of
+//! dilations are those for which the largest ratio to the seconds of the processor was least, rounded; the others are quotients of single jobs. Another machine, or another build, has others; on
+//! several cores less time passes. What is counted is the same on every run, and so is the estimate. `fixtures/estimates.py` measures again, and `fixtures/ESTIMATES.md` shows how well it does.
+
+use lacuna_kernel::dilation::Prediction;
+
+/// For each triangle of a lattice's surface: made, cleaned, joined, verified, written and read back.
+const TRIANGLE: f64 = 6.0e-6;
+/// For each leaf cell that a block of the lattice meets: what is near to the block is sorted out, and its distances are found.
+const MET_CELL: f64 = 9.0e-6;
+/// For each triangle of a lattice that is simplified: trials to remove its corners.
+const SIMPLIFIED: f64 = 3.0e-6;
+/// For each byte that the simplification looks at: the sites near a corner, all of which every trial asks.
+const LOOKED_AT_BYTE: f64 = 4.5e-9;
+/// For each leaf cell that is drawn by itself, and for each that becomes part of a conforming complex.
+const CELL: f64 = 5.0e-7;
+const FACE: f64 = 2.0e-6;
+/// For each triangle of the operands of a boolean: what the engine does, and the check of the result. Measured from 1e-5 (half a million triangles trimmed by a plane) over 2e-5 (a union of 4000
+/// cubes) to 7e-5 (one of 10 000 that overlap more): how much they overlap is not predicted.
+const COMBINED: f64 = 2.0e-5;
+/// What simplification leaves of an operand's triangles, at most.
+const LEFT: f64 = 0.1;
+/// For each triangle of a level's solid.
+const COPIED: f64 = 5.0e-7;
+/// For each triangle of a mesh that is only converted.
+const CONVERTED: f64 = 1.0e-6;
+
+/// Of a dilation.
+pub(crate) fn of_dilation(prediction: &Prediction, simplify: bool) -> f64 {
+    let triangles = prediction.triangles.max(prediction.counted_triangles);
+    let simplifying = if simplify { triangles * SIMPLIFIED + prediction.looked_at_bytes * LOOKED_AT_BYTE } else { 0.0 };
+    triangles * TRIANGLE + prediction.leaf_cells * MET_CELL + simplifying
+}
+
+/// Of an evaluation with so many leaf cells.
+pub(crate) fn of_cells(leaf_cells: f64, joined: bool) -> f64 {
+    leaf_cells * if joined { FACE } else { CELL }
+}
+
+/// Of an operand of a boolean that is a mesh with so many triangles, the boolean's share included.
+pub(crate) fn of_operand(triangles: f64) -> f64 {
+    triangles * COMBINED
+}
+
+/// Of one that is a dilation.
+pub(crate) fn of_dilated_operand(prediction: &Prediction) -> f64 {
+    of_dilation(prediction, true) + of_operand(LEFT * prediction.triangles)
+}
+
+/// Of a level's solid with so many triangles.
+pub(crate) fn of_level(triangles: f64) -> f64 {
+    triangles * COPIED
+}
+
+/// Of a conversion of so many triangles.
+pub(crate) fn of_conversion(triangles: f64) -> f64 {
+    triangles * CONVERTED
+}
