@@ -303,11 +303,6 @@ fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<O
     if job.outputs.is_empty() {
         job.outputs = default_outputs(&job).iter().map(|&name| name.to_owned()).collect();
     }
-    let mapped = job.params.thickness && job.outputs.iter().all(|name| name == Format::Ply.facts().ending);
-    if job.kind == JobKind::Measure && !job.outputs.is_empty() && !mapped {
-        let message = "a measurement makes numbers, and with \"thickness\" its map on the surface as \"ply\"; ask for no other outputs";
-        return Err(one_finding("/outputs", "job.no-geometry", message));
-    }
     for (index, name) in job.outputs.iter().enumerate() {
         format(name).map_err(|problem| one_finding(&format!("/outputs/{index}"), &problem.code, &problem.detail))?;
     }

@@ -4,6 +4,7 @@
 pub mod attractor;
 pub mod automaton;
 pub mod budget;
+mod de_casteljau;
 pub mod dilation;
 pub mod error;
 mod groups;

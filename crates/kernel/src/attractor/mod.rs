@@ -10,6 +10,7 @@ mod connected;
 mod cover;
 mod defect;
 mod early;
+mod enclosure;
 mod hull;
 mod invariant;
 mod near;
@@ -35,6 +36,7 @@ pub(crate) use attained::AttainedPoint;
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
+pub(crate) use enclosure::Enclosure;
 use glam::DVec3;
 use hull::Hulls;
 pub(crate) use hull::StateHull;
@@ -92,6 +94,8 @@ pub struct Attractor {
     hulls: Hulls,
     /// Of every state, when first asked for.
     state_hulls: Vec<OnceLock<Option<StateHull>>>,
+    /// Of every state, when first asked for.
+    enclosures: Vec<OnceLock<Option<Enclosure>>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
     precisions: Vec<Option<LinearPrecision>>,
@@ -244,6 +248,7 @@ impl Attractor {
             attained: vec![OnceLock::new(); count],
             hulls,
             state_hulls: vec![OnceLock::new(); count],
+            enclosures: vec![OnceLock::new(); count],
             connected,
             precisions,
             contraction,
@@ -428,7 +433,12 @@ impl Attractor {
     pub(crate) fn hull(&self, state: StateId) -> Option<&StateHull> {
         // Weights have to be positive at the points, too.
         let fits = |hull: &StateHull| !hull.is_signed || self.roots.iter().all(|root| !root.rational);
-        self.state_hulls[state.index()].get_or_init(|| self.hulls.of(&self.automaton, state).filter(fits)).as_ref()
+        self.state_hulls[state.index()].get_or_init(|| self.hulls.of(self, state).filter(fits)).as_ref()
+    }
+
+    /// A box of coordinates that holds the attractor of a state whose operators have negative entries, or a product of such.
+    pub(crate) fn enclosure(&self, state: StateId) -> Option<&Enclosure> {
+        self.enclosures[state.index()].get_or_init(|| enclosure::enclosure(self, state)).as_ref()
     }
 
     /// Parameters of a state's points, where its curves or faces are proven to have linear precision.

@@ -11,6 +11,10 @@
 //!
 //! Surfaces: operators that are all Kronecker products A_e x B_e, found by their partial sums as columns sum to 1, have the
 //! products of the points of A and B.
+//!
+//! *Bicubic patches* of subdivision schemes number their control points around the cell, and turn their children, so that no operator is a product as it
+//! stands. Where the parameters of linear precision are those of a grid of uniform cubic splines, the Bezier points H of these are tried: K_e = H^-1 A_e H,
+//! and a child's corner is a Bezier point of the surface again.
 
 use crate::automaton::{Automaton, Hull, StateId, SubdivisionOperator};
 
@@ -38,13 +42,16 @@ pub(super) struct Polytope {
 /// The polytope of a state, or the product of two.
 ///
 /// Cost: n^2 for every operator and every way to write n as a product, and n^3 for those found.
-pub(super) fn polytope(automaton: &Automaton, id: StateId) -> Option<Polytope> {
+pub(super) fn polytope(automaton: &Automaton, id: StateId, parameters: Option<&[[f64; 2]]>) -> Option<Polytope> {
     let state = automaton.state(id);
     let own = state.transitions.iter().all(|transition| transition.to == id) && state.transitions.len() > 1;
     if !own || state.frame || state.dimension > MOST_POINTS || !automaton.factors(id).is_empty() {
         return None;
     }
     let operators: Vec<&SubdivisionOperator> = state.transitions.iter().map(|transition| &transition.operator).collect();
+    if let Some(found) = parameters.and_then(|parameters| bicubic(&operators, parameters)) {
+        return Some(found);
+    }
     around(&operators).or_else(|| {
         (2..state.dimension).filter(|rows| state.dimension.is_multiple_of(*rows)).find_map(|rows| {
             let parted: Option<Vec<[SubdivisionOperator; 2]>> = operators.iter().map(|operator| parted(operator, rows)).collect();
@@ -74,6 +81,43 @@ fn parted(operator: &SubdivisionOperator, rows: usize) -> Option<[SubdivisionOpe
     let product = SubdivisionOperator::product(factors.to_vec());
     let same = product.entries().iter().zip(operator.entries()).all(|(x, y)| (x - y).abs() <= SAME);
     same.then_some(factors)
+}
+
+/// Bezier points of a uniform cubic span, as combinations of its four control points, and the other way round: column by column, in sixths and in ones.
+const BEZIER: [[f64; 4]; 4] = [[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]];
+const SPLINE: [[f64; 4]; 4] = [[6.0, -7.0, 2.0, 0.0], [0.0, 2.0, -1.0, 0.0], [0.0, -1.0, 2.0, 0.0], [0.0, 2.0, -7.0, 6.0]];
+
+/// The Bezier points of a patch whose control points have the parameters -1, 0, 1, 2 in both directions.
+fn bicubic(operators: &[&SubdivisionOperator], parameters: &[[f64; 2]]) -> Option<Polytope> {
+    let place = |parameter: &[f64; 2]| {
+        let [u, v] = parameter.map(|x| (x + 1.0).round());
+        let near = parameter.iter().zip([u, v]).all(|(x, near)| (x + 1.0 - near).abs() < 1e-9);
+        (near && (0.0..4.0).contains(&u) && (0.0..4.0).contains(&v)).then_some((u as usize, v as usize))
+    };
+    let places: Vec<(usize, usize)> = parameters.iter().map(place).collect::<Option<_>>()?;
+    let mut numbers = [16; 16];
+    places.iter().enumerate().for_each(|(k, (u, v))| numbers[4 * u + v] = k);
+    if places.len() != 16 || numbers.contains(&16) {
+        return None;
+    }
+    let sixths = BEZIER.map(|column| column.map(|x| x / 6.0));
+    let bezier = (0..16).flat_map(|j| places.iter().map(move |(u, v)| sixths[j / 4][*u] * sixths[j % 4][*v]));
+    let spline = places.iter().flat_map(|(u, v)| (0..16).map(|i| SPLINE[*u][i / 4] * SPLINE[*v][i % 4]));
+    let points = SubdivisionOperator::exact(16, bezier.collect());
+    let inverse = SubdivisionOperator::exact(16, spline.collect());
+    let child = |operator: &&SubdivisionOperator| {
+        let shares = inverse.times(&operator.times(&points));
+        // What vanishes, and what are binomials in 64ths, comes out as rounding.
+        let entries: Vec<f64> = shares.entries().iter().map(|share| (share * 64.0).round() / 64.0).collect();
+        SubdivisionOperator::exact(16, entries)
+    };
+    let children: Vec<SubdivisionOperator> = operators.iter().map(child).collect();
+    // Each corner of the patch is the image of one of a child, and so on: a point of the attractor.
+    let unit = |at: usize| (0..16).map(|k| f64::from(u8::from(k == at))).collect::<Vec<f64>>();
+    let corners = [0, 3, 12, 15].map(unit);
+    let is_image = |corner: &Vec<f64>| children.iter().any(|child| [0, 3, 12, 15].iter().any(|&k| child.column(k) == corner.as_slice()));
+    let attained = if corners.iter().all(is_image) { corners.to_vec() } else { Vec::new() };
+    Some(Polytope { hull: Hull { points, children }, attained })
 }
 
 /// The simplex or the box of square operators.
@@ -229,7 +273,7 @@ mod tests {
             leaf: LeafPrimitive::Centre,
             frame: false,
         };
-        polytope(&Automaton::new(vec![state]).unwrap(), StateId::new(0)).map(|found| found.hull)
+        polytope(&Automaton::new(vec![state]).unwrap(), StateId::new(0), None).map(|found| found.hull)
     }
 
     /// Entries of T H - H K.
@@ -282,6 +326,34 @@ mod tests {
         }
         // A box in the plane has four corners, and three control points are fewer.
         assert!(found(cutting(0.3, -0.1).to_vec()).is_none());
+    }
+
+    #[test]
+    fn turned_bicubic_patches_lie_in_their_bezier_points() {
+        // The cells of a cube that Catmull and Clark's scheme subdivides, away from its corners.
+        let vertices = (0..8).map(|k| glam::DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)));
+        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
+        let shape = crate::model::Shape::Subdivision(crate::model::Subdivision {
+            scheme: crate::model::Scheme::CatmullClark,
+            vertices: vertices.collect(),
+            faces: faces.iter().map(|face| face.to_vec()).collect(),
+            creases: Vec::new(),
+            corners: Vec::new(),
+            boundary: crate::model::BoundaryRule::default(),
+            coefficients: Vec::new(),
+        });
+        let attractor = crate::model::Model { name: None, shape }.lower().unwrap().attractor;
+        let ids = (0..attractor.automaton().states().len()).map(StateId::new);
+        let regular: Vec<StateId> = ids.filter(|&id| attractor.hull(id).is_some_and(|hull| hull.attained.len() == 4)).collect();
+        assert_eq!(regular.len(), 1);
+        let hull = attractor.hull(regular[0]).unwrap();
+        assert!(!hull.is_signed && hull.miss < 1e-11, "{:e}", hull.miss);
+        let points = hull.points.as_ref().unwrap();
+        let state = attractor.automaton().state(regular[0]);
+        for (transition, inner) in state.transitions.iter().zip(&hull.children) {
+            let (left, right) = (transition.operator.times(points), points.times(inner));
+            assert!(left.entries().iter().zip(right.entries()).all(|(x, y)| (x - y).abs() < 1e-14));
+        }
     }
 
     #[test]

@@ -70,6 +70,11 @@ impl Contraction {
         self.norms[state.index()].sum_ratio()
     }
 
+    /// A bound of |y| / |y|_1 over V, for a state that is no product; no bound for others.
+    pub(crate) fn norm_of_sum(&self, state: StateId) -> f64 {
+        self.norms[state.index()].ellipsoid().map_or(f64::INFINITY, AdaptedNorm::corner)
+    }
+
     /// The rate that goes with [`Self::transient`].
     pub(crate) fn rate(&self) -> f64 {
         self.upper.max(LEAST_RATE)

@@ -3,6 +3,7 @@
 use crate::attractor::cell::{ControlPoint, Point, dot};
 use crate::attractor::{AttainedPoint, StateBound};
 use crate::automaton::SubdivisionOperator;
+use crate::de_casteljau::halves;
 
 /// x -> (values . x) / (weights . x) on a barycentric space; without weights, values . x.
 #[derive(Clone)]
@@ -110,6 +111,7 @@ impl Functional {
 
     /// The halves of a Bezier curve, by de Casteljau's algorithm.
     pub(super) fn halves(&self) -> [Self; 2] {
+        let halves = |points: &[f64]| halves(points, |a, b| 0.5 * (a + b));
         let [first, second] = halves(&self.values);
         let [first_weights, second_weights] = self.weights.as_ref().map_or([None, None], |weights| halves(weights).map(Some));
         [Self { values: first, weights: first_weights }, Self { values: second, weights: second_weights }]
@@ -125,24 +127,29 @@ impl Functional {
     }
 }
 
-fn halves(points: &[f64]) -> [Vec<f64>; 2] {
-    let (mut first, mut second) = (Vec::with_capacity(points.len()), points.to_vec());
-    for length in (0..points.len()).rev() {
-        first.push(second[0]);
-        (0..length).for_each(|k| second[k] = 0.5 * (second[k] + second[k + 1]));
-    }
-    [first, second]
-}
-
 fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(value), most.max(value)])
+}
+
+/// The same, of four at a time: one alone would wait for every comparison.
+fn extremes_of(values: &[f64]) -> [f64; 2] {
+    let (parts, rest) = values.as_chunks::<4>();
+    let (mut least, mut most) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
+    for part in parts {
+        for k in 0..4 {
+            least[k] = if part[k] < least[k] { part[k] } else { least[k] };
+            most[k] = if part[k] > most[k] { part[k] } else { most[k] };
+        }
+    }
+    let [low, high] = extremes(rest.iter().copied());
+    [least.into_iter().fold(low, f64::min), most.into_iter().fold(high, f64::max)]
 }
 
 /// Bounds of values . x over the attractor of a state with that bound.
 fn range(bound: &StateBound, values: &[f64]) -> [f64; 2] {
     match bound {
         StateBound::Hull { margin, .. } => {
-            let [least, most] = extremes(values.iter().copied());
+            let [least, most] = extremes_of(values);
             let beyond = if *margin > 0.0 { margin * (most - least) } else { 0.0 };
             [least - beyond, most + beyond]
         }

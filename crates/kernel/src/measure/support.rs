@@ -19,6 +19,9 @@
 //! *Hulls.* Where a state has points in whose hull its attractor lies (`attractor::hull`), functionals are kept by their values at these, and pulled back
 //! to those of children. Splines are searched as Bezier patches: their corners are attained, and sides that are level stay so.
 //!
+//! *Boxes.* In longer searches, functionals of states with negative entries are seen by boxes of their coordinates too (`attractor::enclosure`), whose bounds
+//! are several times closer than those by margins.
+//!
 //! *Loops.* Let f = x . u be a function of the parameters of a trimmed surface, and x where it is largest in the closed region that is kept. If x is on a
 //! loop, one of the curves that the loops are in space attains f(x): these are searched too, each as a Bezier curve. Otherwise x is in the region's inside.
 //! If f rises towards a side on a whole cell, x is on that side, as f would rise on within the surface's span; and not even there unless the side is on
@@ -28,7 +31,7 @@
 use super::functional::Functional;
 use crate::attractor::cell::{Cell, ControlPoint, Point, dot};
 use crate::attractor::trim::{Rim, TrimmedSurface, Window};
-use crate::attractor::{Attractor, OwnRadius, StateBound};
+use crate::attractor::{Attractor, Enclosure, OwnRadius, StateBound};
 use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
@@ -39,6 +42,8 @@ const SPLITS: usize = 20_000;
 const ROUNDS: usize = 1000;
 /// Splits after which points of the attractor are worked out, so that what is reached rises sooner: most searches are done before.
 const LONG: usize = 64;
+/// Splits after which signed cells are bounded by boxes of their coordinates: level and planar shapes need none.
+const SIGNED: usize = 12;
 /// Wanted width, relative to the shape's size.
 const RELATIVE_WIDTH: f64 = 1e-11;
 /// Slack that one cell may add to another's, and most slack of a cell, as shares of the wanted width.
@@ -96,6 +101,8 @@ struct Candidate {
     /// Absent for curves.
     state: Option<StateId>,
     functional: Functional,
+    /// Its values at the columns of the state's enclosure, once that is used.
+    seen: Vec<f64>,
     /// Bounds its supremum, without regard to loops that cut the cell.
     bound: f64,
     /// s of the module's comment.
@@ -114,6 +121,12 @@ impl Candidate {
     }
 }
 
+/// The ratio of the largest and the least of positive weights.
+fn spread(weights: &[f64]) -> f64 {
+    let ends = weights.iter().fold([f64::INFINITY, 0.0_f64], |[least, most], &weight| [least.min(weight), most.max(weight)]);
+    ends[1] / ends[0]
+}
+
 /// The search for the supremum of x . direction.
 pub(super) struct Search<'a> {
     attractor: &'a Attractor,
@@ -122,7 +135,7 @@ pub(super) struct Search<'a> {
     /// Wanted width of the interval.
     width: f64,
     rounding: f64,
-    /// The largest terms of sums, and the share of them by which the hulls that were met miss the attractors.
+    /// The largest terms of sums, and the share of them by which the hulls that were met miss the attractors at most.
     largest: f64,
     missed: f64,
     /// Some point of the shape attains this, or more.
@@ -166,7 +179,15 @@ impl<'a> Search<'a> {
                 budget.cancel.check()?;
             }
             let functional = Functional::of(points, true, &self.direction, offset(*root as usize));
-            self.consider(Candidate { root: *root, state: None, functional, bound: f64::INFINITY, slack: 0.0, window: None });
+            self.consider(Candidate {
+                root: *root,
+                state: None,
+                functional,
+                bound: f64::INFINITY,
+                slack: 0.0,
+                seen: Vec::new(),
+                window: None,
+            });
         }
         for (index, root) in attractor.roots().iter().enumerate() {
             if index % 4096 == 0 {
@@ -198,13 +219,25 @@ impl<'a> Search<'a> {
             return;
         }
         let functional = self.at_hull(state, Functional::of(points, rational, &self.direction, offset));
-        self.consider(Candidate { root, state: Some(state), functional, bound: f64::INFINITY, slack: 0.0, window: window.map(Box::new) });
+        self.consider(Candidate {
+            root,
+            state: Some(state),
+            functional,
+            bound: f64::INFINITY,
+            slack: 0.0,
+            seen: Vec::new(),
+            window: window.map(Box::new),
+        });
     }
 
     /// The functional by its values at the points in whose hull the state's attractor lies.
     fn at_hull(&mut self, state: StateId, functional: Functional) -> Functional {
         let Some(hull) = self.attractor.hull(state) else { return functional };
-        self.missed = self.missed.max(hull.miss);
+        // Let y be what a point x of the hull misses by, and v the value at x. Without weights c . y is at most half of |y|_1 times what the values differ by,
+        // which is at most twice their largest term; with weights the value moves by (values - v weights) . y / (weights . (x + y)).
+        self.missed = self.missed.max(
+            hull.miss * functional.weights.as_ref().map_or(1.0, |weights| 2.0 * spread(weights) / (1.0 - hull.miss * spread(weights))),
+        );
         match &hull.points {
             Some(points) => functional.pulled_back(points),
             None => functional,
@@ -216,9 +249,25 @@ impl<'a> Search<'a> {
         if self.attractor.hull(state).is_some() { &IN_HULL } else { self.attractor.bound(state) }
     }
 
+    /// What holds the attractor of a state closer than its bound, in searches that are long enough.
+    fn enclosure(&self, state: StateId) -> Option<&'a Enclosure> {
+        if self.splits < SIGNED || self.attractor.hull(state).is_some() {
+            return None;
+        }
+        self.attractor.enclosure(state)
+    }
+
     /// Keeps a candidate, bounded here and by its parent, if it may be higher than what is reached.
     fn consider(&mut self, mut candidate: Candidate) {
-        let [floor, bound] = candidate.functional.range(candidate.state.map_or(&IN_HULL, |state| self.bound_of(state)));
+        let enclosure = candidate.state.and_then(|state| self.enclosure(state));
+        let [floor, bound] = match enclosure {
+            Some(enclosure) => {
+                candidate.seen = enclosure.columns.pull_back(&candidate.functional.values);
+                self.missed = self.missed.max(enclosure.miss);
+                enclosure.range(candidate.seen.iter().copied())
+            }
+            None => candidate.functional.range(candidate.state.map_or(&IN_HULL, |state| self.bound_of(state))),
+        };
         candidate.bound = bound.min(candidate.bound);
         if candidate.ceiling() <= self.reached {
             return;
@@ -297,11 +346,11 @@ impl<'a> Search<'a> {
 
     /// Considers the children instead of a candidate.
     fn split(&mut self, candidate: &Candidate) {
-        let &Candidate { root, state, ref functional, bound, slack, ref window } = candidate;
+        let &Candidate { root, state, ref functional, bound, slack, ref window, .. } = candidate;
         let attractor = self.attractor;
         let Some(state) = state else {
             for functional in functional.halves() {
-                self.consider(Candidate { root, state: None, functional, bound, slack, window: None });
+                self.consider(Candidate { root, state: None, functional, bound, slack, seen: Vec::new(), window: None });
             }
             return;
         };
@@ -314,7 +363,15 @@ impl<'a> Search<'a> {
                 Some(hull) => functional.pulled_back(&hull.children[index]),
                 None => self.at_hull(transition.to, functional.pulled_back(&transition.operator)),
             };
-            self.consider(Candidate { root, state: Some(transition.to), functional, bound, slack, window: window.map(Box::new) });
+            self.consider(Candidate {
+                root,
+                state: Some(transition.to),
+                functional,
+                bound,
+                slack,
+                seen: Vec::new(),
+                window: window.map(Box::new),
+            });
         }
     }
 
@@ -356,7 +413,14 @@ impl<'a> Search<'a> {
             let near = rest.len().saturating_sub(COMPARISONS / 2);
             let found = rest[near..].iter().rev().chain(first).find_map(|&index| {
                 let (other, bound) = (&self.candidates[index].functional, self.bound_of(state));
-                let slack = cell.functional.slack_under(other, bound, self.reached, cell.bound, allowed, &mut difference)?;
+                let seen = &self.candidates[index].seen;
+                let slack = match attractor.enclosure(state).filter(|_| !seen.is_empty() && !cell.seen.is_empty()) {
+                    Some(enclosure) => {
+                        let lower = enclosure.range(seen.iter().zip(&cell.seen).map(|(other, own)| other - own))[0];
+                        (lower >= -allowed).then_some((-lower).max(0.0))?
+                    }
+                    None => cell.functional.slack_under(other, bound, self.reached, cell.bound, allowed, &mut difference)?,
+                };
                 let slack = cell.slack + slack;
                 (slack <= most).then_some((index, slack))
             });

@@ -3,7 +3,8 @@
 use super::CellKind;
 use super::lower::Draft;
 use crate::attractor::Root;
-use crate::automaton::{LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
+use crate::automaton::{LeafPrimitive, State, StateId, Transition};
+use crate::de_casteljau::operators;
 use glam::DVec3;
 
 /// A polynomial or rational Bezier curve of degree n - 1, n control points.
@@ -64,7 +65,7 @@ fn bezier_state(draft: &mut Draft, name: String, n: usize) -> StateId {
     let unit = |at: usize| (0..n).map(|k| if k == at { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
     let boundaries = if n == 1 { Vec::new() } else { vec![draft.end_point(unit(0)), draft.end_point(unit(n - 1))] };
     let own = StateId::new(draft.states.len());
-    let subdivide = || halves(n).into_iter().enumerate().map(|(label, operator)| Transition { to: own, operator, label }).collect();
+    let subdivide = || operators(n).into_iter().enumerate().map(|(label, operator)| Transition { to: own, operator, label }).collect();
     draft.state(State {
         name,
         kind: Some(if n == 1 { CellKind::Vertex } else { CellKind::Edge }),
@@ -74,23 +75,4 @@ fn bezier_state(draft: &mut Draft, name: String, n: usize) -> StateId {
         leaf: if n <= 2 { LeafPrimitive::Simplex } else { LeafPrimitive::Centre },
         frame: false,
     })
-}
-
-/// De Casteljau at 1/2: column j of the left half holds binomial(j, k) / 2^j, the right half mirrors it.
-pub(super) fn halves(n: usize) -> [SubdivisionOperator; 2] {
-    let mut left = vec![0.0; n * n];
-    for j in 0..n {
-        let mut value = 0.5_f64.powi(j as i32);
-        for k in 0..=j {
-            left[j * n + k] = value;
-            value *= (j - k) as f64 / (k + 1) as f64;
-        }
-    }
-    let mut right = vec![0.0; n * n];
-    for j in 0..n {
-        for k in 0..n {
-            right[j * n + k] = left[(n - 1 - j) * n + (n - 1 - k)];
-        }
-    }
-    [SubdivisionOperator::exact(n, left), SubdivisionOperator::exact(n, right)]
 }

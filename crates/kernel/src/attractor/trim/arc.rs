@@ -1,5 +1,7 @@
 //! Pieces of trim curves: rational Bezier arcs in the parameter plane.
 
+use crate::de_casteljau::halves;
+
 /// A point of the parameter plane, (u, v).
 pub(crate) type Parameter = [f64; 2];
 
@@ -98,15 +100,7 @@ impl Arc {
 
     /// The two halves, by de Casteljau's algorithm.
     pub(super) fn halves(&self) -> [Self; 2] {
-        let mut row = self.points.clone();
-        let (mut left, mut right) = (vec![row[0]], vec![row[row.len() - 1]]);
-        while row.len() > 1 {
-            row = row.windows(2).map(|pair| std::array::from_fn(|k| 0.5 * (pair[0][k] + pair[1][k]))).collect();
-            left.push(row[0]);
-            right.push(row[row.len() - 1]);
-        }
-        right.reverse();
-        [Self { points: left }, Self { points: right }]
+        halves(&self.points, |a, b| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).map(|points| Self { points })
     }
 
     /// The least box of the control points: [low, high].

@@ -94,9 +94,10 @@ fn holds(solids: &[Filled<'_>], point: &Point) -> bool {
 pub fn hausdorff(a: &Attractor, b: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Hausdorff, ContactError> {
     let surfaces = [a, b].map(Attractor::surfaces);
     let solids = surfaces.each_ref().map(|own| own.iter().map(|mesh| Filled { mesh, inside: Inside::new(mesh) }).collect::<Vec<_>>());
+    let [same_of_first, same_of_second] = same::shared_solids([&solids[0], &solids[1]]);
     let (forwards, backwards) = rayon::join(
-        || directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], tolerance, budget),
-        || directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], tolerance, budget),
+        || directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], &same_of_first, tolerance, budget),
+        || directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], &same_of_second, tolerance, budget),
     );
     let ((from_first, first_complete), (from_second, second_complete)) = (forwards?, backwards?);
     Ok(Hausdorff { from_first, from_second, complete: first_complete && second_complete })
@@ -165,10 +166,10 @@ const MOST_BELOW: usize = 96;
 fn directed<'a>(
     [mut first, second]: [Tree<'a>; 2],
     solids: [&'a [Filled<'a>]; 2],
+    same_solids: &[bool],
     tolerance: Tolerance,
     budget: &'a Budget,
 ) -> Result<(Directed, bool), ContactError> {
-    let same_solids = same::shared_solids(solids[0], solids[1]);
     let mut search = Search {
         shared: same::shared(&mut first, &second),
         most: MOST_NODES + MORE_PER_NODE * (first.count() + second.count()) as u64,
@@ -190,7 +191,7 @@ fn directed<'a>(
         settled: 0.0,
     };
     search.look(Part::Node(0), &[0], &[], f64::INFINITY);
-    for (solid, _) in solids[0].iter().zip(same_solids).filter(|(_, same)| !same) {
+    for (solid, _) in solids[0].iter().zip(same_solids).filter(|(_, same)| !**same) {
         let Some(low) = solid.mesh.vertices.iter().copied().reduce(DVec3::min) else { continue };
         let high = solid.mesh.vertices.iter().copied().fold(low, DVec3::max);
         let (centre, half) = (0.5 * (low + high), 0.5 * (high - low).max_element() * (1.0 + 1e-9));

@@ -16,10 +16,6 @@ fn key(corners: &[Point]) -> Key {
     [&bits[least..], &bits[..least]].concat()
 }
 
-fn keys_of_solid(mesh: &TriMesh) -> HashSet<Key> {
-    mesh.triangles.iter().map(|triangle| key(&triangle.map(|index| mesh.vertices[index as usize].to_array()))).collect()
-}
-
 /// The simplices of a shape that are known exactly.
 fn exact<'t>(tree: &'t Tree<'_>, id: NodeId) -> Option<&'t Site> {
     match (tree.node(id).body.nature, tree.node(id).body.sites.as_slice()) {
@@ -46,8 +42,17 @@ pub(super) fn shared(first: &mut Tree<'_>, second: &Tree<'_>) -> Vec<bool> {
     shared
 }
 
-/// For every solid of the first shape, whether the second has the same one, triangle by triangle: nothing of its inside is outside of the second.
-pub(super) fn shared_solids(first: &[Filled<'_>], second: &[Filled<'_>]) -> Vec<bool> {
-    let known: Vec<HashSet<Key>> = second.iter().map(|solid| keys_of_solid(solid.mesh)).collect();
-    first.iter().map(|solid| known.contains(&keys_of_solid(solid.mesh))).collect()
+/// For every solid of either shape, whether the other has the same one, triangle by triangle: nothing of its inside is outside of the other.
+///
+/// Cost: one entry of a table per triangle of every solid that has as many triangles as some of the other shape.
+pub(super) fn shared_solids(solids: [&[Filled<'_>]; 2]) -> [Vec<bool>; 2] {
+    let count = |solid: &Filled<'_>| solid.mesh.triangles.len();
+    let keys = |mesh: &TriMesh| -> HashSet<Key> {
+        mesh.triangles.iter().map(|triangle| key(&triangle.map(|index| mesh.vertices[index as usize].to_array()))).collect()
+    };
+    let keys_of = |own: &[Filled<'_>], others: &[Filled<'_>]| -> Vec<Option<HashSet<Key>>> {
+        own.iter().map(|solid| others.iter().any(|other| count(other) == count(solid)).then(|| keys(solid.mesh))).collect()
+    };
+    let [first, second] = [keys_of(solids[0], solids[1]), keys_of(solids[1], solids[0])];
+    [(&first, &second), (&second, &first)].map(|(own, others)| own.iter().map(|keys| keys.is_some() && others.contains(keys)).collect())
 }

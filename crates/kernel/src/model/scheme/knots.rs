@@ -270,7 +270,7 @@ impl Pieces {
                 // A span lies in the hull of its Bezier points, which are halved by de Casteljau's algorithm.
                 hull: Some(Hull {
                     points: SubdivisionOperator::exact(degree + 1, bezier_points(&knots, degree).concat()),
-                    children: super::super::bezier::halves(degree + 1).to_vec(),
+                    children: crate::de_casteljau::operators(degree + 1).to_vec(),
                 }),
             });
         }

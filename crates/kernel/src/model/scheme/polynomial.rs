@@ -2,7 +2,7 @@
 
 use super::factor::{Factor, Piece, Span};
 use super::{Faults, Parametrization, lengths, windows};
-use crate::model::bezier::halves;
+use crate::de_casteljau::operators;
 use glam::DVec3;
 
 /// Control points of one Bezier curve in a product.
@@ -14,7 +14,7 @@ pub(super) fn piece(count: usize) -> Piece {
     Piece {
         name: format!("bezier curve of degree {}", count - 1),
         dimension: count,
-        children: halves(count).into_iter().map(|operator| (0, operator)).collect(),
+        children: operators(count).into_iter().map(|operator| (0, operator)).collect(),
         ends: [unit(0), unit(count - 1)],
         parameters: (0..count).map(|k| k as f64 / (count - 1) as f64).collect(),
         hull: None,
