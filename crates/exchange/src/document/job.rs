@@ -216,8 +216,7 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
         _ => false,
     };
     if !compares {
-        let mapped = document.params.thickness && document.outputs.iter().all(|name| name == Format::Ply.facts().ending);
-        let mapped = mapped || document.outputs.is_empty();
+        let mapped = document.params.thickness || document.outputs.is_empty();
         if let (JobKind::Measure, Some(place), false) = (document.kind, members.get("outputs"), mapped) {
             walker.fault(&place, code::CONFLICTING_MEMBERS, || MEASURED.into());
             return None;
@@ -670,10 +669,13 @@ fn outputs(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> 
         seen.push(name);
         Some(name.to_owned())
     })?;
+    if kind == Some(JobKind::Measure) && outputs.iter().any(|name| name != Format::Ply.facts().ending) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || MEASURED.into());
+        return None;
+    }
     for (index, name) in outputs.iter().enumerate() {
         let drawing = Format::from_name(name).is_some_and(Format::is_drawing);
-        // What a measure may deliver depends on its parameters: see `settle`.
-        if kind.is_some_and(|kind| kind != JobKind::Measure && (kind == JobKind::Slice) != drawing) {
+        if kind.is_some_and(|kind| (kind == JobKind::Slice) != drawing) {
             let wanted =
                 FORMATS.iter().map(|row| row.format).filter(|format| format.is_drawing() != drawing).map(|format| format.facts().ending);
             let wanted = wanted.collect::<Vec<_>>().join(", ");

@@ -8,7 +8,6 @@
 //! operator has negative entries. Ends of a curve among them are points of the attractor too.
 //!
 //! Products: (T_A x T_B) (H_A x H_B) = (H_A x H_B) (K_A x K_B).
-
 //!
 //! *Rounding.* What is computed of operators is not exact: T_e H_w = H_s K_e + E_e with small E_e. Sums of columns are 1, exactly, if what they are off is
 //! taken from the first row of T and H, and from the largest entry of each column of K; then columns of E sum to 0. Let x' = H_w p + y be a point of a child

@@ -78,6 +78,8 @@ const MOST_UNKNOWNS: usize = 256;
 const MOST_WORK: f64 = 4e7;
 /// Equations may miss by this much, relative to functionals of size 1.
 pub(super) const MISS: f64 = 1e-10;
+/// Where bounds of all that equations miss by come to more than this, in units of the domain, parameters say too little. Residuals count in every bound, so more is safe, too.
+const MOST_RESIDUAL: f64 = 1e-8;
 /// Lengths of a curve's domain and areas of a face's that rounding may hide, as a share of the whole. A hole of that
 /// area is at most its root wide, which is charged.
 pub(super) const SAME: f64 = 1e-12;
@@ -491,7 +493,15 @@ pub(super) fn scaled(raw: &[[f64; 2]], domain: &[[f64; 2]], residual: f64, margi
     let fit = if domain.len() == 2 { Vec::new() } else { fit(&parameters)? };
     let domain = domain.iter().map(map).collect();
     let measured = parameters.clone();
-    (residual <= MISS && norm.is_finite()).then(|| LinearPrecision { parameters, domain, residual, hull: None, margin, measured, fit })
+    (residual <= MOST_RESIDUAL && norm.is_finite()).then(|| LinearPrecision {
+        parameters,
+        domain,
+        residual,
+        hull: None,
+        margin,
+        measured,
+        fit,
+    })
 }
 
 /// The pseudo-inverse of the rows 1, G: least squares of an affine map.

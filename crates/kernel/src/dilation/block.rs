@@ -476,9 +476,8 @@ impl<'a> Workshop<'a> {
             return;
         }
         let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
-        if !self.has_witness(setting, &frame, &rest) {
-            self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), surface);
-        }
+        let witness = self.witness(setting, &frame, &rest);
+        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), witness, surface);
         if frame.covered == 0 {
             return;
         }
@@ -562,24 +561,26 @@ impl<'a> Workshop<'a> {
         })
     }
 
-    /// Whether a point tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron.
+    /// A point that tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron: it grows towards that point.
     ///
-    /// If x is critical, some closest point lies in every closed half-space through x: so d(y)^2 <= d(x)^2 + |y - x|^2 for all y.
-    fn has_witness(&mut self, setting: &Setting, frame: &Frame, rest: &[Point]) -> bool {
+    /// If x is critical, some closest point lies in every closed half-space through x: so d(y)^2 <= d(x)^2 + |y - x|^2 for all y. In the same way some closest point c with
+    /// (y - x) . (x - c) <= 0 gives that.
+    fn witness(&mut self, setting: &Setting, frame: &Frame, rest: &[Point]) -> Option<Point> {
         let outer = setting.outer * setting.outer;
         let needed = |y: &Point| outer + rest.iter().map(|x| distance_squared(x, y)).fold(0.0, f64::max) * (1.0 + 1e-9);
-        if (0..4).any(|k| frame.values[k].square > needed(&frame.positions[k])) {
-            return true;
+        if let Some(k) = (0..4).find(|&k| frame.values[k].square > needed(&frame.positions[k])) {
+            return Some(frame.positions[k]);
         }
         let middle: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).sum::<f64>() / rest.len().max(1) as f64);
         let foot: Point = std::array::from_fn(|axis| frame.values.iter().map(|value| 0.25 * value.closest[axis]).sum());
         let offset = subtract(&middle, &foot);
         let length = dot(&offset, &offset).sqrt();
-        WITNESSES.iter().any(|share| {
+        WITNESSES.iter().find_map(|share| {
             let y: Point = std::array::from_fn(|axis| middle[axis] + share * setting.reach * offset[axis] / length);
             let distance = needed(&y).sqrt();
-            distance + distance_squared(&y, &self.known.0).sqrt() <= self.known.1
-                && self.tree.nearest(&y, &self.near, self.seed, distance, distance).is_none()
+            let is_far = distance + distance_squared(&y, &self.known.0).sqrt() <= self.known.1
+                && self.tree.nearest(&y, &self.near, self.seed, distance, distance).is_none();
+            is_far.then_some(y)
         })
     }
 

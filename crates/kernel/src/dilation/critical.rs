@@ -2,8 +2,13 @@
 //!
 //! A point x is critical when it lies in the convex hull of its closest points. By Morse theory the dilations change their topology only at the values of critical points,
 //! and D(r) is, up to homotopy, D(s) with the hulls of those of values in (s, r] attached (Chazal, Cohen-Steiner and Lieutier, "A sampling theory for compact sets in Euclidean
-//! space", 2009). The solid lies between D(s) and D(outer). It has the topology of D(r) where every critical point of a value in (s, r] is inside and
-//! every one of a value in (r, outer] is outside. Both kinds lie in what the sites leave of a tetrahedron.
+//! space", 2009). The solid lies between D(s) and D(outer): every critical point of a value in (s, r] must be inside, and every one of a value in (r, outer] outside.
+//!
+//! That alone is not enough. In a tetrahedron the solid is where H = min L_i, affine functions, is below theta, and H has critical points of its own, where the origin is in the hull of the slopes of
+//! those that are lowest: a void or a handle may be there that the distance does not know. So a place x where d^2 and H are on different sides of theta must have a direction w along which
+//! both grow: w . (x - c) > 0 for all closest points c, and w . grad L_i > 0 for all that may be lowest. Then so do (1 - t) d^2 + t H for all t, and along a field of such directions
+//! none of their level sets can change its topology: the solid has that of D(r). Directions are found tetrahedron by tetrahedron. On the faces between two of them one direction has to do for both:
+//! the slopes of L_i for a point differ by sqrt(2) / 2 of an edge there ([`MARGIN`]). That much is not asked for: it costs half as much again, and that no two neighbours disagree is not shown.
 
 use super::block::{Frame, Nearby, place};
 use super::certificate::highest;
@@ -21,6 +26,9 @@ use crate::measure::triangle::{Feature, closest_feature};
 const MOST_WORK: usize = 4000;
 /// Boxes are halved down to so many binary places below a cube's edge: where no critical point is they are settled long before, and a finer lattice costs far more than a smaller box.
 const SMALLEST: u32 = 12;
+/// By how much functions must grow in boxes that reach a face of the tetrahedron, in units of a cube's edge: half the gradients of squared distances of points differ by sqrt(2) / 4 there. Without a margin
+/// one false void and some false handles were left of thousands of places in random trees and loose segments, with a tenth none.
+const MARGIN: f64 = 0.1;
 /// Boxes are halved along axes across which distances hardly vary, too, when they are so many times as long.
 const LEAST_SLOPE: f64 = 0.15;
 
@@ -61,7 +69,10 @@ struct View {
     distance: f64,
     /// The gradient of the distance.
     slope: Point,
-    closest: Point,
+    /// From the closest point.
+    away: Point,
+    /// Whether it may be the nearest somewhere in the box.
+    is_near: bool,
 }
 
 /// Working memory of the search.
@@ -69,6 +80,12 @@ struct View {
 pub(super) struct Critical {
     /// Points whose hull holds the closest points of active sites.
     closest: Vec<Point>,
+    /// Half the gradients of the squared distance and of H.
+    gradients: Vec<Point>,
+    /// How long half the gradients must be along a direction at faces, in mm.
+    margin: f64,
+    /// The unit of functions, in mm^2.
+    unit: f64,
     /// The sites of a box.
     views: Vec<View>,
     /// Corners of what the sites leave.
@@ -95,7 +112,7 @@ struct Open {
 
 impl Critical {
     /// Looks for critical points on the wrong side in what the sites leave of a tetrahedron, of which the corners are given, and notes the cubes that must be
-    /// subdivided to bring them to the right one.
+    /// subdivided to bring them to the right one. A witness is a point towards which the distance grows in all of it.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn search(
         &mut self,
@@ -105,37 +122,43 @@ impl Critical {
         smooth: u16,
         nearby: &[Nearby],
         corners: &[Corner],
+        witness: Option<Point>,
         surface: &mut BlockSurface,
     ) {
-        if self.may_be(setting, tree, frame, nearby, corners) {
-            self.prepare(frame, smooth, nearby);
-            self.refine(setting, tree, frame, nearby, surface);
-        }
-    }
-
-    /// Whether no plane parts what is left from the closest points of the sites that are active there.
-    fn may_be(&mut self, setting: &Setting, tree: &Tree<'_>, frame: &Frame, nearby: &[Nearby], corners: &[Corner]) -> bool {
-        if nearby.len() < 2 {
-            return false;
-        }
         let band = setting.bands[frame.level as usize] as f64;
         let least = |values: &[i64; 4]| -> f64 {
             corners.iter().map(|corner| (0..4).map(|k| corner.weights[k] * values[k] as f64).sum()).fold(f64::INFINITY, f64::min)
         };
-        self.closest.clear();
-        let mut active = 0;
-        for nearby in nearby {
-            if least(&nearby.half_space.values) <= band {
-                active += 1;
-                add_closest(&tree.site(nearby.site).site, &frame.positions, &mut self.closest);
-            }
+        // Where d is at most outer, L_i is above the band for sites that are neither nearest nor lowest.
+        self.active.clear();
+        self.active.extend((0..nearby.len() as u32).filter(|&index| least(&nearby[index as usize].half_space.values) <= band));
+        if self.active.len() < 2 {
+            return;
         }
-        if active < 2 {
-            return false;
-        }
+        self.prepare(frame, smooth, nearby);
+        self.margin = MARGIN * setting.lattice.pitch / f64::from(1 << frame.level);
+        self.unit = setting.unit();
         self.rest.clear();
         self.rest.extend(corners.iter().map(|corner| place(&frame.positions, &corner.weights)));
-        !are_parted(&self.rest, &self.closest)
+        // Along the way to the witness, from every place.
+        if witness.is_some_and(|y| self.rest.iter().all(|x| self.all_grow(&subtract(&y, x)))) {
+            return;
+        }
+        self.closest.clear();
+        for &index in &self.active {
+            add_closest(&tree.site(nearby[index as usize].site).site, &frame.positions, &mut self.closest);
+        }
+        if parted(&self.rest, &self.closest).is_some_and(|direction| self.all_grow(&direction)) {
+            return;
+        }
+        self.refine(setting, tree, frame, nearby, surface);
+    }
+
+    /// Whether all functions that may be lowest grow along a direction.
+    fn all_grow(&self, direction: &Point) -> bool {
+        let sites = self.active.iter().map(|&index| &self.sites[index as usize]);
+        let least = 2.0 * self.margin * dot(direction, direction).sqrt() / self.unit;
+        sites.chain(&self.functions).all(|function| dot(&function.slope, direction) > least)
     }
 
     fn prepare(&mut self, frame: &Frame, smooth: u16, nearby: &[Nearby]) {
@@ -155,13 +178,11 @@ impl Critical {
         let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + SMALLEST));
         let mut open = std::mem::take(&mut self.open);
         open.clear();
-        self.active.clear();
-        self.active.extend(0..nearby.len() as u32);
         open.push(Open {
             middle: std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis])),
             half: std::array::from_fn(|axis| 0.5 * (high[axis] - low[axis])),
             first: 0,
-            end: nearby.len(),
+            end: self.active.len(),
         });
         let mut work = 0;
         while let Some(Open { middle, half, first, end }) = open.pop() {
@@ -223,34 +244,45 @@ impl Critical {
         if self.weights.iter().any(below) || self.active[first..].iter().any(|&site| below(&self.sites[site as usize])) {
             return true;
         }
+        let lowest = self.active[first..].iter().map(|&site| &self.sites[site as usize]).chain(&self.functions);
+        let lowest = lowest.map(|function| function.over(&offset, half)[1]).fold(f64::INFINITY, f64::min);
+        let may_be_lowest = |function: &Affine| function.over(&offset, half)[0] <= lowest;
         let (active, views) = (&self.active, &mut self.views);
         views.clear();
         views.extend(active[first..].iter().map(|&index| {
             let site = tree.site(nearby[index as usize].site);
-            let closest = site.closest(x);
-            let away = subtract(x, &closest);
+            let away = subtract(x, &site.closest(x));
             let distance = (dot(&away, &away) + site.deficit).sqrt();
-            View { site: index, distance, slope: away.map(|part| part / distance.max(f64::MIN_POSITIVE)), closest }
+            View { site: index, distance, slope: away.map(|part| part / distance.max(f64::MIN_POSITIVE)), away, is_near: false }
         }));
         let Some(nearest) = views.iter().min_by(|a, b| a.distance.total_cmp(&b.distance)) else { return true };
         let site = tree.site(nearby[nearest.site as usize].site);
         let corner = |code: usize| std::array::from_fn(|axis| x[axis] + if code >> axis & 1 == 1 { half[axis] } else { -half[axis] });
         let high = (0..8).map(|code| site.distance_squared(&corner(code))).fold(0.0, f64::max).sqrt();
-        views.retain(|view| view.distance - range(&view.slope, half) <= high);
-        let low = views.iter().map(|view| view.distance - range(&view.slope, half)).fold(f64::INFINITY, f64::min);
+        views.iter_mut().for_each(|view| view.is_near = view.distance - range(&view.slope, half) <= high);
         let own = |view: &View| &self.sites[view.site as usize];
+        views.retain(|view| view.is_near || may_be_lowest(own(view)));
+        let near = || views.iter().filter(|view| view.is_near);
+        let low = near().map(|view| view.distance - range(&view.slope, half)).fold(f64::INFINITY, f64::min);
         // A site that is nowhere nearest has L >= d^2 - theta > 0 where the others have d > r.
         if low > setting.outer
             || (high <= setting.reach && self.functions.iter().any(below))
-            || (low > setting.reach && self.functions.iter().all(above) && views.iter().all(|view| above(own(view))))
+            || (low > setting.reach && self.functions.iter().all(above) && near().all(|view| above(own(view))))
         {
             return true;
         }
-        self.closest.clear();
-        self.closest.extend(views.iter().map(|view| view.closest));
-        // Closest points of other points of the box are as near to these as the points are to the middle.
+        self.gradients.clear();
+        self.gradients.extend(near().map(|view| view.away));
+        let of_distance = self.gradients.len();
+        let low_functions = views.iter().map(own).chain(&self.functions).filter(|function| may_be_lowest(function));
+        self.gradients.extend(low_functions.map(|function| function.slope.map(|part| 0.5 * self.unit * part)));
+        // Where the closest point moves, it moves no farther than the place: so much is a gradient of the distance off.
         let around = dot(half, half).sqrt();
-        if is_farther(x, &self.closest, 2.0 * around) || is_beyond(views, tree, nearby, x, half) {
+        let reaches_face = self.weights.iter().any(|weight| weight.over(&offset, half)[0] <= 0.0);
+        let margin = if reaches_face { self.margin } else { 0.0 };
+        if avoids_origin(&self.gradients, 2.0 * around + margin)
+            || (!reaches_face && is_beyond(views, &self.gradients[of_distance..], tree, nearby, x, half))
+        {
             return true;
         }
         self.active.extend(self.views.iter().map(|view| view.site));
@@ -258,12 +290,16 @@ impl Critical {
     }
 }
 
-/// Whether all of a box lies beyond all sites along one direction: no point of it is then in a hull of points of theirs.
-fn is_beyond(views: &[View], tree: &Tree<'_>, nearby: &[Nearby], x: &Point, half: &Point) -> bool {
-    let direction = views.iter().fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.slope[axis]));
+/// Whether all of a box lies beyond all sites that are near along one direction, along which the lowest functions grow: no point of it is then in a hull of points of these sites.
+fn is_beyond(views: &[View], slopes: &[Point], tree: &Tree<'_>, nearby: &[Nearby], x: &Point, half: &Point) -> bool {
+    let near = || views.iter().filter(|view| view.is_near);
+    let direction = near().fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.slope[axis]));
+    if slopes.iter().any(|slope| dot(slope, &direction) <= 0.0) {
+        return false;
+    }
     let least = dot(&direction, x) - range(&direction, half);
     let slack = 1e-12 * (dot(&direction, &direction) * dot(x, x)).sqrt();
-    views.iter().all(|view| highest(&tree.site(nearby[view.site as usize].site).site, &direction) + slack < least)
+    near().all(|view| highest(&tree.site(nearby[view.site as usize].site).site, &direction) + slack < least)
 }
 
 /// Adds points whose hull holds the closest points of a site to all points of a tetrahedron.
@@ -301,21 +337,21 @@ fn add_closest(site: &Site, positions: &[Point; 4], closest: &mut Vec<Point>) {
     }
 }
 
-/// Whether a point is surely farther than `distance` from the convex hull of others.
-fn is_farther(x: &Point, others: &[Point], distance: f64) -> bool {
-    let Some(first) = others.first() else { return true };
-    let lowest = |direction: &Point| subtract(x, farthest(others, direction).unwrap_or(first));
-    parting(subtract(x, first), distance, lowest, |direction, lowest| is_above(direction, lowest, distance)).is_some()
+/// Whether the hull of some vectors is surely farther than `distance` from the origin.
+fn avoids_origin(vectors: &[Point], distance: f64) -> bool {
+    let Some(first) = vectors.first() else { return true };
+    let lowest = |direction: &Point| *farthest(vectors, &direction.map(|part| -part)).unwrap_or(first);
+    parting(*first, distance, lowest, |direction, lowest| is_above(direction, lowest, distance)).is_some()
 }
 
-/// Whether a plane surely parts two sets of points.
-fn are_parted(points: &[Point], others: &[Point]) -> bool {
-    let (Some(point), Some(other)) = (points.first(), others.first()) else { return true };
+/// A vector along which all points of one set surely are beyond those of another.
+fn parted(points: &[Point], others: &[Point]) -> Option<Point> {
+    let (point, other) = (points.first()?, others.first()?);
     let lowest = |direction: &Point| {
         let backwards = direction.map(|part| -part);
         subtract(farthest(points, &backwards).unwrap_or(point), farthest(others, direction).unwrap_or(other))
     };
-    parting(subtract(point, other), 0.0, lowest, |direction, lowest| is_above(direction, lowest, 0.0)).is_some()
+    parting(subtract(point, other), 0.0, lowest, |direction, lowest| is_above(direction, lowest, 0.0))
 }
 
 /// Whether a point is surely higher than `distance` along a direction.
@@ -376,9 +412,9 @@ mod tests {
             let offset = 1.2 * next();
             let points: Vec<Point> = (0..count).map(|_| [next() + offset, thin * next() + 0.3 * offset, flat * next()]).collect();
             let (true_distance, distance) = (distance_from_hull(&points), 0.4 * next().abs());
-            let found = is_farther(&[0.0; 3], &points, distance);
+            let found = avoids_origin(&points, distance);
             assert!(!found || true_distance > distance * (1.0 - 1e-9), "{points:?}: {true_distance} {distance}");
-            let parted = are_parted(&[[0.0; 3]], &points);
+            let parted = parted(&[[0.0; 3]], &points).is_some();
             assert!(!parted || true_distance > 0.0, "{points:?}: {true_distance}");
             if true_distance > 1.001 * distance + 1e-6 {
                 apart += 1;

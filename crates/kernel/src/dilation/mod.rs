@@ -6,8 +6,8 @@
 //! for the sites (see `block`). theta = r^2, and R^2 = r^2 - (r - e)^2 is a pitch of some 2.5 sqrt(r e), whatever the shape, and
 //! 0.65 r at most: above that, which is where e is larger than r / 14, surfaces take longer for more triangles (see `plan`).
 //!
-//! Where the solid leaves out a critical point of the distance below r, the lattice is refined until it does not: by Morse
-//! theory the solid then has all of D(r)'s topology (see `block`). Where no level is fine enough, that is counted as uncertain.
+//! Where the solid leaves out a critical point of the distance below r, or has one of its own, the lattice is refined until it does not: in every tetrahedron the solid then has
+//! D(r)'s topology (see `critical`, and there what is not shown). Where no level is fine enough, that is counted as uncertain.
 //!
 //! Where points stand for cells, as in most fractals, there are too many of them to be told apart. There the least squared distance at the lattice's vertices alone decides
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.

@@ -141,6 +141,11 @@ impl Setting {
         }
     }
 
+    /// The unit q of integer values, in mm^2.
+    pub(super) fn unit(&self) -> f64 {
+        self.inverse_unit.recip()
+    }
+
     /// A squared distance less theta as an integer, never 0.
     #[inline]
     pub(super) fn integer(&self, distance_squared: f64) -> i64 {
