@@ -15,6 +15,19 @@ pub(crate) fn mix(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
+/// A generator for tests.
+#[cfg(test)]
+pub(crate) struct Random(pub(crate) u64);
+
+#[cfg(test)]
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        let number = number(self.0);
+        self.0 = self.0.wrapping_add(STEP);
+        number
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -181,17 +181,8 @@ fn highest(attractor: &Attractor, id: StateId, row: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::model::{ControlNet, CurveScheme, Model, Shape, TensorProduct};
-    use crate::split_mix;
+    use crate::split_mix::Random;
     use glam::DVec3;
-
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> u64 {
-            self.0 = self.0.wrapping_add(split_mix::STEP);
-            split_mix::mix(self.0)
-        }
-    }
 
     /// A product of two schemes on five by four points.
     fn product(schemes: [CurveScheme; 2]) -> Attractor {

@@ -281,16 +281,7 @@ mod tests {
     use super::*;
     use crate::automaton::convergence::contraction;
     use crate::automaton::{Smooth, State, Transition};
-    use crate::split_mix;
-
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> u64 {
-            self.0 = self.0.wrapping_add(split_mix::STEP);
-            split_mix::mix(self.0)
-        }
-    }
+    use crate::split_mix::Random;
 
     /// De Casteljau's halves of a curve, as operators on points that are other than its Bezier points, with errors that are added to them.
     fn curve(errors: f64, random: &mut Random) -> (Automaton, Hull) {

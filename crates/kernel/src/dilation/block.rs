@@ -477,7 +477,7 @@ impl<'a> Workshop<'a> {
         }
         let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
         let witness = self.witness(setting, &frame, &rest);
-        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), witness, surface);
+        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), &rest, witness, surface);
         if frame.covered == 0 {
             return;
         }

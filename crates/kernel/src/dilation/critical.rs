@@ -10,7 +10,7 @@
 //! none of their level sets can change its topology: the solid has that of D(r). Directions are found tetrahedron by tetrahedron. On the faces between two of them one direction has to do for both:
 //! the slopes of L_i for a point differ by sqrt(2) / 2 of an edge there ([`MARGIN`]). That much is not asked for: it costs half as much again, and that no two neighbours disagree is not shown.
 
-use super::block::{Frame, Nearby, place};
+use super::block::{Frame, Nearby};
 use super::certificate::highest;
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
@@ -88,8 +88,6 @@ pub(super) struct Critical {
     unit: f64,
     /// The sites of a box.
     views: Vec<View>,
-    /// Corners of what the sites leave.
-    rest: Vec<Point>,
     /// What sites cover, what V's cover, and the tetrahedron itself.
     sites: Vec<Affine>,
     functions: Vec<Affine>,
@@ -111,7 +109,7 @@ struct Open {
 }
 
 impl Critical {
-    /// Looks for critical points on the wrong side in what the sites leave of a tetrahedron, of which the corners are given, and notes the cubes that must be
+    /// Looks for critical points on the wrong side in what the sites leave of a tetrahedron, of which the corners and their places, `rest`, are given, and notes the cubes that must be
     /// subdivided to bring them to the right one. A witness is a point towards which the distance grows in all of it.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn search(
@@ -122,6 +120,7 @@ impl Critical {
         smooth: u16,
         nearby: &[Nearby],
         corners: &[Corner],
+        rest: &[Point],
         witness: Option<Point>,
         surface: &mut BlockSurface,
     ) {
@@ -138,20 +137,18 @@ impl Critical {
         self.prepare(frame, smooth, nearby);
         self.margin = MARGIN * setting.lattice.pitch / f64::from(1 << frame.level);
         self.unit = setting.unit();
-        self.rest.clear();
-        self.rest.extend(corners.iter().map(|corner| place(&frame.positions, &corner.weights)));
         // Along the way to the witness, from every place.
-        if witness.is_some_and(|y| self.rest.iter().all(|x| self.all_grow(&subtract(&y, x)))) {
+        if witness.is_some_and(|y| rest.iter().all(|x| self.all_grow(&subtract(&y, x)))) {
             return;
         }
         self.closest.clear();
         for &index in &self.active {
             add_closest(&tree.site(nearby[index as usize].site).site, &frame.positions, &mut self.closest);
         }
-        if parted(&self.rest, &self.closest).is_some_and(|direction| self.all_grow(&direction)) {
+        if parted(rest, &self.closest).is_some_and(|direction| self.all_grow(&direction)) {
             return;
         }
-        self.refine(setting, tree, frame, nearby, surface);
+        self.refine(setting, tree, frame, nearby, rest, surface);
     }
 
     /// Whether all functions that may be lowest grow along a direction.
@@ -172,9 +169,10 @@ impl Critical {
     }
 
     /// Branch and bound over boxes, until one is found that is not settled.
-    fn refine(&mut self, setting: &Setting, tree: &Tree<'_>, frame: &Frame, nearby: &[Nearby], surface: &mut BlockSurface) {
-        let low: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
-        let high: Point = std::array::from_fn(|axis| self.rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
+    #[allow(clippy::too_many_arguments)]
+    fn refine(&mut self, setting: &Setting, tree: &Tree<'_>, frame: &Frame, nearby: &[Nearby], rest: &[Point], surface: &mut BlockSurface) {
+        let low: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min));
+        let high: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max));
         let smallest = setting.lattice.pitch / f64::from(1 << (frame.level + SMALLEST));
         let mut open = std::mem::take(&mut self.open);
         open.clear();
