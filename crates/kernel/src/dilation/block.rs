@@ -134,8 +134,6 @@ pub(super) struct Workshop<'a> {
     corners: Vec<u32>,
     numbers: Vec<u32>,
     critical: Critical,
-    /// Middle of the sub-block, and how far around it all sites are known.
-    known: (Point, f64),
     /// The cubes of the sub-block that are looked at, by their offset from its first.
     cubes: Vec<[i64; 3]>,
     leaves: Vec<Cube>,
@@ -178,7 +176,6 @@ impl<'a> Workshop<'a> {
             corners: Vec::new(),
             numbers: Vec::new(),
             critical: Critical::default(),
-            known: ([0.0; 3], 0.0),
             cubes: Vec::new(),
             leaves: Vec::new(),
             names: NameMap::default(),
@@ -215,6 +212,7 @@ impl<'a> Workshop<'a> {
             }
         }
         surface.shared.sort_unstable();
+        surface.shrink();
         surface.critical.sort_unstable();
         surface.critical.dedup();
         surface.uncertain.sort_unstable();
@@ -255,7 +253,6 @@ impl<'a> Workshop<'a> {
         let mut near = std::mem::take(&mut self.near);
         self.tree.gather(&middle, starts, setting.sight + half, &mut near);
         self.near = near;
-        self.known = (middle, setting.sight + half);
         self.gather_solids(starts, open, &middle, half);
         let (chosen, mut leaves) = (std::mem::take(&mut self.cubes), std::mem::take(&mut self.leaves));
         let plain = if setting.dense { grading.plain(first, SUB) } else { Plain::default() };
@@ -476,8 +473,7 @@ impl<'a> Workshop<'a> {
             return;
         }
         let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
-        let witness = self.witness(setting, &frame, &rest);
-        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), &rest, witness, surface);
+        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), &rest, surface);
         if frame.covered == 0 {
             return;
         }
@@ -558,29 +554,6 @@ impl<'a> Workshop<'a> {
         hit.is_some_and(|hit| {
             let site = self.tree.site(hit.site);
             serves(&[frame.positions.map(|x| site.distance_squared(&x))])
-        })
-    }
-
-    /// A point that tells that the distance has no critical point of a value up to `outer` in the hull of `rest`, a part of the tetrahedron: it grows towards that point.
-    ///
-    /// If x is critical, some closest point lies in every closed half-space through x: so d(y)^2 <= d(x)^2 + |y - x|^2 for all y. In the same way some closest point c with
-    /// (y - x) . (x - c) <= 0 gives that.
-    fn witness(&mut self, setting: &Setting, frame: &Frame, rest: &[Point]) -> Option<Point> {
-        let outer = setting.outer * setting.outer;
-        let needed = |y: &Point| outer + rest.iter().map(|x| distance_squared(x, y)).fold(0.0, f64::max) * (1.0 + 1e-9);
-        if let Some(k) = (0..4).find(|&k| frame.values[k].square > needed(&frame.positions[k])) {
-            return Some(frame.positions[k]);
-        }
-        let middle: Point = std::array::from_fn(|axis| rest.iter().map(|x| x[axis]).sum::<f64>() / rest.len().max(1) as f64);
-        let foot: Point = std::array::from_fn(|axis| frame.values.iter().map(|value| 0.25 * value.closest[axis]).sum());
-        let offset = subtract(&middle, &foot);
-        let length = dot(&offset, &offset).sqrt();
-        WITNESSES.iter().find_map(|share| {
-            let y: Point = std::array::from_fn(|axis| middle[axis] + share * setting.reach * offset[axis] / length);
-            let distance = needed(&y).sqrt();
-            let is_far = distance + distance_squared(&y, &self.known.0).sqrt() <= self.known.1
-                && self.tree.nearest(&y, &self.near, self.seed, distance, distance).is_none();
-            is_far.then_some(y)
         })
     }
 
@@ -842,8 +815,6 @@ fn moved(at: [i64; 3], by: [i64; 3]) -> [i64; 3] {
 const WALK: usize = 12;
 /// How far the witnesses of vertices are from the closest points, in units of r.
 pub(super) const WITNESS: f64 = 1.5;
-/// How far beyond the surface witnesses of tetrahedra are looked for, in units of r.
-const WITNESSES: [f64; 2] = [0.5, 0.3];
 /// The bit that tells names of V from those of sites.
 const VIRTUAL: u64 = 1 << 63;
 

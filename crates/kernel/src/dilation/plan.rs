@@ -46,6 +46,8 @@ pub(crate) struct Setting {
     pub(super) filled_value: i64,
     /// outer^2 + R^2 less theta by level, as an integer.
     pub(super) bands: [i64; LEVELS as usize + 1],
+    /// R^2 by level.
+    pub(super) inner_bands: [i64; LEVELS as usize + 1],
     /// A site nearer than this to a vertex covers all tetrahedra there.
     pub(super) deep: f64,
     /// 1 / q, with q the unit in which squared distances are compared.
@@ -109,6 +111,8 @@ impl Setting {
         let (theta, enclosing) = (radius * radius, (ENCLOSING * pitch).powi(2));
         let near = (outer * outer + enclosing).sqrt();
         let horizon = near.max(radius + 1.001 * pitch);
+        // Beside larger cubes there are tetrahedra on half a face: the ball around the face's diagonal holds them.
+        let enclosing_of = |level: usize| if level == 0 { enclosing } else { 0.5 * pitch * pitch * 0.25_f64.powi(level as i32) };
         // Values of sites that matter are within -theta and (near + a)^2 - theta.
         let largest = ((near + 1.001 * pitch).powi(2) - theta).max(theta);
         let inverse_unit = (MOST - 2 * MOST_NOISE) as f64 / largest;
@@ -124,7 +128,8 @@ impl Setting {
             thinnest: least(radius, pitch),
             outer,
             filled_value: -1,
-            bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing * 0.25_f64.powi(level as i32))),
+            bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing_of(level))),
+            inner_bands: std::array::from_fn(|level| integer(enclosing_of(level))),
             deep: (radius - pitch * 1.000_1).max(0.0),
             inverse_unit,
             most: integer(largest),

@@ -41,6 +41,15 @@ pub(super) struct BlockSurface {
 pub(super) type Blocks = BTreeMap<[i64; 3], Mutex<BlockSurface>>;
 
 impl BlockSurface {
+    /// Gives back what lists have grown beyond their length: all blocks are held at once.
+    pub(super) fn shrink(&mut self) {
+        self.vertices.shrink_to_fit();
+        self.triangles.shrink_to_fit();
+        self.shared.shrink_to_fit();
+        self.names.shrink_to_fit();
+        self.pieces.shrink_to_fit();
+    }
+
     /// Drops the triangles of leaves whose tetrahedra are others now.
     pub(super) fn drop_changed(&mut self, changed: &Changed) {
         let mut kept = Vec::with_capacity(self.triangles.len());
