@@ -5,7 +5,7 @@
 //! may end the process in others.
 
 use lacuna_kernel::budget::{Budget, CancelToken, Stopped};
-use lacuna_kernel::solid::{Crossings, TriMesh};
+use lacuna_kernel::solid::{Crossings, TriMesh, misplaced_shell};
 
 use crate::{BooleanError, Fault};
 
@@ -44,8 +44,13 @@ pub(crate) fn check(
         if let Some(fault) = fault(mesh) {
             return refused(fault);
         }
-        if meets_itself(mesh, cancel)? && overlaps(operand, mesh)? {
-            return refused(Fault::SelfIntersecting);
+        if meets_itself(mesh, cancel)? {
+            if overlaps(operand, mesh)? {
+                return refused(Fault::SelfIntersecting);
+            }
+        } else if let Some(shell) = misplaced_shell(mesh) {
+            // Where shells touch it is not told on which sides of each other they lie.
+            return refused(Fault::MisplacedShell(shell));
         }
     }
     Ok(())
