@@ -198,6 +198,12 @@ fn what_is_no_solid_is_refused() {
     mesh.vertices[7] = DVec3::splat(-3.0);
     let error = combine(Operation::Union, 1e-3, cubes(Shape::Mesh(mesh)), &Budget::default()).unwrap_err();
     assert!(error.message.starts_with("input '0'"), "{error}");
+    // A cube in a cube, both outward: their union is 8 mm^3, and sums over all triangles are 9.
+    let (Shape::Mesh(mut outer), Shape::Mesh(inner)) = (cube([0.0; 3], 2.0), cube([0.5; 3], 1.0)) else { panic!() };
+    outer.faces.extend(inner.faces.iter().map(|face| face.iter().map(|corner| corner + 8).collect()));
+    outer.vertices.extend(inner.vertices);
+    let error = combine(Operation::Union, 1e-3, cubes(Shape::Mesh(outer)), &Budget::default()).unwrap_err();
+    assert_eq!((error.code, error.message.contains("0.5, 0.5, 0.5")), ("boolean.misplaced-shell", true), "{error}");
     let error = combine(Operation::Union, 1e-3, cubes(cube([1e6; 3], 2.0)), &Budget::default()).unwrap_err();
     assert_eq!(error.limit.unwrap().remedy.unwrap().0, "tolerance_mm");
     let error = combine(Operation::Union, 1e-3, vec![(cube([0.0; 3], 1.0), None)], &Budget::default()).unwrap_err();

@@ -228,3 +228,45 @@ fn extents_along_a_direction() {
     assert_within(found.width_mm, 100.0 * 3.0_f64.sqrt() / 6.0, 1e-6);
     assert_within(found.to_mm, 0.0, 1e-6);
 }
+
+/// Cubes as one mesh, from and to these corners of their diagonals; those whose ends are exchanged face inwards.
+fn cubes(ends: &[[f64; 2]]) -> Model {
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for &[low, high] in ends {
+        let end = |code: usize, axis: usize| if code >> axis & 1 == 1 { high } else { low };
+        let outward: [[usize; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        faces.extend(outward.map(|face| face.map(|corner| (vertices.len() + corner) as u32).to_vec()));
+        vertices.extend((0..8).map(|code| DVec3::new(end(code, 0), end(code, 1), end(code, 2))));
+    }
+    Model { name: None, shape: Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Auto }) }
+}
+
+/// Sums over the triangles of a mesh count a place as often as it winds around it: that is no volume where it is not 0 or 1.
+#[test]
+fn volumes_that_count_a_place_twice_say_so() {
+    let told = |ends: &[[f64; 2]]| measured(cubes(ends), Params::new(0.01));
+    for (solid, volume) in [(&[[0.0, 1.0]][..], 1.0), (&[[0.0, 4.0], [3.0, 1.0]], 56.0), (&[[0.0, 1.0], [2.0, 4.0]], 9.0)] {
+        let found = told(solid);
+        assert_within(found.volume_mm3.unwrap(), volume, 1e-9);
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    }
+    let crossing = told(&[[0.0, 2.0], [1.0, 3.0]]);
+    assert!(crossing.warnings[0].contains("counts twice"), "{:?}", crossing.warnings);
+    let nested = told(&[[0.0, 4.0], [1.0, 3.0]]);
+    assert!(nested.warnings[0].contains("the shell at 1, 1, 1 lies inside of another"), "{:?}", nested.warnings);
+    assert!(nested.warnings[0].contains("counts 2 times"), "{:?}", nested.warnings);
+    let beside = told(&[[0.0, 4.0], [6.0, 5.0]]);
+    assert!(beside.warnings[0].contains("counts -1 times"), "{:?}", beside.warnings);
+}
+
+/// Volumes and moments beyond the range of numbers are refused, and were once an internal error.
+#[test]
+fn shapes_too_large_for_numbers_are_refused() {
+    let inputs = vec![Input { name: "shape".into(), model: cubes(&[[0.0, 1e150]]), radius_mm: None }];
+    let job = Job { kind: JobKind::Measure, inputs, params: Params::new(0.01), outputs: Vec::new(), limits: Limits::default() };
+    let error = run(&job, &Budget::default()).unwrap_err();
+    assert_eq!(error.code, "measure.too-large");
+    let found = measured(cubes(&[[0.0, 1e40]]), Params::new(0.01));
+    assert_within(found.volume_mm3.unwrap().map(|volume| volume / 1e120), 1.0, 1e-9);
+    assert_within(found.inertia_mm5.unwrap()[2][2].map(|moment| moment / 1e200), 1.0 / 6.0, 1e-5);
+}

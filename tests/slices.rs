@@ -77,6 +77,38 @@ fn a_hole_and_an_oblique_plane() {
     assert!(certificate["warnings"][0].as_str().unwrap().contains("1 of 2 sections are empty"), "{}", certificate["warnings"]);
 }
 
+/// Planes are cut where they leave the solid above them: at its bottom, not at its top.
+#[test]
+fn what_is_empty_or_counts_twice_is_said() {
+    let folder = Scratch::new();
+    let (model, svg, told) = (folder.join("cubes.json"), folder.join("cubes.svg"), folder.join("told.json"));
+    let cut = |cubes: &[[f64; 2]], words: [&str; 2]| {
+        let outward = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let corner = |ends: &[f64; 2], code: usize| [0, 1, 2].map(|axis| ends[code >> axis & 1]);
+        let vertices: Vec<[f64; 3]> = cubes.iter().flat_map(|ends| (0..8).map(move |code| corner(ends, code))).collect();
+        let faces: Vec<[usize; 4]> = (0..cubes.len()).flat_map(|cube| outward.map(|face| face.map(|k| 8 * cube + k))).collect();
+        write(&model, &serde_json::json!({ "family": "mesh", "vertices": vertices, "faces": faces }));
+        let words = ["slice", "--tolerance", "0.001", words[0], words[1], "-o"].map(std::ffi::OsStr::new);
+        binary::succeed(words.into_iter().chain([svg.as_os_str(), "--certificate".as_ref(), told.as_os_str(), model.as_os_str()]));
+        let certificate = certificate(&told);
+        let warnings =
+            certificate["warnings"].as_array().unwrap().iter().map(|words| words.as_str().unwrap().to_owned()).collect::<Vec<_>>();
+        (certificate["sections"]["planes"].clone(), warnings.join("; "))
+    };
+    let (planes, said) = cut(&[[0.0, 1.0]], ["--at", "0,1"]);
+    assert_eq!((planes[0]["area_mm2"].as_f64(), planes[1]["polygons"].as_u64()), (Some(1.0), Some(0)));
+    assert!(said.contains("only touch it from above"), "{said}");
+    let (planes, said) = cut(&[[0.0, 1.0]], ["--step", "3"]);
+    assert_eq!(planes.as_array().map(Vec::len), Some(0));
+    assert!(said.contains("smaller step"), "{said}");
+    let (planes, said) = cut(&[[0.0, 4.0], [3.0, 1.0]], ["--at", "2"]);
+    assert!((planes[0]["area_mm2"].as_f64().unwrap() - 12.0).abs() < 1e-6 && !said.contains("counts"), "{planes} {said}");
+    let (_, said) = cut(&[[0.0, 4.0], [1.0, 3.0]], ["--at", "2"]);
+    assert!(said.contains("counts 2 times"), "{said}");
+    let (_, said) = cut(&[[0.0, 2.0], [1.0, 3.0]], ["--at", "1.5"]);
+    assert!(said.contains("counts twice"), "{said}");
+}
+
 #[test]
 fn what_cannot_be_cut_is_refused() {
     let folder = Scratch::new();

@@ -2,9 +2,10 @@
 
 use lacuna_kernel::budget::Stopped;
 use lacuna_kernel::error::Kind;
+use lacuna_kernel::solid::MisplacedShell;
 
 /// What keeps a mesh from being an operand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     /// A triangle names a vertex that is not there, or the same one twice.
     #[error("triangle {triangle} names a vertex that does not exist, or one vertex twice")]
@@ -32,10 +33,13 @@ pub enum Fault {
     /// Two of its triangles cross, overlap or coincide.
     #[error("its triangles intersect each other")]
     SelfIntersecting,
+    /// Its shells are not nested as those of a solid are.
+    #[error("{0}; give each shell as an input of its own")]
+    MisplacedShell(MisplacedShell),
 }
 
 /// Why there is no result.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BooleanError {
     /// An operand is not a closed, outward mesh without self-intersections.
     #[error("operand {operand} is not a solid: {fault}")]
@@ -95,6 +99,7 @@ impl BooleanError {
                 Fault::NotClosed { .. } => "boolean.not-closed",
                 Fault::InsideOut => "boolean.inside-out",
                 Fault::SelfIntersecting => "boolean.self-intersecting",
+                Fault::MisplacedShell(_) => "boolean.misplaced-shell",
             },
             Self::TooLarge { .. } => "boolean.operand-too-large",
             Self::ResultTooLarge => "boolean.result-too-large",

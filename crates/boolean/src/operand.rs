@@ -5,8 +5,7 @@
 //! may end the process in others.
 
 use lacuna_kernel::budget::{Budget, CancelToken, Stopped};
-use lacuna_kernel::solid::{Crossings, TriMesh};
-use rayon::prelude::*;
+use lacuna_kernel::solid::{Crossings, TriMesh, misplaced_shell};
 
 use crate::{BooleanError, Fault};
 
@@ -45,8 +44,13 @@ pub(crate) fn check(
         if let Some(fault) = fault(mesh) {
             return refused(fault);
         }
-        if meets_itself(mesh, cancel)? && overlaps(operand, mesh)? {
-            return refused(Fault::SelfIntersecting);
+        if meets_itself(mesh, cancel)? {
+            if overlaps(operand, mesh)? {
+                return refused(Fault::SelfIntersecting);
+            }
+        } else if let Some(shell) = misplaced_shell(mesh) {
+            // Where shells touch it is not told on which sides of each other they lie.
+            return refused(Fault::MisplacedShell(shell));
         }
     }
     Ok(())
@@ -68,20 +72,51 @@ fn fault(mesh: &TriMesh) -> Option<Fault> {
     open_edge(mesh).or_else(|| (!mesh.triangles.is_empty() && six_volumes(mesh) <= 0.0).then_some(Fault::InsideOut))
 }
 
-/// The first directed edge that occurs twice, or whose opposite does not occur, or that occurs only as an opposite.
+/// The first directed edge that occurs twice; or else, of all that have no opposite and of the opposites they lack, the first.
 fn open_edge(mesh: &TriMesh) -> Option<Fault> {
-    // As numbers, since they are quickly sorted.
-    let name = |from: u32, to: u32| u64::from(from) << 32 | u64::from(to);
-    let sorted = |backwards: bool| -> Vec<u64> {
-        let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let mut names: Vec<u64> = edges.map(|(a, b)| if backwards { name(b, a) } else { name(a, b) }).collect();
-        names.par_sort_unstable();
-        names
+    let edges = &Edges::of(mesh);
+    let vertices = || 0..mesh.vertices.len() as u32;
+    let doubled = vertices().find_map(|from| Some((from, edges.from(from).windows(2).find(|pair| pair[0] == pair[1])?[0])));
+    let open = || {
+        let lacking =
+            |from: u32| edges.from(from).iter().filter(move |&&to| edges.from(to).binary_search(&from).is_err()).map(move |&to| (from, to));
+        vertices().flat_map(lacking).map(|(from, to)| (from.min(to), from.max(to))).min()
     };
-    let (edges, opposites) = (sorted(false), sorted(true));
-    let doubled = edges.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
-    let unmatched = || edges.iter().zip(&opposites).find(|(edge, opposite)| edge != opposite).map(|(edge, opposite)| *edge.min(opposite));
-    doubled.or_else(unmatched).map(|edge| Fault::NotClosed { from: (edge >> 32) as u32, to: edge as u32 })
+    doubled.or_else(open).map(|(from, to)| Fault::NotClosed { from, to })
+}
+
+/// Where the directed edges lead that begin at a vertex, in ascending order.
+struct Edges {
+    starts: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+impl Edges {
+    /// Counted by vertex, which is faster than to sort them all: few edges share one.
+    fn of(mesh: &TriMesh) -> Self {
+        let edges = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let mut starts = vec![0_u32; mesh.vertices.len() + 1];
+        edges().for_each(|(from, _)| starts[from as usize] += 1);
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        // Filled from behind, so that what were the ends of vertices become their starts.
+        let mut ends = vec![0; sum as usize];
+        for (from, to) in edges() {
+            let place = &mut starts[from as usize];
+            *place -= 1;
+            ends[*place as usize] = to;
+        }
+        starts.windows(2).for_each(|own| ends[own[0] as usize..own[1] as usize].sort_unstable());
+        Self { starts, ends }
+    }
+
+    fn from(&self, vertex: u32) -> &[u32] {
+        let start = |vertex: u32| self.starts[vertex as usize] as usize;
+        &self.ends[start(vertex)..start(vertex + 1)]
+    }
 }
 
 /// Six times the enclosed volume, seen from a vertex of the mesh so that a place far from the origin costs no digits.

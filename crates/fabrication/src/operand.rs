@@ -8,7 +8,7 @@ use lacuna_kernel::error::Kind;
 use lacuna_kernel::measure::mass::{area, dilated_difference, volume};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::CellKind;
-use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried};
+use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried, misplaced_shell};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use std::f64::consts::PI;
@@ -194,6 +194,16 @@ pub(crate) fn solid_of(source: &Source<'_>, tolerance: Tolerance, budget: &Budge
     operand.join(budget)?;
     let mesh = operand.meshes.pop().unwrap_or_default();
     Ok((rounded(&mesh, budget)?, operand))
+}
+
+/// What is counted twice, or taken away, of what a closed mesh bounds, so many pairs of whose triangles meet; nothing of a solid.
+pub(crate) fn miscounted(mesh: &TriMesh, crossings: u64) -> Option<String> {
+    if crossings > 0 {
+        let words =
+            "triangles of the mesh meet where they are not joined: what its surface winds around twice counts twice in areas and volumes";
+        return Some(format!("{crossings} pairs of {words}"));
+    }
+    misplaced_shell(mesh).map(|shell| format!("{shell} in areas and volumes"))
 }
 
 /// A mesh as a solid in single precision.

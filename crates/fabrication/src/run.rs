@@ -7,12 +7,12 @@ use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
 use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
 use lacuna_kernel::model::{Finding, Lowered, Model, PolygonMesh};
-use lacuna_kernel::solid::Solid;
+use lacuna_kernel::solid::{Crossings, Solid};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
 use crate::certificate::DimensionStatement;
-use crate::operand::is_solid;
+use crate::operand::{is_solid, miscounted};
 use crate::plan::with_remedy;
 use crate::repair::repaired;
 use crate::shape_measures::{MappedThickness, enclosed, extent, no_solid, smallest_box, walls_and_gaps};
@@ -245,6 +245,9 @@ pub(crate) fn split_of(job: &Job) -> Result<Split, JobError> {
     job.params.split.clone().ok_or_else(missing)
 }
 
+/// Shapes are measured up to this coordinate: moments of inertia grow with its fifth power.
+const LARGEST_MM: f64 = 1e50;
+
 fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let radius = radius(job)?;
     let attractor = &lower(job, budget)?.attractor;
@@ -253,10 +256,21 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
     let mapped = !job.outputs.is_empty();
     let Some(radius) = radius else {
         let bounds = bounding_box(attractor, budget)?;
+        if bounds.extent() > LARGEST_MM {
+            let message = format!(
+                "the shape reaches to {:e} mm, and beyond {LARGEST_MM:e} mm its moments are no numbers; give a smaller shape",
+                bounds.extent()
+            );
+            return Err(JobError::new(Kind::Invalid, "measure.too-large", message));
+        }
         let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
         certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
+            // Its triangles, joined.
+            for surface in attractor.surfaces() {
+                certificate.warnings.extend(miscounted(&surface, Crossings::of(&surface, budget)?.count));
+            }
         }
         match enclosed(attractor, budget)? {
             Ok(found) => certificate.enclosed = found,

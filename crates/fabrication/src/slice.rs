@@ -8,7 +8,7 @@ use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::{self, PlaneStatement, SectionsStatement};
 use crate::job::Planes;
-use crate::operand::{Source, solid_of};
+use crate::operand::{Source, miscounted, solid_of};
 use crate::plan::Plan;
 use crate::run::{JobError, Outcome, StreamError};
 use crate::{Geometry, Job};
@@ -55,6 +55,7 @@ pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<
     let source = Source::only(job, budget)?;
     let (rounded, operand) = solid_of(&source, tolerance, budget)?;
     let mut certificate = certificate::of_operand(&rounded, &operand, tolerance);
+    certificate.warnings.extend(miscounted(rounded.solid.mesh(), rounded.crossings));
     let offsets_mm = offsets(planes, &rounded.solid, &frame)?;
     let stack = Stack { solid: rounded.solid, frame, offsets_mm };
     let mut told = Vec::with_capacity(stack.offsets_mm.len());
@@ -73,9 +74,15 @@ pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<
         StreamError::Job(error) | StreamError::Sink(error) => error,
         StreamError::NotPoints => JobError::new(Kind::Defect, "internal", "sections are no points".into()),
     })?;
+    if told.is_empty() {
+        let words = "no sections: the middle of the first layer is beyond the solid; take a smaller step";
+        certificate.warnings.push(words.into());
+    }
     let empty = told.iter().filter(|plane| plane.polygons == 0).count();
     if empty > 0 {
-        certificate.warnings.push(format!("{empty} of {} sections are empty: their planes miss the solid", told.len()));
+        certificate
+            .warnings
+            .push(format!("{empty} of {} sections are empty: their planes miss the solid, or only touch it from above", told.len()));
     }
     let [normal, u, v] = [frame.normal(), frame.u(), frame.v()].map(|axis| axis.to_array());
     certificate.sections = Some(SectionsStatement { normal, u, v, planes: told });

@@ -44,6 +44,14 @@ pub(crate) struct Enclosure {
 impl Enclosure {
     /// Bounds of c . x over the attractor, c being given by its values at the columns.
     pub(crate) fn range(&self, seen: impl Iterator<Item = f64>) -> [f64; 2] {
+        if self.groups == 1 {
+            // The middle comes first.
+            let (mut middle, mut reach) = (0.0, 0.0);
+            for (k, value) in seen.enumerate() {
+                if k == 0 { middle = value } else { reach += f64::abs(value) }
+            }
+            return [middle - reach, middle + reach];
+        }
         let (mut middles, mut reaches) = ([0.0; MOST_GROUPS], [0.0; MOST_GROUPS]);
         for (&(group, is_middle), value) in self.places.iter().zip(seen) {
             if is_middle {
@@ -69,7 +77,12 @@ pub(super) fn enclosure(attractor: &Attractor, id: StateId) -> Option<Enclosure>
     let (mut factors, mut places, mut groups, mut sizes) = (Vec::new(), vec![(0, true)], 1, [1.0; 2]);
     for &part in parts {
         let is_box = attractor.bound(part).margin() > 0.0;
-        let (columns, miss) = if is_box { (coordinate_box(attractor, part)?, 0.0) } else { hull(attractor, part) };
+        let (columns, miss) = match (is_box, part == id) {
+            (true, true) => (coordinate_box(attractor, part)?, 0.0),
+            // Kept: all products that a curve is a factor of see it by the same box.
+            (true, false) => (attractor.enclosure(part)?.columns.clone(), 0.0),
+            (false, _) => hull(attractor, part),
+        };
         let count = columns.columns();
         let more = if is_box { 1 } else { count };
         let pair = |&(group, is_middle): &(u32, bool), k: usize| {

@@ -8,6 +8,7 @@ pub mod topology;
 
 pub use connection::Ends;
 pub use convergence::Contraction;
+pub(crate) use operator::PullBack;
 pub use operator::{OperatorError, SubdivisionOperator};
 
 use crate::model::CellKind;

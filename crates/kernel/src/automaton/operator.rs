@@ -185,7 +185,7 @@ impl SubdivisionOperator {
     #[must_use]
     pub fn apply(&self, point: &[f64]) -> Vec<f64> {
         if let Form::Product { factors, .. } = &self.form {
-            return through_factors(factors, point, false);
+            return through_factors(factors, point, 1, false);
         }
         let mut image = vec![0.0; self.rows];
         for (column, &weight) in point.iter().enumerate() {
@@ -202,7 +202,7 @@ impl SubdivisionOperator {
     #[must_use]
     pub fn pull_back(&self, functional: &[f64]) -> Vec<f64> {
         if let Form::Product { factors, .. } = &self.form {
-            return through_factors(factors, functional, true);
+            return through_factors(factors, functional, 1, true);
         }
         self.entries().chunks_exact(self.rows).map(|column| product_sum(column, functional)).collect()
     }
@@ -261,41 +261,68 @@ fn kronecker(factors: &[SubdivisionOperator]) -> Vec<f64> {
     product.entries().to_vec()
 }
 
-/// (T_u x T_v) x, direction after direction; or `back`, x^T (T_u x T_v).
-fn through_factors(factors: &[SubdivisionOperator], values: &[f64], back: bool) -> Vec<f64> {
+/// (T_u x T_v) x, direction after direction; or `back`, x^T (T_u x T_v). Values are so many blocks, each of which is x.
+fn through_factors(factors: &[SubdivisionOperator], values: &[f64], mut outer: usize, back: bool) -> Vec<f64> {
     let mut current = Cow::Borrowed(values);
-    let (mut outer, mut inner) = (1, values.len());
     for factor in factors {
-        let (from, to) = if back { (factor.rows, factor.columns) } else { (factor.columns, factor.rows) };
-        inner /= from;
-        let image = if back && inner == 1 {
-            // The last direction: values to be combined stand side by side, as entries of a column do.
-            let mut image = Vec::with_capacity(outer * to);
-            for source in current.chunks_exact(from) {
-                image.extend(factor.entries().chunks_exact(from).map(|column| product_sum(column, source)));
-            }
-            image
-        } else {
-            let mut image = vec![0.0; outer * to * inner];
-            for block in 0..outer {
-                for column in 0..factor.columns {
-                    for (row, &entry) in factor.column(column).iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
-                        let (source, target) = if back { (row, column) } else { (column, row) };
-                        let source = &current[(block * from + source) * inner..][..inner];
-                        let target = &mut image[(block * to + target) * inner..][..inner];
-                        target.iter_mut().zip(source).for_each(|(sum, &x)| *sum += entry * x);
-                    }
-                }
-            }
-            image
-        };
-        outer *= to;
-        current = Cow::Owned(image);
+        current = Cow::Owned(through_factor(factor, &current, outer, back));
+        outer *= if back { factor.columns } else { factor.rows };
     }
     current.into_owned()
 }
 
+/// The same in one direction.
+fn through_factor(factor: &SubdivisionOperator, values: &[f64], outer: usize, back: bool) -> Vec<f64> {
+    let (from, to) = if back { (factor.rows, factor.columns) } else { (factor.columns, factor.rows) };
+    let (entries, inner) = (factor.entries(), values.len() / (outer * from));
+    let mut image = Vec::with_capacity(outer * to * inner);
+    for block in values.chunks_exact(from * inner) {
+        if back && inner == 1 {
+            // The last direction: values to be combined stand side by side, as entries of a column do.
+            image.extend(entries.chunks_exact(from).map(|column| product_sum(column, block)));
+            continue;
+        }
+        for target in 0..to {
+            let start = image.len();
+            image.resize(start + inner, 0.0);
+            for (source, part) in block.chunks_exact(inner).enumerate() {
+                let entry = if back { entries[target * from + source] } else { entries[source * to + target] };
+                if entry != 0.0 {
+                    image[start..].iter_mut().zip(part).for_each(|(sum, &x)| *sum += entry * x);
+                }
+            }
+        }
+    }
+    image
+}
+
+/// A functional on the parent's space that is pulled back by the operators of several children. What those of a product have in common, the first factor
+/// of neighbours in lexicographic order, is applied once.
+pub(crate) struct PullBack<'a> {
+    functional: &'a [f64],
+    first: Option<(&'a SubdivisionOperator, Vec<f64>)>,
+}
+
+impl<'a> PullBack<'a> {
+    pub(crate) fn new(functional: &'a [f64]) -> Self {
+        Self { functional, first: None }
+    }
+
+    /// As [`SubdivisionOperator::pull_back`], to the last bit.
+    pub(crate) fn by(&mut self, operator: &'a SubdivisionOperator) -> Vec<f64> {
+        let [first, rest @ ..] = operator.factors() else { return operator.pull_back(self.functional) };
+        let image = match self.first.take() {
+            Some((known, image)) if known == first => image,
+            _ => through_factor(first, self.functional, 1, true),
+        };
+        let pulled_back = through_factors(rest, &image, first.columns, true);
+        self.first = Some((first, image));
+        pulled_back
+    }
+}
+
 /// The sum of products, in four sums side by side: one alone would wait for every addition.
+#[inline]
 fn product_sum(left: &[f64], right: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (left_parts, right_parts) = (left.chunks_exact(4), right.chunks_exact(4));
@@ -338,6 +365,18 @@ mod tests {
         for operator in [&a, &dense(&a)] {
             let off = value(&operator.pull_back(&functional), &point) - value(&functional, &a.apply(&point));
             assert!(off.abs() < 1e-14, "{off}");
+        }
+    }
+
+    #[test]
+    fn what_children_share_changes_no_bit() {
+        let (first, second) = ([operator(3, 3, 1.1), operator(3, 2, 0.7)], [operator(4, 4, 2.3), operator(4, 3, 0.3)]);
+        let pair = |u: usize, v: usize| SubdivisionOperator::product(vec![first[u].clone(), second[v].clone()]);
+        let children = [pair(0, 0), pair(0, 1), pair(1, 0), pair(1, 1), operator(12, 5, 1.7), pair(0, 1)];
+        let functional: Vec<f64> = (0..12).map(|k| f64::from(k).sin()).collect();
+        let mut shared = PullBack::new(&functional);
+        for child in &children {
+            assert_eq!(shared.by(child), child.pull_back(&functional));
         }
     }
 }

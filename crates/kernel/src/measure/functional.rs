@@ -2,7 +2,7 @@
 
 use crate::attractor::cell::{ControlPoint, Point, dot};
 use crate::attractor::{AttainedPoint, StateBound};
-use crate::automaton::SubdivisionOperator;
+use crate::automaton::{PullBack, SubdivisionOperator};
 use crate::de_casteljau::halves;
 
 /// x -> (values . x) / (weights . x) on a barycentric space; without weights, values . x.
@@ -25,6 +25,11 @@ impl Functional {
     /// As seen from the child with this operator.
     pub(super) fn pulled_back(&self, operator: &SubdivisionOperator) -> Self {
         Self { values: operator.pull_back(&self.values), weights: self.weights.as_ref().map(|weights| operator.pull_back(weights)) }
+    }
+
+    /// To be seen from several children.
+    pub(super) fn for_children(&self) -> ForChildren<'_> {
+        ForChildren { values: PullBack::new(&self.values), weights: self.weights.as_deref().map(PullBack::new) }
     }
 
     pub(super) fn at(&self, point: &[f64]) -> f64 {
@@ -124,6 +129,19 @@ impl Functional {
             // Operators without negative entries, and positive weights: a mean of the control points' quotients.
             Some(weights) => extremes(self.values.iter().zip(weights).map(|(value, weight)| value / weight)),
         }
+    }
+}
+
+/// A functional on the way to a cell's children.
+pub(super) struct ForChildren<'a> {
+    values: PullBack<'a>,
+    weights: Option<PullBack<'a>>,
+}
+
+impl<'a> ForChildren<'a> {
+    /// As seen from the child with this operator.
+    pub(super) fn pulled_back(&mut self, operator: &'a SubdivisionOperator) -> Functional {
+        Functional { values: self.values.by(operator), weights: self.weights.as_mut().map(|weights| weights.by(operator)) }
     }
 }
 

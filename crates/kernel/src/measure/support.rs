@@ -354,14 +354,15 @@ impl<'a> Search<'a> {
             }
             return;
         };
+        let mut functionals = functional.for_children();
         for (index, transition) in attractor.automaton().state(state).transitions.iter().enumerate() {
             let window = window.as_ref().and_then(|window| attractor.child_window(root as usize, window, index));
             if window.as_ref().is_some_and(Window::is_outside) {
                 continue;
             }
             let functional = match attractor.hull(state) {
-                Some(hull) => functional.pulled_back(&hull.children[index]),
-                None => self.at_hull(transition.to, functional.pulled_back(&transition.operator)),
+                Some(hull) => functionals.pulled_back(&hull.children[index]),
+                None => self.at_hull(transition.to, functionals.pulled_back(&transition.operator)),
             };
             self.consider(Candidate {
                 root,
@@ -416,6 +417,8 @@ impl<'a> Search<'a> {
                 let seen = &self.candidates[index].seen;
                 let slack = match attractor.enclosure(state).filter(|_| !seen.is_empty() && !cell.seen.is_empty()) {
                     Some(enclosure) => {
+                        // At the first point, a middle, the difference is no less than its lower bound.
+                        (seen[0] - cell.seen[0] >= -allowed).then_some(())?;
                         let lower = enclosure.range(seen.iter().zip(&cell.seen).map(|(other, own)| other - own))[0];
                         (lower >= -allowed).then_some((-lower).max(0.0))?
                     }

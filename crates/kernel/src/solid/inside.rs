@@ -28,6 +28,11 @@ impl<'a> Inside<'a> {
     /// the triangles whose boxes are above x.
     #[must_use]
     pub fn winding(&self, x: DVec3) -> i64 {
+        self.winding_of(x, |_| true)
+    }
+
+    /// That of the triangles that are counted.
+    pub(super) fn winding_of(&self, x: DVec3, is_counted: impl Fn(u32) -> bool) -> i64 {
         if self.mesh.triangles.is_empty() {
             return 0;
         }
@@ -36,7 +41,7 @@ impl<'a> Inside<'a> {
         let mut winding = 0;
         self.tree.query(&above, 0, |leaf| {
             for (&triangle, bounds) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)) {
-                if bounds.meets(&above) {
+                if bounds.meets(&above) && is_counted(triangle) {
                     winding += around(&self.mesh.triangles[triangle as usize].map(|corner| self.mesh.vertices[corner as usize]), x);
                 }
             }

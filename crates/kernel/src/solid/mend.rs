@@ -62,7 +62,7 @@ pub(crate) fn mend(points: Vec<Point>, triangles: &[[u32; 3]], rounding: f64, bu
 }
 
 /// A triangle that is compared with others.
-struct Facet {
+pub(super) struct Facet {
     corners: [u32; 3],
     points: [Point; 3],
     bounds: Box32,
@@ -72,7 +72,7 @@ struct Facet {
 }
 
 impl Facet {
-    fn new(corners: [u32; 3], points: [Point; 3]) -> Self {
+    pub(super) fn new(corners: [u32; 3], points: [Point; 3]) -> Self {
         let (p, q) = (subtract(&points[1], &points[0]), subtract(&points[2], &points[0]));
         // Products of two lengths, at most 8 roundings each, and three sums.
         let error = 64.0 * f64::EPSILON * (dot(&p, &p) + dot(&q, &q));
@@ -80,8 +80,9 @@ impl Facet {
     }
 
     /// Whether a plane surely parts the triangle from what another has besides common corners: its own, or one through an edge and the normal.
+    /// Both have a corner that is not common.
     #[inline]
-    fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
+    pub(super) fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
         let (mut above, mut below) = (true, true);
         for (corner, point) in corners.iter().zip(points) {
             if !self.corners.contains(corner) {

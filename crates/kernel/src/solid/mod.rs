@@ -8,6 +8,7 @@ pub(crate) mod half_edges;
 pub(crate) mod inside;
 pub(crate) mod mend;
 mod repair;
+mod shells;
 pub(crate) mod topology;
 
 use crate::budget::{Budget, Stopped};
@@ -16,6 +17,7 @@ pub use crossings::Crossings;
 use glam::DVec3;
 pub use inside::Inside;
 pub use repair::{Repair, RepairError, Repaired, Unfilled, repair};
+pub use shells::{MisplacedShell, misplaced_shell};
 pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.

@@ -1,8 +1,8 @@
 //! Counting a triangle mesh's topology, from the triangles around each vertex.
 
+use super::shells::Shells;
 use super::{SolidError, TriMesh};
 use crate::budget::Budget;
-use crate::groups::Groups;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -127,24 +127,9 @@ impl Topology {
         self.nonmanifold_vertices += u64::from(fans(link) > 1);
     }
 
-    /// Shells by union-find over vertices; the sign of each shell's volume tells cavities.
+    /// The sign of each shell's volume tells cavities.
     fn count_shells(&mut self, mesh: &TriMesh) {
-        let mut groups = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles);
-        let mut volumes: Vec<f64> = Vec::new();
-        // The root's entry in `number` names its shell.
-        let mut number = vec![u32::MAX; mesh.vertices.len()];
-        let mut origins: Vec<DVec3> = Vec::new();
-        for &[a, b, c] in &mesh.triangles {
-            let root = groups.of(a as usize) as usize;
-            if number[root] == u32::MAX {
-                number[root] = volumes.len() as u32;
-                volumes.push(0.0);
-                origins.push(mesh.vertices[a as usize]);
-            }
-            let shell = number[root] as usize;
-            let corner = |index: u32| mesh.vertices[index as usize] - origins[shell];
-            volumes[shell] += corner(a).dot(corner(b).cross(corner(c)));
-        }
+        let volumes = Shells::of(mesh).volumes;
         self.shells = volumes.len() as u64;
         self.cavities = volumes.iter().filter(|&&volume| volume < 0.0).count() as u64;
         self.components = self.shells - self.cavities;
