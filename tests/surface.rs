@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lacuna_tests::support::binary::{run, succeed};
 use lacuna_tests::support::cases::model;
 use lacuna_tests::support::scratch::Scratch;
-use lacuna_tests::support::service::Service;
+use lacuna_tests::support::service::{Service, until};
 use serde_json::{Value, json};
 
 /// Work for a minute at least.
@@ -351,4 +351,45 @@ fn an_answer_that_takes_too_long_is_a_problem_and_a_job_s_id_comes_before() {
     assert_eq!(answer.status, 202, "{}", answer.json());
     assert!(matches!(answer.header("preference-applied"), "wait=1" | "wait=2"), "{answer:?}");
     assert_eq!(service.post(&format!("{}/cancel", answer.header("location")), &json!({})).status / 100, 2);
+}
+
+#[test]
+fn metrics_tell_of_routes_kinds_and_phases() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order = json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"),
+        "params": { "tolerance_mm": 0.1, "radius_mm": 1 }, "outputs": ["stl"] });
+    assert_eq!(service.done(&order)["state"], "succeeded");
+    let value = |text: &str, name: &str| text.lines().find_map(|line| line.strip_prefix(name)?.trim().parse::<f64>().ok());
+    let counted = |text: &str| value(text, "lacuna_job_seconds_count{kind=\"solidify\",state=\"succeeded\"}") == Some(1.0);
+    // The end is counted a moment after it is told.
+    let told = || String::from_utf8(service.get("/metrics").body).unwrap();
+    until(Duration::from_secs(20), "a job that is counted", || counted(&told()) && told().contains("lacuna_phase_seconds_count"));
+    let text = told();
+    let whole = value(&text, "lacuna_job_seconds_sum{kind=\"solidify\",state=\"succeeded\"}").unwrap();
+    let mut phases = 0.0;
+    for phase in ["dilate", "write"] {
+        let labels = format!("{{kind=\"solidify\",phase=\"{phase}\"}}");
+        assert!(value(&text, &format!("lacuna_phase_seconds_count{labels}")).is_some_and(|count| count >= 1.0), "{phase}: {text}");
+        phases += value(&text, &format!("lacuna_phase_seconds_sum{labels}")).unwrap();
+    }
+    // The phases are parts of the whole, up to the moment in which both are noted.
+    assert!(0.0 < phases && phases <= whole + 0.1, "{phases} of {whole}");
+    assert!(value(&text, "lacuna_http_requests_total{method=\"POST\",route=\"/v1/jobs\",status=\"200\"}").is_some(), "{text}");
+}
+
+#[test]
+fn the_reader_s_page_asks_nobody_but_the_service() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let page = service.get("/docs");
+    let text = String::from_utf8(page.body.clone()).unwrap();
+    assert!(page.status == 200 && text.contains("/v1/openapi.json"), "{text}");
+    for outside in ["http://", "https://", "src=\"//", "href=\"//", "@import", "<link"] {
+        assert!(!text.contains(outside), "the page names {outside}");
+    }
+    // A browser would refuse it, too.
+    let policy = page.header("content-security-policy");
+    assert!(policy.starts_with("default-src 'none'") && policy.contains("connect-src 'self'"), "{policy}");
+    assert!(!policy.contains("http") && !policy.contains('*'), "{policy}");
 }
