@@ -307,7 +307,7 @@ print(ended, flush=True)
 #[test]
 fn a_service_that_is_asked_to_end_drains_and_its_jobs_go_on_at_the_next_start() {
     let scratch = Scratch::new();
-    let one = [("LACUNA_WORKERS", "1"), ("LACUNA_DRAIN_SECONDS", "2")];
+    let one = [("LACUNA_WORKERS", "1"), ("LACUNA_DRAIN_SECONDS", "4")];
     let mut service = Service::start_with(scratch.path(), &one);
     let running = submit(&service, &long(0));
     until(PATIENCE, "running", || state(&service, &running) == "running");
@@ -320,6 +320,11 @@ fn a_service_that_is_asked_to_end_drains_and_its_jobs_go_on_at_the_next_start() 
     write!(waiter, "{head}\r\ncontent-length: {}\r\n\r\n{body}", body.len()).unwrap();
     until(PATIENCE, "the third job", || service.get("/v1/jobs").json()["items"].as_array().unwrap().len() == 3);
     service.signal("TERM");
+    // Not ready comes first, and is told to whoever asks anew while a job still runs; so is how the job is.
+    until(PATIENCE, "not ready", || service.get("/readyz").status == 503);
+    assert_eq!(state(&service, &running), "running");
+    let refused = service.post("/v1/jobs", &small(2));
+    assert_eq!((refused.status, &refused.json()["code"]), (503, &json!("shutting-down")));
     assert!(service.end(Duration::from_secs(30)).success());
     let mut answer = String::new();
     waiter.read_to_string(&mut answer).unwrap();

@@ -29,7 +29,7 @@
 //! | `secure` | does the command line speak TLS, have metrics an address of their own, do traces arrive? |
 //! | `service` | does the running service keep them? |
 //! | `session` | does the page's session by curl run as it stands there? |
-//! | `surface` | shortcuts, superseded jobs, rates, pages of problems, what trades know: are they there? |
+//! | `surface` | shortcuts, superseded jobs, rates, pages, parts and tags of files, pages of problems, what trades know: are they there? |
 //! | `uploads` | are mesh files taken, refused and used as models are? |
 //! | `architecture` | are the crates, the folders and the map what they claim to be? |
 //! | `container` | do the container's files say what they must? |

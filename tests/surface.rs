@@ -1,11 +1,13 @@
-//! Smaller promises of the surface: shortcuts, superseded jobs, rates, pages of problems, what trades know.
+//! Smaller promises of the surface: shortcuts, superseded jobs, rates, pages, parts and tags of files, pages of problems, what trades know.
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::{run, succeed};
 use lacuna_tests::support::cases::model;
 use lacuna_tests::support::scratch::Scratch;
-use lacuna_tests::support::service::Service;
+use lacuna_tests::support::service::{Service, until};
 use serde_json::{Value, json};
 
 /// Work for a minute at least.
@@ -184,4 +186,210 @@ fn what_trades_know_has_sources() {
     let capabilities = service.get("/v1/capabilities").json();
     assert_eq!(capabilities["profiles"], json!(["cast", "panels", "sla"]));
     assert!(capabilities["kinds"].as_array().unwrap().contains(&json!("convert")) && capabilities["limits"]["upload_bytes"] == 256 << 20);
+}
+
+#[test]
+fn a_file_is_told_in_parts_and_by_its_tag() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order = json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"),
+        "params": { "tolerance_mm": 0.1, "radius_mm": 1 }, "outputs": ["stl"] });
+    let job = service.done(&order);
+    let output = job["outputs"].as_array().unwrap().iter().find(|output| output["name"] == "stl").unwrap();
+    let path = format!("/v1/results/{}", output["digest"].as_str().unwrap());
+    let whole = service.get(&path);
+    let (length, tag) = (whole.body.len(), whole.header("etag").to_owned());
+    assert!(length > 100 && tag.starts_with("\"sha256:") && whole.header("cache-control").contains("immutable"), "{whole:?}");
+    // (Range, status, first and last byte); a server may pass over what it does not understand.
+    for (range, status, first, last) in [
+        ("bytes=0-9", 206, 0, 9),
+        ("bytes=90-", 206, 90, length - 1),
+        ("bytes=-7", 206, length - 7, length - 1),
+        ("bytes=5-18446744073709551616", 206, 5, length - 1),
+        ("bytes=-99999999999999999999999", 206, 0, length - 1),
+        ("bytes=18446744073709551616-", 416, 0, 0),
+        ("bytes=-0", 416, 0, 0),
+        ("bytes=9-3", 200, 0, length - 1),
+        ("bytes=0-1,3-4", 200, 0, length - 1),
+        ("bytes=x", 200, 0, length - 1),
+    ] {
+        let answer = service.get_with(&path, &[("range", range)]);
+        assert_eq!(answer.status, status, "{range}");
+        match status {
+            416 => {
+                assert_eq!(answer.header("content-range"), format!("bytes */{length}"), "{range}");
+                assert_eq!(answer.json()["code"], "range", "{range}");
+            }
+            _ => assert_eq!(answer.body, whole.body[first..=last], "{range}"),
+        }
+        if status == 206 {
+            assert_eq!(answer.header("content-range"), format!("bytes {first}-{last}/{length}"), "{range}");
+        }
+    }
+    // Half of another version is not glued to this one; what is known is not sent again; what was meant is what is here.
+    let ranged = |name: &str, value: &str| service.get_with(&path, &[("range", "bytes=0-9"), (name, value)]).status;
+    assert_eq!((ranged("if-range", &tag), ranged("if-range", "\"another\""), ranged("if-range", &format!("W/{tag}"))), (206, 200, 200));
+    assert_eq!((ranged("if-none-match", &tag), ranged("if-none-match", "\"another\"")), (304, 206));
+    assert_eq!((ranged("if-match", &tag), ranged("if-match", "*"), ranged("if-match", "\"another\"")), (206, 206, 412));
+    let refused = service.get_with(&path, &[("if-match", "\"another\"")]).json();
+    assert!(refused["code"] == "precondition-failed" && refused["detail"].as_str().unwrap().contains(&tag), "{refused}");
+
+    // A model is forgotten only if it is the one that was meant.
+    let stored = service.post("/v1/models", &model("meshes/segment"));
+    let place = stored.header("location").to_owned();
+    assert_eq!(service.request("DELETE", &place, &[("if-match", "\"another\"")], b"").status, 412);
+    assert_eq!(service.get_with(&place, &[("if-match", "\"another\"")]).status, 412);
+    assert_eq!(service.get_with(&place, &[("if-match", stored.header("etag"))]).status, 200);
+    assert_eq!(service.request("DELETE", &place, &[("if-match", stored.header("etag"))], b"").status, 204);
+    assert_eq!(service.request("DELETE", &place, &[("if-match", "*")], b"").status, 404);
+}
+
+#[test]
+fn pages_follow_each_other_to_the_end() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order = |kind: &str, number: u32| json!({ "lacuna": 1, "kind": kind, "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 + f64::from(number) } });
+    let id = |view: &Value| view["id"].as_str().unwrap().to_owned();
+    let mut jobs: Vec<String> = (0..5).map(|number| id(&service.done(&order("measure", number)))).collect();
+    jobs.reverse();
+    let other = id(&service.done(&order("evaluate", 0)));
+    let pages = |path: &str| {
+        let (mut found, mut cursor) = (Vec::new(), String::new());
+        for _ in 0..10 {
+            let page = service.get(&format!("{path}{cursor}")).json();
+            found.push(page["items"].as_array().unwrap().iter().map(id).collect::<Vec<_>>());
+            let Some(next) = page["next"].as_str() else { break };
+            cursor = format!("&cursor={next}");
+        }
+        found
+    };
+    assert_eq!(pages("/v1/jobs?limit=2&kind=measure"), [&jobs[..2], &jobs[2..4], &jobs[4..]]);
+    assert_eq!(pages("/v1/jobs?limit=3").concat(), [&[other][..], &jobs].concat());
+    // An item that goes between two pages takes nothing with it.
+    let next = service.get("/v1/jobs?limit=2&kind=measure").json()["next"].as_str().unwrap().to_owned();
+    assert_eq!(service.delete(&format!("/v1/jobs/{next}")).status, 204);
+    let rest = service.get(&format!("/v1/jobs?kind=measure&cursor={next}")).json();
+    assert_eq!(rest["items"].as_array().unwrap().iter().map(id).collect::<Vec<_>>(), jobs[2..]);
+
+    let mut models: Vec<String> =
+        ["meshes/segment", "ifs/koch_curve", "ifs/cantor_dust"].map(|name| id(&service.post("/v1/models", &model(name)).json())).into();
+    models.sort();
+    assert_eq!(pages("/v1/models?limit=2"), [&models[..2], &models[2..]]);
+    for path in ["/v1/jobs?cursor=job_1", "/v1/jobs?cursor=", "/v1/jobs?cursor=..%2F..%2Fx", "/v1/models?cursor=%FF"] {
+        let refused = service.get(path);
+        assert_eq!((refused.status, &refused.json()["code"]), (400, &json!("bad-cursor")), "{path}");
+    }
+    assert_eq!(service.get(&format!("/v1/models?cursor={next}")).json()["code"], "bad-cursor");
+}
+
+#[test]
+fn bodies_that_are_announced_as_compressed_are_refused_as_such() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order = json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 } }).to_string();
+    let triangle = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    for coding in ["gzip", "br", "unknown"] {
+        let job = service.post_with("/v1/jobs", &[("content-encoding", coding)], order.as_bytes());
+        let headers = [("content-encoding", coding), ("content-type", "application/octet-stream")];
+        let file = service.request("POST", "/v1/models?format=off", &headers, triangle);
+        for answer in [job, file] {
+            let problem = answer.json();
+            assert_eq!((answer.status, &problem["code"]), (415, &json!("unsupported-encoding")), "{problem}");
+            assert!(problem["detail"].as_str().unwrap().contains(coding), "{problem}");
+        }
+    }
+    assert_eq!(service.get("/v1/jobs").json()["items"], json!([]));
+    assert_eq!(service.get("/v1/models").json()["items"], json!([]));
+    let plain = service.post_with("/v1/jobs", &[("content-encoding", "identity")], order.as_bytes());
+    assert!(matches!(plain.status, 200 | 202), "{}", plain.json());
+}
+
+#[test]
+fn what_cannot_be_read_in_an_address_or_a_header_is_named() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    for (path, words) in [
+        ("/v1/jobs/%FF", &["UTF-8", "id"][..]),
+        ("/v1/profiles/%C3%28", &["UTF-8", "process"]),
+        ("/v1/jobs?limit=many", &["limit=many"]),
+        ("/v1/jobs?limit=201", &["201", "1 to 200"]),
+    ] {
+        let answer = service.get(path);
+        let detail = answer.json()["detail"].as_str().unwrap().to_owned();
+        assert!(answer.status == 400 && words.iter().all(|word| detail.contains(word)), "{path}: {detail}");
+    }
+    let order = json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 } }).to_string();
+    let long = "k".repeat(256);
+    for (keys, words) in [(&[long.as_str()][..], &["256", "255"][..]), (&["a", "b"], &["2 headers"])] {
+        let headers: Vec<(&str, &str)> = keys.iter().map(|key| ("idempotency-key", *key)).collect();
+        let problem = service.post_with("/v1/jobs", &headers, order.as_bytes()).json();
+        assert_eq!(problem["code"], "bad-header", "{problem}");
+        assert!(words.iter().all(|word| problem["detail"].as_str().unwrap().contains(word)), "{problem}");
+    }
+    assert_eq!(service.get("/v1/jobs").json()["items"], json!([]));
+}
+
+#[test]
+fn an_answer_that_takes_too_long_is_a_problem_and_a_job_s_id_comes_before() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_ANSWER_SECONDS", "3")]);
+    // A body that never comes, with more time for itself than for the answer.
+    let mut stream = TcpStream::connect(service.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    let head = "POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\nx-request-id: late-1\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{";
+    stream.write_all(head.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    assert!(head.starts_with("HTTP/1.1 504 ") && head.contains("application/problem+json"), "{answer}");
+    let problem: Value = serde_json::from_str(body).unwrap();
+    assert_eq!((&problem["code"], &problem["request_id"]), (&json!("timeout"), &json!("late-1")), "{problem}");
+    assert!(problem["detail"].as_str().unwrap().contains("3 s"), "{problem}");
+
+    // Whoever would wait longer than an answer may take gets the job's id while there is time.
+    let answer = service.post_with("/v1/jobs", &[("prefer", "wait=30")], long_order(0.04).to_string().as_bytes());
+    assert_eq!(answer.status, 202, "{}", answer.json());
+    assert!(matches!(answer.header("preference-applied"), "wait=1" | "wait=2"), "{answer:?}");
+    assert_eq!(service.post(&format!("{}/cancel", answer.header("location")), &json!({})).status / 100, 2);
+}
+
+#[test]
+fn metrics_tell_of_routes_kinds_and_phases() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order = json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"),
+        "params": { "tolerance_mm": 0.1, "radius_mm": 1 }, "outputs": ["stl"] });
+    assert_eq!(service.done(&order)["state"], "succeeded");
+    let value = |text: &str, name: &str| text.lines().find_map(|line| line.strip_prefix(name)?.trim().parse::<f64>().ok());
+    let counted = |text: &str| value(text, "lacuna_job_seconds_count{kind=\"solidify\",state=\"succeeded\"}") == Some(1.0);
+    // The end is counted a moment after it is told.
+    let told = || String::from_utf8(service.get("/metrics").body).unwrap();
+    until(Duration::from_secs(20), "a job that is counted", || counted(&told()) && told().contains("lacuna_phase_seconds_count"));
+    let text = told();
+    let whole = value(&text, "lacuna_job_seconds_sum{kind=\"solidify\",state=\"succeeded\"}").unwrap();
+    let mut phases = 0.0;
+    for phase in ["dilate", "write"] {
+        let labels = format!("{{kind=\"solidify\",phase=\"{phase}\"}}");
+        assert!(value(&text, &format!("lacuna_phase_seconds_count{labels}")).is_some_and(|count| count >= 1.0), "{phase}: {text}");
+        phases += value(&text, &format!("lacuna_phase_seconds_sum{labels}")).unwrap();
+    }
+    // The phases are parts of the whole, up to the moment in which both are noted.
+    assert!(0.0 < phases && phases <= whole + 0.1, "{phases} of {whole}");
+    assert!(value(&text, "lacuna_http_requests_total{method=\"POST\",route=\"/v1/jobs\",status=\"200\"}").is_some(), "{text}");
+}
+
+#[test]
+fn the_reader_s_page_asks_nobody_but_the_service() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let page = service.get("/docs");
+    let text = String::from_utf8(page.body.clone()).unwrap();
+    assert!(page.status == 200 && text.contains("/v1/openapi.json"), "{text}");
+    for outside in ["http://", "https://", "src=\"//", "href=\"//", "@import", "<link"] {
+        assert!(!text.contains(outside), "the page names {outside}");
+    }
+    // A browser would refuse it, too.
+    let policy = page.header("content-security-policy");
+    assert!(policy.starts_with("default-src 'none'") && policy.contains("connect-src 'self'"), "{policy}");
+    assert!(!policy.contains("http") && !policy.contains('*'), "{policy}");
 }

@@ -38,12 +38,13 @@ impl Histogram {
     }
 }
 
-/// What is counted. Labels are routes, methods, statuses, kinds and states: a bounded set.
+/// What is counted. Labels are routes, methods, statuses, kinds, phases and states: a bounded set.
 #[derive(Debug, Default)]
 pub struct Metrics {
     requests: Mutex<BTreeMap<(String, String, u16), u64>>,
     latency: Mutex<BTreeMap<String, Histogram>>,
     jobs: Mutex<BTreeMap<(String, &'static str), Histogram>>,
+    phases: Mutex<BTreeMap<(String, String), Histogram>>,
     cancelled: Mutex<Histogram>,
     accepted: AtomicU64,
     reused: AtomicU64,
@@ -73,6 +74,11 @@ impl Metrics {
         crate::locked(&self.jobs).entry((kind.to_owned(), state.word())).or_default().observe(time);
     }
 
+    /// Counts a phase of a job, from its first step to that of the next one or to the end.
+    pub fn phase(&self, kind: &str, phase: &str, time: Duration) {
+        crate::locked(&self.phases).entry((kind.to_owned(), phase.to_owned())).or_default().observe(time);
+    }
+
     /// Counts the time from a wish to stop, as the worker heard of it, to the record of the stop.
     pub fn stopped_after(&self, time: Duration) {
         crate::locked(&self.cancelled).observe(time);
@@ -99,6 +105,10 @@ impl Metrics {
         heading(&mut text, "lacuna_job_seconds", "histogram", "time a worker spent on a job");
         for ((kind, state), histogram) in crate::locked(&self.jobs).iter() {
             histogram.write(&mut text, "lacuna_job_seconds", &format!("kind=\"{kind}\",state=\"{state}\""));
+        }
+        heading(&mut text, "lacuna_phase_seconds", "histogram", "time that a phase of a job took");
+        for ((kind, phase), histogram) in crate::locked(&self.phases).iter() {
+            histogram.write(&mut text, "lacuna_phase_seconds", &format!("kind=\"{kind}\",phase=\"{phase}\""));
         }
         heading(&mut text, "lacuna_cancel_seconds", "histogram", "time from a wish to stop a job to its stop");
         crate::locked(&self.cancelled).write(&mut text, "lacuna_cancel_seconds", "reason=\"caller\"");

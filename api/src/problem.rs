@@ -59,6 +59,9 @@ pub enum ProblemKind {
     /// The idempotency key was used with another body.
     #[serde(rename = "/problems/idempotency-mismatch")]
     IdempotencyMismatch,
+    /// What is here is not what `If-Match` names.
+    #[serde(rename = "/problems/precondition-failed")]
+    PreconditionFailed,
     /// What was asked cannot be reached.
     #[serde(rename = "/problems/unreachable")]
     Unreachable,
@@ -122,6 +125,7 @@ impl ProblemKind {
             Self::InvalidModel => (422, 3, "invalid-model", "The document is not a legal model or job"),
             Self::InvalidFile => (422, 3, "invalid-file", "The file cannot be read"),
             Self::IdempotencyMismatch => (422, 2, "idempotency-mismatch", "The key was used with another body"),
+            Self::PreconditionFailed => (412, 5, "precondition-failed", "What is here is another version"),
             Self::Unreachable => (422, 4, "unreachable", "What was asked cannot be reached"),
             Self::Limit => (422, 4, "limit", "A limit was hit"),
             Self::TooManyJobs => (429, 5, "too-many-jobs", "The queue is full"),
@@ -140,7 +144,7 @@ impl ProblemKind {
     }
 
     /// All kinds.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::MalformedJson,
         Self::BadRequest,
         Self::Unauthenticated,
@@ -156,6 +160,7 @@ impl ProblemKind {
         Self::InvalidModel,
         Self::InvalidFile,
         Self::IdempotencyMismatch,
+        Self::PreconditionFailed,
         Self::Unreachable,
         Self::Limit,
         Self::TooManyJobs,

@@ -74,7 +74,7 @@ export class Api extends Transport {
    * what it holds, and nothing of it is repaired. `model_ref` in a job names either.
    */
   storeModel(body: Model | BodyInit, options?: { format?: string; name?: string; contentType?: string; signal?: AbortSignal }): Promise<ModelView>;
-  /** Forgets a model. Jobs that used it keep what they made. */
+  /** Forgets a model, with `If-Match` only if it has that tag. Jobs that used it keep what they made. */
   forgetModel(id: string, options?: { signal?: AbortSignal }): Promise<void>;
   /** The canonical document of a model, or a mesh file as it was uploaded. `HEAD` gives the headers. */
   fetchModel(id: string, options?: { signal?: AbortSignal }): Promise<Response>;

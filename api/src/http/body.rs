@@ -22,6 +22,7 @@ impl FromRequest<Shared> for JsonBody {
 
     async fn from_request(request: Request, state: &Shared) -> Result<Self, Problem> {
         check_media_type(request.headers())?;
+        check_coding(request.headers())?;
         read(request, state).await.map(Self)
     }
 }
@@ -49,8 +50,9 @@ const PIECE: usize = 1 << 20;
 /// Receives a body into a file, piece by piece; between two of them no more time than `idle` may pass.
 ///
 /// # Errors
-/// When the body is longer than allowed, too slow or breaks off, or the device fails.
+/// When the body is compressed, longer than allowed, too slow or breaks off, or the device fails.
 pub async fn receive(request: Request, mut file: PendingFile, allowed: u64, idle: Duration) -> Result<PendingFile, Problem> {
+    check_coding(request.headers())?;
     let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
     if let Some(announced) = announced.filter(|&announced| announced > allowed) {
         return Err(file_too_large(announced, allowed));
@@ -113,10 +115,36 @@ fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
     Err(Problem::new(ProblemKind::UnsupportedMedia, detail))
 }
 
+/// Bodies are read as they come: what is announced as compressed would be taken for something else.
+fn check_coding(headers: &HeaderMap) -> Result<(), Problem> {
+    let mut codings = headers.get_all(header::CONTENT_ENCODING).iter().map(|value| String::from_utf8_lossy(value.as_bytes()));
+    match codings.find(|coding| !coding.trim().eq_ignore_ascii_case("identity")) {
+        Some(coding) => {
+            let given: String = coding.chars().take(80).collect();
+            let detail = format!("the body is announced with Content-Encoding {given:?}; send it as it is, without that header");
+            Err(Problem::new(ProblemKind::UnsupportedMedia, detail).code("unsupported-encoding"))
+        }
+        None => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn only_what_is_not_compressed_is_read() {
+        let check = |value: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::CONTENT_ENCODING, value.parse().unwrap());
+            check_coding(&headers).map_err(|problem| problem.code)
+        };
+        assert!(check_coding(&HeaderMap::new()).is_ok() && check("identity").is_ok());
+        for coding in ["gzip", "br", "identity, gzip", "snappy-9000", ""] {
+            assert_eq!(check(coding), Err("unsupported-encoding".to_owned()), "{coding}");
+        }
+    }
 
     #[test]
     fn json_by_any_of_its_names() {

@@ -55,11 +55,18 @@ impl Preference {
 /// The digest of the `Idempotency-Key`, if there is one.
 ///
 /// # Errors
-/// When the key is empty or longer than 255 characters.
+/// When the key is empty or longer than 255 characters, or there are several.
 pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<Digest>, Problem> {
-    let Some(value) = headers.get("idempotency-key") else { return Ok(None) };
+    let refused = |detail: String| Err(Problem::new(ProblemKind::BadRequest, detail).code("bad-header"));
+    let mut values = headers.get_all("idempotency-key").iter();
+    let Some(value) = values.next() else { return Ok(None) };
+    let more = values.count();
+    if more > 0 {
+        // Which one a proxy or a retry keeps is nobody's guess.
+        return refused(format!("there are {} headers Idempotency-Key; send one", more + 1));
+    }
     if value.is_empty() || value.len() > 255 {
-        return Err(Problem::new(ProblemKind::BadRequest, "an Idempotency-Key has 1 to 255 characters").code("bad-header"));
+        return refused(format!("the Idempotency-Key has {} characters; it has 1 to 255", value.len()));
     }
     Ok(Some(Digest::of(value.as_bytes())))
 }
@@ -69,6 +76,22 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<Digest>, Problem> {
 pub fn is_known(headers: &HeaderMap, etag: &str) -> bool {
     let values = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|value| value.to_str().ok());
     values.flat_map(|value| value.split(',')).map(str::trim).any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
+}
+
+/// Holds what is there against `If-Match`: with another tag than those that are named, nothing is done.
+///
+/// # Errors
+/// 412 when it is none of them.
+pub fn check_match(headers: &HeaderMap, etag: &str) -> Result<(), Problem> {
+    let mut values = headers.get_all(header::IF_MATCH).iter().peekable();
+    let unconditional = values.peek().is_none();
+    // Strong comparison: a weak tag matches nothing (RFC 9110, 13.1.1).
+    let matches = values.filter_map(|value| value.to_str().ok()).flat_map(|value| value.split(',')).map(str::trim);
+    if unconditional || matches.into_iter().any(|tag| tag == "*" || tag == etag) {
+        return Ok(());
+    }
+    let detail = format!("If-Match names another version; what is here has the tag {etag}: leave If-Match out, or send that tag");
+    Err(Problem::new(ProblemKind::PreconditionFailed, detail))
 }
 
 /// `Preference-Applied`.
@@ -85,7 +108,8 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for QueryOf<T> {
         let query = Query::<T>::try_from_uri(&parts.uri);
         query.map(|Query(value)| Self(value)).map_err(|error| {
             let source = std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string);
-            Problem::new(ProblemKind::BadRequest, format!("the query cannot be read: {source}"))
+            let given: String = parts.uri.query().unwrap_or_default().chars().take(200).collect();
+            Problem::new(ProblemKind::BadRequest, format!("the query {given:?} cannot be read: {source}"))
         })
     }
 }
@@ -98,6 +122,25 @@ pub fn page_length(limit: Option<usize>) -> Result<usize, Problem> {
     match limit.unwrap_or(50) {
         limit @ 1..=200 => Ok(limit),
         limit => Err(Problem::new(ProblemKind::BadRequest, format!("limit is {limit}; a page has 1 to 200 items"))),
+    }
+}
+
+/// Where a page begins: behind an item that may be gone by now, so only its form can be held against what we make.
+///
+/// # Errors
+/// When it is nothing that a page has told.
+pub fn page_cursor(cursor: Option<String>, prefix: &str) -> Result<Option<String>, Problem> {
+    let ours = |cursor: &String| {
+        let id = cursor.strip_prefix(prefix).unwrap_or_default();
+        id.len() == 32 && id.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+    };
+    match cursor {
+        Some(cursor) if !ours(&cursor) => {
+            let given: String = cursor.chars().take(80).collect();
+            let detail = format!("the cursor is {given:?}; it is what \"next\" of the page before says, or left out for the first page");
+            Err(Problem::new(ProblemKind::BadRequest, detail).code("bad-cursor"))
+        }
+        cursor => Ok(cursor),
     }
 }
 
@@ -133,9 +176,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_meant_by_its_tag_is_that_or_refused() {
+        let passes = |values: &[&str]| check_match(&headers("if-match", values), "\"a\"").is_ok();
+        assert!(passes(&[]) && passes(&["*"]) && passes(&["\"b\", \"a\""]) && passes(&["\"b\"", "\"a\""]));
+        assert!(!passes(&["\"b\""]) && !passes(&["W/\"a\""]) && !passes(&[""]));
+    }
+
+    #[test]
+    fn cursors_are_those_of_pages() {
+        let id = format!("job_{}", "0a".repeat(16));
+        assert_eq!(page_cursor(Some(id.clone()), "job_").unwrap(), Some(id.clone()));
+        assert_eq!(page_cursor(None, "job_").unwrap(), None);
+        for other in ["", "job_", "../../x", &id.to_uppercase(), &format!("{id}0"), &id.replace("job", "mdl")] {
+            assert_eq!(page_cursor(Some(other.to_owned()), "job_").unwrap_err().code, "bad-cursor", "{other}");
+        }
+    }
+
+    #[test]
     fn keys_have_a_length() {
         assert!(idempotency_key(&HeaderMap::new()).unwrap().is_none());
         assert!(idempotency_key(&headers("idempotency-key", &[&"k".repeat(256)])).is_err());
         assert!(idempotency_key(&headers("idempotency-key", &["k"])).unwrap().is_some());
+        assert!(idempotency_key(&headers("idempotency-key", &["k", "k"])).is_err());
     }
 }

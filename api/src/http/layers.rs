@@ -19,7 +19,7 @@ use crate::traces::{self, Context, Span, SpanKind};
 /// The header with a request's id.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-const EXPOSED: &str = "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Link, RateLimit, RateLimit-Policy";
+const EXPOSED: &str = "Location, ETag, Retry-After, X-Request-Id, Repr-Digest, Content-Disposition, Preference-Applied, Content-Range, Accept-Ranges, Allow, Idempotency-Replayed, Link, RateLimit, RateLimit-Policy";
 
 /// Gives a request its id, tells the log and the metrics of it, and every error its form.
 pub async fn observe(State(state): State<Shared>, mut request: Request, next: Next) -> Response {
@@ -31,7 +31,7 @@ pub async fn observe(State(state): State<Shared>, mut request: Request, next: Ne
     let route = request.extensions().get::<MatchedPath>().map_or("unmatched", MatchedPath::as_str).to_owned();
     let mut response = guard(&state, request, next).await;
     if response.status().is_client_error() || response.status().is_server_error() {
-        response = as_problem(response, &id);
+        response = as_problem(response, &id).await;
     }
     if let Ok(value) = HeaderValue::from_str(&id) {
         response.headers_mut().insert(REQUEST_ID, value);
@@ -83,8 +83,14 @@ fn time_of(state: &Shared, request: &Request) -> u64 {
     if uploads { state.config.upload_seconds.max(state.config.answer_seconds) } else { state.config.answer_seconds }
 }
 
-fn as_problem(mut response: Response, id: &str) -> Response {
-    let mut problem = response.extensions_mut().remove::<Problem>().unwrap_or_else(|| Problem::from_status(response.status().as_u16()));
+/// Characters of what a library says in our place: a sentence, not a page.
+const SAID: usize = 500;
+
+async fn as_problem(mut response: Response, id: &str) -> Response {
+    let mut problem = match response.extensions_mut().remove::<Problem>() {
+        Some(problem) => problem,
+        None => said_by_library(&mut response).await,
+    };
     if problem.is_defect() {
         tracing::error!(request_id = %id, code = %problem.code, detail = %problem.detail, "defect");
     }
@@ -98,6 +104,20 @@ fn as_problem(mut response: Response, id: &str) -> Response {
         }
     }
     answer
+}
+
+/// What a library refuses in our place, with its own words on what the caller may mend.
+async fn said_by_library(response: &mut Response) -> Problem {
+    let mut problem = Problem::from_status(response.status().as_u16());
+    if !problem.is_defect() {
+        let body = std::mem::take(response.body_mut());
+        let said = axum::body::to_bytes(body, 4 * SAID).await.unwrap_or_default();
+        let said: String = String::from_utf8_lossy(&said).chars().take(SAID).collect();
+        if !said.trim().is_empty() {
+            problem.detail = said;
+        }
+    }
+    problem
 }
 
 /// The caller's id if it is harmless in a log, else a new one.
@@ -145,7 +165,7 @@ fn preflight_answer() -> Response {
     headers.insert(
         header::ACCESS_CONTROL_ALLOW_HEADERS,
         HeaderValue::from_static(
-            "Authorization, Content-Type, Idempotency-Key, Prefer, Range, If-None-Match, If-Range, Last-Event-ID, X-Request-Id",
+            "Authorization, Content-Type, Content-Disposition, Idempotency-Key, Prefer, Range, If-Match, If-None-Match, If-Range, Last-Event-ID, Traceparent, X-Request-Id",
         ),
     );
     headers.insert(header::ACCESS_CONTROL_MAX_AGE, HeaderValue::from_static("600"));

@@ -4,7 +4,7 @@ use axum::body::Body;
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::headers::is_known;
+use super::headers::{check_match, is_known};
 use crate::jobs::record::Output;
 use crate::problem::{Problem, ProblemKind};
 use crate::store::{File, Store};
@@ -26,15 +26,25 @@ pub fn part(range: Option<&str>, length: u64) -> Part {
     let Some((first, last)) = range.and_then(|range| range.trim().strip_prefix("bytes=")?.split_once('-')) else {
         return Part::Whole;
     };
-    match (first.trim().parse::<u64>(), last.trim().parse::<u64>(), first.trim().is_empty(), last.trim().is_empty()) {
-        (Ok(first), Ok(last), ..) if first <= last && first < length => Part::Range(first, last.min(length - 1)),
-        (Ok(first), Ok(last), ..) if first > last => Part::Whole,
-        (Ok(first), Err(_), _, true) if first < length => Part::Range(first, length - 1),
-        (Ok(_), Ok(_), ..) | (Ok(_), Err(_), _, true) | (Err(_), Ok(0), true, _) => Part::Outside,
-        (Err(_), Ok(suffix), true, _) if length > 0 => Part::Range(length - suffix.min(length), length - 1),
-        (Err(_), Ok(_), true, _) => Part::Outside,
-        _ => Part::Whole,
+    match (first.trim(), last.trim()) {
+        ("", suffix) => match position(suffix) {
+            None => Part::Whole,
+            Some(suffix) if suffix == 0 || length == 0 => Part::Outside,
+            Some(suffix) => Part::Range(length - suffix.min(length), length - 1),
+        },
+        (first, last) => match (position(first), if last.is_empty() { Some(u64::MAX) } else { position(last) }) {
+            (Some(first), Some(last)) if first > last => Part::Whole,
+            (Some(first), Some(last)) if first < length => Part::Range(first, last.min(length - 1)),
+            (Some(_), Some(_)) => Part::Outside,
+            _ => Part::Whole,
+        },
     }
+}
+
+/// A place in a file: digits only. One that no number of ours holds lies behind the end of every file, as the greatest one does.
+fn position(digits: &str) -> Option<u64> {
+    let all_digits = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
+    all_digits.then(|| digits.parse().unwrap_or(u64::MAX))
 }
 
 /// Answers with a file that never changes.
@@ -43,6 +53,7 @@ pub fn part(range: Option<&str>, length: u64) -> Part {
 /// When the file is gone or fails.
 pub async fn answer(request: &HeaderMap, store: &Store, file: File, output: &Output) -> Result<Response<Body>, Problem> {
     let etag = format!("\"{}\"", output.digest);
+    check_match(request, &etag)?;
     let mut response = Response::new(Body::empty());
     immutable_headers(response.headers_mut(), output, &etag)?;
     if is_known(request, &etag) {
@@ -114,6 +125,13 @@ mod tests {
             (Some("bytes=0-1,3-4"), Part::Whole),
             (Some("lines=1-2"), Part::Whole),
             (Some("bytes=a-b"), Part::Whole),
+            (Some("bytes=+1-+5"), Part::Whole),
+            (Some("bytes=-"), Part::Whole),
+            // Numbers beyond 64 bits.
+            (Some("bytes=2-18446744073709551616"), Part::Range(2, 9)),
+            (Some("bytes=18446744073709551616-"), Part::Outside),
+            (Some("bytes=18446744073709551616-18446744073709551617"), Part::Outside),
+            (Some("bytes=-18446744073709551616"), Part::Range(0, 9)),
         ] {
             assert_eq!(part(range, 10), expected, "{range:?}");
         }

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::future::Future;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::Router;
 use axum::body::Body;
@@ -20,6 +20,9 @@ use crate::config::Config;
 use crate::jobs::worker;
 use crate::problem::Problem;
 use crate::traces;
+
+/// Time for answers that are under way when the time for jobs is over.
+const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
 /// Between two sweeps of what is too old to keep.
 const SWEEP_EVERY: Duration = Duration::from_secs(3600);
@@ -58,20 +61,26 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
         tokio::spawn(async move { accept(&watched, app, &state, None).await });
     }
     tokio::select! {
-        () = accept(&listener, app, &state, Some(&connections)) => {}
+        () = accept(&listener, app.clone(), &state, Some(&connections)) => {}
         () = stop => {}
     }
-    // In this order: no new work, open streams end, answers under way are finished, running jobs too.
+    // In this order: not ready and no new work, open streams end, running jobs are finished, then answers under way.
     tracing::info!("going down");
     state.desk.stop();
     state.closing.send_replace(true);
     sweeper.abort();
     let drain = Duration::from_secs(state.config.drain_seconds);
     let desk = Arc::clone(&state.desk);
+    let start = Instant::now();
     let drained = tokio::task::spawn_blocking(move || end_workers(&desk, workers, drain));
+    // Until jobs have ended, who calls anew is told that the service is not ready, or how a job is, instead of being turned away.
+    tokio::select! {
+        () = accept(&listener, app, &state, Some(&connections)) => {}
+        _ = drained => {}
+    }
     drop(listener);
-    let _ = tokio::time::timeout(drain, connections.shutdown()).await;
-    let _ = drained.await;
+    let left = drain.saturating_sub(start.elapsed()).max(LAST_ANSWERS);
+    let _ = tokio::time::timeout(left, connections.shutdown()).await;
     let _ = tokio::task::spawn_blocking(traces::finish).await;
     tracing::info!("down");
     Ok(())

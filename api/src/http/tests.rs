@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::http::{HeaderMap, Request, StatusCode};
+use axum::middleware::from_fn_with_state;
 use http_body_util::BodyExt;
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan};
 use lacuna_kernel::budget::Budget;
@@ -15,6 +16,7 @@ use lacuna_kernel::tessellation::Tessellation;
 use serde_json::{Value, json};
 use tower::ServiceExt;
 
+use super::layers;
 use super::router::router;
 use super::state::{AppState, Shared};
 use crate::config::{Config, Flags};
@@ -301,6 +303,28 @@ async fn listed_pages_may_read_answers_and_errors() {
     assert!(!headers.contains_key("access-control-allow-origin"));
     let preflight = [("origin", "https://shop.example"), ("access-control-request-method", "POST")];
     assert_eq!(service.send("OPTIONS", "/v1/jobs", &preflight, Body::empty()).await.0, StatusCode::NO_CONTENT);
+}
+
+async fn broken() -> StatusCode {
+    panic!("index 7 of 3")
+}
+
+#[tokio::test]
+async fn a_handler_that_panics_is_a_problem_that_listed_pages_may_read() {
+    let service = Service::start(0, &[("LACUNA_CORS_ORIGINS", "https://shop.example")]);
+    let state = || Arc::clone(&service.state);
+    let app = axum::Router::new().route("/broken", axum::routing::get(broken));
+    let app = app.layer(from_fn_with_state(state(), layers::observe)).layer(from_fn_with_state(state(), layers::cors));
+    let request = Request::get("/broken").header("origin", "https://shop.example").header("x-request-id", "r-8");
+    let (parts, body) = app.oneshot(request.body(Body::empty()).unwrap()).await.unwrap().into_parts();
+    let problem: Value = serde_json::from_slice(&body.collect().await.unwrap().to_bytes()).unwrap();
+    assert_eq!(
+        (parts.status, &problem["code"], &problem["request_id"]),
+        (StatusCode::INTERNAL_SERVER_ERROR, &json!("internal"), &json!("r-8"))
+    );
+    assert_eq!(parts.headers["content-type"], "application/problem+json");
+    assert_eq!(parts.headers["access-control-allow-origin"], "https://shop.example");
+    assert!(!problem.to_string().contains("index 7"), "the cause stays in the log: {problem}");
 }
 
 #[tokio::test]

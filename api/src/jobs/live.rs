@@ -18,6 +18,8 @@ pub struct Phase {
     pub name: String,
     /// When it began.
     pub since: SystemTime,
+    /// When it began, by the clock that does not jump.
+    pub began: Instant,
     /// The number of the process that computes.
     pub process: u32,
 }
@@ -141,7 +143,7 @@ impl LiveJob {
         }
         *last = Some(now);
         if !same_phase {
-            crate::locked(&self.phases).push(Phase { name: step.phase.clone(), since: SystemTime::now(), process });
+            crate::locked(&self.phases).push(Phase { name: step.phase.clone(), since: SystemTime::now(), began: Instant::now(), process });
         }
         record.view.progress = Some(step.clone());
         drop(record);

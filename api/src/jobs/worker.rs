@@ -9,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits, Progress, StopReason};
 
 use super::desk::Desk;
-use super::live::LiveJob;
+use super::live::{LiveJob, Phase};
 use super::making::{self, Files, Task, Workshop};
 use super::process::Place;
 use super::record::{Answer, Ending, JobState, Step};
@@ -110,13 +110,17 @@ fn record(desk: &Desk, made: Made) {
     }
     let (kind, time) = (documents::kind_word(job.with(|record| record.view.kind)), since.elapsed());
     desk.metrics.ended(kind, state, time);
-    trace(&job, kind, state, time);
+    let (phases, end) = (job.take_phases(), Instant::now());
+    let ends = phases.iter().skip(1).map(|phase| phase.began).chain([end]);
+    for (phase, end) in phases.iter().zip(ends) {
+        desk.metrics.phase(kind, &phase.name, end.duration_since(phase.began));
+    }
+    trace(&job, kind, state, time, phases);
     tracing::info!(job = %job.id(), kind, state = state.word(), milliseconds = time.as_millis(), "job ended");
 }
 
 /// Tells of an attempt and of its phases, each of which lasts until the next one begins.
-fn trace(job: &LiveJob, kind: &str, state: JobState, time: Duration) {
-    let phases = job.take_phases();
+fn trace(job: &LiveJob, kind: &str, state: JobState, time: Duration, phases: Vec<Phase>) {
     if !traces::wanted() {
         return;
     }

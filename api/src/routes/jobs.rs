@@ -1,7 +1,7 @@
 //! Jobs: submitted, listed, looked at, stopped, forgotten.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::Json;
 use axum::extract::{Extension, Path, State};
@@ -15,7 +15,7 @@ use crate::digest::Digest;
 use crate::documents;
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
-use crate::http::headers::{PREFERENCE_APPLIED, Preference, QueryOf, idempotency_key, page_length};
+use crate::http::headers::{PREFERENCE_APPLIED, Preference, QueryOf, idempotency_key, page_cursor, page_length};
 use crate::http::state::{AppState, Shared};
 use crate::jobs::desk::{JobFilter, Submission};
 use crate::jobs::live::LiveJob;
@@ -95,13 +95,18 @@ pub(super) async fn take(
     body: Vec<u8>,
     usual: Duration,
 ) -> Result<Response, Problem> {
+    let start = Instant::now();
     let key = idempotency_key(headers)?;
-    let preference = Preference::of(headers);
+    let mut preference = Preference::of(headers);
+    let answer_seconds = state.config.answer_seconds;
     let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
     let (job, replayed) = state.beside(move |state| accept(state, &orderer, &body, used)).await?;
     // Whoever asks for an answer at once gets it, wherever others wait.
     let usual = if preference.respond_async { Duration::ZERO } else { usual };
-    let view = job.wait(preference.wait.unwrap_or(usual)).await;
+    // The job is accepted: its id must arrive before the time for an answer is over, of which a tenth is left for sending it.
+    let left = Duration::from_secs(answer_seconds).mul_f64(0.9).saturating_sub(start.elapsed());
+    preference.wait = preference.wait.map(|wait| wait.min(left));
+    let view = job.wait(preference.wait.unwrap_or(usual.min(left))).await;
     let ended = view.state.is_final();
     let mut response = answer(view);
     if let Some(applied) = preference.applied(ended).and_then(|applied| HeaderValue::from_str(&applied).ok()) {
@@ -173,7 +178,8 @@ pub async fn list(
     QueryOf(query): QueryOf<JobQuery>,
 ) -> Result<Json<JobPage>, Problem> {
     let length = page_length(query.limit)?;
-    let filter = JobFilter { state: query.state, kind: query.kind, before: query.cursor };
+    let before = page_cursor(query.cursor, "job_")?;
+    let filter = JobFilter { state: query.state, kind: query.kind, before };
     let mut items = state.desk.page(&owner.0, &filter, length + 1).await?;
     let more = items.len() > length;
     items.truncate(length);

@@ -13,7 +13,7 @@ use crate::documents;
 use crate::files;
 use crate::http::auth::Owner;
 use crate::http::body::{JsonBody, is_json};
-use crate::http::headers::{QueryOf, is_known, page_length};
+use crate::http::headers::{QueryOf, check_match, is_known, page_cursor, page_length};
 use crate::http::range;
 use crate::http::state::Shared;
 use crate::jobs::record::Output;
@@ -91,9 +91,10 @@ pub async fn list(
     QueryOf(query): QueryOf<ModelQuery>,
 ) -> Result<Json<ModelPage>, Problem> {
     let length = page_length(query.limit)?;
+    let after = page_cursor(query.cursor, "mdl_")?;
     let list = move |state: &crate::http::state::AppState| state.store.list_models(&owner.0).map_err(|error| Problem::io("models", &error));
     let all = state.beside(list).await?;
-    let after = query.cursor.unwrap_or_default();
+    let after = after.unwrap_or_default();
     let mut items: Vec<ModelView> = all.into_iter().filter(|view| view.id > after).take(length + 1).collect();
     let more = items.len() > length;
     items.truncate(length);
@@ -127,6 +128,7 @@ pub async fn fetch(
         return range::answer(&headers, &state.store, File::Upload(view.digest), &file_of(&view)).await;
     };
     let etag = format!("\"{}\"", view.digest);
+    check_match(&headers, &etag)?;
     let shared = [(header::ETAG, etag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
     if is_known(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, shared).into_response());
@@ -134,7 +136,7 @@ pub async fn fetch(
     Ok((shared, [(header::CONTENT_TYPE, MEDIA_TYPE)], document).into_response())
 }
 
-/// Forgets a model. Jobs that used it keep what they made.
+/// Forgets a model, with `If-Match` only if it has that tag. Jobs that used it keep what they made.
 #[utoipa::path(
     delete, path = "/v1/models/{id}", operation_id = "forget_model", tag = "models", params(("id" = String, Path, description = "The model's id")),
     responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))
@@ -143,8 +145,12 @@ pub async fn forget(
     State(state): State<Shared>,
     Extension(owner): Extension<Owner>,
     Path(id): Path<String>,
+    headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
     let forgotten = state.beside(move |state| {
+        let failed = |error| Problem::io("the model could not be read", &error);
+        let view = state.store.model(&owner.0, &id).map_err(failed)?.ok_or_else(|| absent(&id))?;
+        check_match(&headers, &format!("\"{}\"", view.digest))?;
         let known = state.store.forget_model(&owner.0, &id).map_err(|error| Problem::io("the model could not be forgotten", &error))?;
         if known { Ok(StatusCode::NO_CONTENT) } else { Err(absent(&id)) }
     });

@@ -129,7 +129,7 @@ class Api(Transport):
         return self._json('POST', '/v1/models', query={'format': format, 'name': name}, body=body, content_type=content_type, accept='application/json, application/problem+json')
 
     def forget_model(self, id: str) -> None:
-        """Forgets a model. Jobs that used it keep what they made."""
+        """Forgets a model, with `If-Match` only if it has that tag. Jobs that used it keep what they made."""
         self._nothing('DELETE', f"/v1/models/{quote(id, safe='')}", accept='application/problem+json')
 
     def fetch_model(self, id: str) -> Answer:
