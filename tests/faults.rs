@@ -220,7 +220,12 @@ fn a_result_deleted_under_a_download_is_delivered_and_then_made_again() {
     assert_eq!((first.len() - head + rest.len()) as u64, bytes);
     // Gone is told as gone, and equal work is not answered with what is no longer there.
     let gone = service.get(&format!("/v1/results/{digest}"));
-    assert_eq!((gone.status, gone.header("content-type")), (404, "application/problem+json"));
+    assert_eq!((gone.status, gone.header("content-type")), (410, "application/problem+json"));
+    assert_eq!((&gone.json()["type"], &gone.json()["code"]), (&json!("/problems/result-expired"), &json!("result-expired")));
+    let pointed = format!("/v1/jobs/{}/outputs/{}?redirect=0", job["id"].as_str().unwrap(), job["outputs"][0]["name"].as_str().unwrap());
+    assert_eq!(service.get(&pointed).status, 410);
+    // What nobody made was never there.
+    assert_eq!(service.get(&format!("/v1/results/sha256:{}", "0".repeat(64))).status, 404);
     let again = service.done(&large());
     assert_eq!((&again["reused"], &again["outputs"]), (&json!(false), &job["outputs"]));
     assert_eq!(service.get(&format!("/v1/results/{digest}")).body.len() as u64, bytes);

@@ -393,3 +393,56 @@ fn the_reader_s_page_asks_nobody_but_the_service() {
     assert!(policy.starts_with("default-src 'none'") && policy.contains("connect-src 'self'"), "{policy}");
     assert!(!policy.contains("http") && !policy.contains('*'), "{policy}");
 }
+
+#[test]
+fn a_result_in_several_formats_comes_in_the_one_that_is_preferred() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order = json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"),
+        "params": { "tolerance_mm": 0.2, "radius_mm": 1 }, "outputs": ["stl", "3mf", "png"] });
+    let view = service.done(&order);
+    let outputs = view["outputs"].as_array().unwrap();
+    let file = |name: &str| outputs.iter().find(|output| output["name"] == name).unwrap();
+    let stem = file("stl")["file_name"].as_str().unwrap().strip_suffix(".stl").unwrap();
+    let address = format!("/v1/jobs/{}/outputs/{stem}", view["id"].as_str().unwrap());
+    let place = |name: &str| format!("/v1/results/{}", file(name)["digest"].as_str().unwrap());
+    for (accept, name) in [
+        ("*/*", "stl"),
+        ("model/3mf", "3mf"),
+        ("application/vnd.ms-package.3dmanufacturing-3dmodel+xml", "3mf"),
+        ("model/stl;q=0.5, model/3mf;q=0.9, */*;q=0.1", "3mf"),
+        ("model/gltf-binary, model/*;q=0.3, image/*;q=0.2", "stl"),
+        ("text/html, image/png", "png"),
+        ("model/*;q=0, */*", "png"),
+    ] {
+        let answer = service.get_with(&address, &[("accept", accept)]);
+        assert_eq!((answer.status, answer.header("location")), (303, place(name).as_str()), "{accept}");
+        assert_eq!(answer.header("vary"), "Accept", "{accept}");
+    }
+    assert_eq!(service.get(&address).header("location"), place("stl"));
+    let named = service.get_with(&format!("{address}?format=3mf"), &[("accept", "model/stl")]);
+    assert_eq!((named.status, named.header("location")), (303, place("3mf").as_str()));
+    let whole = service.get_with(&format!("{address}?redirect=0"), &[("accept", "image/png")]);
+    assert_eq!((whole.status, whole.header("content-type"), whole.header("vary")), (200, "image/png", "Accept"));
+    assert!(whole.body.starts_with(b"\x89PNG"));
+
+    // What was not made is not there, and the refusal says what is.
+    for (query, accept) in [("", "model/obj"), ("?format=glb", "*/*"), ("?redirect=0", "text/*;q=1, */*;q=0")] {
+        let refused = service.get_with(&format!("{address}{query}"), &[("accept", accept)]);
+        assert_eq!((refused.status, refused.header("content-type"), refused.header("vary")), (406, "application/problem+json", "Accept"));
+        let problem = refused.json();
+        assert_eq!((&problem["type"], &problem["code"]), (&json!("/problems/not-acceptable"), &json!("not-acceptable")));
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(["model/stl", "model/3mf", "image/png", "convert"].iter().all(|word| detail.contains(word)), "{detail}");
+    }
+    let unknown = service.get(&format!("{address}?format=parchment"));
+    assert_eq!((unknown.status, &unknown.json()["code"]), (400, &json!("unknown-format")));
+    assert!(["parchment", "stl", "3mf", "glb"].iter().all(|word| unknown.json()["detail"].as_str().unwrap().contains(word)));
+
+    // Drawings are chosen by the same rule.
+    let draw = |accept: &str| service.post_with("/v1/automaton", &[("accept", accept)], model("meshes/segment").to_string().as_bytes());
+    assert_eq!(draw("*/*").header("content-type"), "image/svg+xml");
+    assert_eq!(draw("image/svg+xml;q=0.5, text/vnd.graphviz").header("content-type"), "text/vnd.graphviz; charset=utf-8");
+    let refused = draw("model/stl");
+    assert_eq!((refused.status, refused.header("vary"), &refused.json()["code"]), (406, "Accept", &json!("not-acceptable")));
+}

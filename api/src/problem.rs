@@ -32,6 +32,9 @@ pub enum ProblemKind {
     /// The address does not have this method.
     #[serde(rename = "/problems/method-not-allowed")]
     MethodNotAllowed,
+    /// Nothing of what is here is in a media type that the caller accepts.
+    #[serde(rename = "/problems/not-acceptable")]
+    NotAcceptable,
     /// The request was not finished in time.
     #[serde(rename = "/problems/request-timeout")]
     RequestTimeout,
@@ -41,6 +44,9 @@ pub enum ProblemKind {
     /// The resource's state does not allow the action.
     #[serde(rename = "/problems/state-conflict")]
     StateConflict,
+    /// The job that made the result is known, and the result is no longer kept.
+    #[serde(rename = "/problems/result-expired")]
+    ResultExpired,
     /// The body is longer than is read.
     #[serde(rename = "/problems/body-too-large")]
     BodyTooLarge,
@@ -116,9 +122,11 @@ impl ProblemKind {
             Self::Forbidden => (403, 5, "forbidden", "The key does not allow this"),
             Self::NotFound => (404, 6, "not-found", "There is no such resource"),
             Self::MethodNotAllowed => (405, 2, "method-not-allowed", "The resource does not have this method"),
+            Self::NotAcceptable => (406, 2, "not-acceptable", "It is here in other media types alone"),
             Self::RequestTimeout => (408, 5, "request-timeout", "The request was not finished in time"),
             Self::IdempotencyInProgress => (409, 5, "idempotency-in-progress", "The key's first request is not answered yet"),
             Self::StateConflict => (409, 5, "state-conflict", "The resource's state does not allow this"),
+            Self::ResultExpired => (410, 6, "result-expired", "The result is no longer kept"),
             Self::BodyTooLarge => (413, 4, "body-too-large", "The body is too large"),
             Self::UnsupportedMedia => (415, 3, "unsupported-media", "The media type is not read here"),
             Self::Range => (416, 2, "range", "The range lies outside of the file"),
@@ -144,16 +152,18 @@ impl ProblemKind {
     }
 
     /// All kinds.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 32] = [
         Self::MalformedJson,
         Self::BadRequest,
         Self::Unauthenticated,
         Self::Forbidden,
         Self::NotFound,
         Self::MethodNotAllowed,
+        Self::NotAcceptable,
         Self::RequestTimeout,
         Self::IdempotencyInProgress,
         Self::StateConflict,
+        Self::ResultExpired,
         Self::BodyTooLarge,
         Self::UnsupportedMedia,
         Self::Range,
@@ -279,6 +289,7 @@ impl Problem {
             403 => ProblemKind::Forbidden,
             404 => ProblemKind::NotFound,
             405 => ProblemKind::MethodNotAllowed,
+            406 => ProblemKind::NotAcceptable,
             408 => ProblemKind::RequestTimeout,
             413 => ProblemKind::BodyTooLarge,
             415 => ProblemKind::UnsupportedMedia,
@@ -444,6 +455,9 @@ impl IntoResponse for Problem {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if self.kind == ProblemKind::NotAcceptable {
+            headers.insert(header::VARY, HeaderValue::from_static("Accept"));
         }
         if self.kind == ProblemKind::Unauthenticated {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));

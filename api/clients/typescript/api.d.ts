@@ -23,8 +23,8 @@ export class Api extends Transport {
   locate(body: AddressQuestion, options?: { signal?: AbortSignal }): Promise<AddressAnswer>;
   /**
    * Draws the automaton of a model: states as nodes, transitions and boundaries as two kinds of arrows. An SVG
-   * picture, or DOT text when `Accept` prefers `text/vnd.graphviz`. A model that is a legal document is drawn even
-   * if it cannot be evaluated, with what is wrong in red.
+   * picture, or DOT text when `Accept` prefers `text/vnd.graphviz`; 406 when it refuses both. A model that is a
+   * legal document is drawn even if it cannot be evaluated, with what is wrong in red.
    */
   automaton(body: Model, options?: { signal?: AbortSignal }): Promise<Response>;
   /** Kinds of jobs, formats and limits of this service. */
@@ -53,8 +53,12 @@ export class Api extends Transport {
    * the stream sends `Last-Event-ID` and gets what it missed.
    */
   jobEvents(id: string, options?: { lastEventId?: number | null; signal?: AbortSignal }): AsyncGenerator<ServerEvent>;
-  /** A job's output: 303 to its bytes, or the bytes with `?redirect=0`. `HEAD` gives the headers. */
-  jobOutput(id: string, name: string, options?: { redirect?: number; signal?: AbortSignal }): Promise<Response>;
+  /**
+   * A job's output: 303 to its bytes, or the bytes with `?redirect=0`. `HEAD` gives the headers. A file name
+   * without its ending stands for all files of that name: `format`, or else `Accept`, says which of them.
+   * `application/octet-stream` accepts every file. 406 where none is acceptable: nothing is converted here.
+   */
+  jobOutput(id: string, name: string, options?: { redirect?: number; format?: string; signal?: AbortSignal }): Promise<Response>;
   /** Lists the library of classics. */
   listClassics(options?: { signal?: AbortSignal }): Promise<LibraryPage>;
   /** The model document of a classic. `HEAD` gives its headers. */

@@ -64,7 +64,7 @@ export class Api extends Transport {
   }
 
   jobOutput(id, name, options = {}) {
-    return this._bytes("GET", `/v1/jobs/${encodeURIComponent(id)}/outputs/${encodeURIComponent(name)}`, { query: { "redirect": options.redirect }, accept: "application/octet-stream, application/problem+json", signal: options.signal });
+    return this._bytes("GET", `/v1/jobs/${encodeURIComponent(id)}/outputs/${encodeURIComponent(name)}`, { query: { "redirect": options.redirect, "format": options.format }, accept: "application/octet-stream, application/problem+json", signal: options.signal });
   }
 
   listClassics(options = {}) {

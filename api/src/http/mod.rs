@@ -1,5 +1,6 @@
 //! The HTTP door: router, layers and everything that is not about one resource.
 
+pub mod accept;
 pub mod auth;
 pub mod body;
 pub mod headers;

@@ -75,10 +75,23 @@ pub async fn answer(request: &HeaderMap, store: &Store, file: File, output: &Out
     };
     response.headers_mut().insert(header::CONTENT_LENGTH, HeaderValue::from(length));
     *response.body_mut() = store.part(file, first, length).await.map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => Problem::new(ProblemKind::NotFound, "the result is no longer kept; submit the job again"),
+        std::io::ErrorKind::NotFound => gone(file, output),
         _ => Problem::io("the result could not be read", &error),
     })?;
     Ok(response)
+}
+
+/// What is known by its record and is not there. Our own sweep takes a result with the last job that has it; a rule of a
+/// bucket, or somebody who makes room, need not.
+fn gone(file: File, output: &Output) -> Problem {
+    let name = &output.file_name;
+    match file {
+        File::Result(_) => {
+            let detail = format!("{name} is no longer kept; submit its job again, and it is made again");
+            Problem::new(ProblemKind::ResultExpired, detail)
+        }
+        File::Upload(_) => Problem::new(ProblemKind::NotFound, format!("{name} is no longer kept; send it again")),
+    }
 }
 
 fn immutable_headers(headers: &mut HeaderMap, output: &Output, etag: &str) -> Result<(), Problem> {

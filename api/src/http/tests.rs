@@ -146,6 +146,39 @@ async fn a_job_is_waited_for_and_its_files_are_served() {
 }
 
 #[tokio::test]
+async fn a_name_that_is_exact_is_refused_where_its_type_is() {
+    let service = Service::start(1, &[]);
+    let (_, _, job) = service.submit(0.1, &[("prefer", "wait=20")]).await;
+    let id = job["id"].as_str().unwrap();
+    let ask = async |name: &str, accept: &str| {
+        service.send("HEAD", &format!("/v1/jobs/{id}/outputs/{name}"), &[("accept", accept)], Body::empty()).await
+    };
+    for (name, accept, expected) in [
+        ("obj", "model/obj", 303),
+        ("obj", "model/*;q=0.1", 303),
+        ("obj", "", 303),
+        ("bar.obj", "application/octet-stream, application/problem+json", 303),
+        ("bar", "text/html, */*;q=0.1", 303),
+        ("obj", "model/stl", 406),
+        ("obj", "application/json", 406),
+        ("bar", "*/*;q=0", 406),
+        ("obj?format=obj", "model/stl", 303),
+        ("obj?format=stl", "*/*", 406),
+        ("bar?format=parchment", "*/*", 400),
+        ("obj", "model/obj;q=much", 400),
+        ("certificate", "application/json", 303),
+        ("ba", "*/*", 404),
+        ("", "*/*", 404),
+    ] {
+        let (status, headers, _) = ask(name, accept).await;
+        assert_eq!(status.as_u16(), expected, "{name} {accept}");
+        if [303, 406].contains(&expected) {
+            assert_eq!(headers["vary"], "Accept", "{name} {accept}");
+        }
+    }
+}
+
+#[tokio::test]
 async fn equal_work_is_done_once_and_keys_repeat_answers() {
     let service = Service::start(1, &[]);
     let (_, _, first) = service.submit(0.1, &[("prefer", "wait=20"), ("idempotency-key", "k")]).await;

@@ -7,11 +7,12 @@ use lacuna_fabrication::Plan;
 
 use crate::addresses::AddressAnswer;
 use crate::documents::{SolveReport, ValidationReport};
+use crate::http::accept::Accept;
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
 use crate::http::state::Shared;
 use crate::openapi::{AddressQuestion, Job, Model, SolveRequest};
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemKind};
 use crate::questions::Question;
 
 /// The answer to a question, as it was written.
@@ -31,9 +32,12 @@ pub async fn validate(State(state): State<Shared>, Extension(owner): Extension<O
     json(&state, owner, Question::Validate, body).await
 }
 
+const SVG: &str = "image/svg+xml";
+const DOT: &str = "text/vnd.graphviz";
+
 /// Draws the automaton of a model: states as nodes, transitions and boundaries as two kinds of arrows.
 ///
-/// An SVG picture, or DOT text when `Accept` prefers `text/vnd.graphviz`. A model that is a legal document is drawn
+/// An SVG picture, or DOT text when `Accept` prefers `text/vnd.graphviz`; 406 when it refuses both. A model that is a legal document is drawn
 /// even if it cannot be evaluated, with what is wrong in red.
 #[utoipa::path(
     post, path = "/v1/automaton", tag = "studies", request_body = Model,
@@ -46,19 +50,17 @@ pub async fn automaton(
     headers: HeaderMap,
     JsonBody(body): JsonBody,
 ) -> Result<Response, Problem> {
-    let dot = prefers_dot(&headers);
+    let there = [SVG, DOT];
+    let media_type = Accept::of(&headers)?.preferred(there, |name| name).ok_or_else(|| {
+        let detail = format!("a drawing is {}, and Accept refuses both", there.join(" or "));
+        Problem::new(ProblemKind::NotAcceptable, detail)
+    })?;
+    let dot = media_type == DOT;
     let drawn = state.beside(move |state| state.ask(&owner, Question::Draw { dot }, &body));
-    let media_type = if dot { "text/vnd.graphviz; charset=utf-8" } else { "image/svg+xml" };
+    let media_type = if dot { format!("{DOT}; charset=utf-8") } else { SVG.to_owned() };
     // The picture needs nothing from anywhere, whatever a browser is told to do with it.
-    let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
-    Ok(([(header::CONTENT_TYPE, media_type), (header::VARY, "accept"), policy], drawn.await?).into_response())
-}
-
-/// Whether `Accept` names DOT, and not a picture before it.
-fn prefers_dot(headers: &HeaderMap) -> bool {
-    let values = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
-    let mut types = values.flat_map(|value| value.split(',')).map(|item| item.split(';').next().unwrap_or_default().trim());
-    types.find(|name| matches!(*name, "text/vnd.graphviz" | "image/svg+xml" | "image/*" | "*/*")) == Some("text/vnd.graphviz")
+    let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'".to_owned());
+    Ok(([(header::CONTENT_TYPE, media_type), (header::VARY, "Accept".to_owned()), policy], drawn.await?).into_response())
 }
 
 /// Tells where an address leads, or which addresses lead near a point.

@@ -42,8 +42,8 @@ class Api(Transport):
     def automaton(self, body: Model) -> Answer:
         """Draws the automaton of a model: states as nodes, transitions and boundaries as two kinds of arrows.
 
-        An SVG picture, or DOT text when `Accept` prefers `text/vnd.graphviz`. A model that is a legal document
-        is drawn even if it cannot be evaluated, with what is wrong in red.
+        An SVG picture, or DOT text when `Accept` prefers `text/vnd.graphviz`; 406 when it refuses both. A model
+        that is a legal document is drawn even if it cannot be evaluated, with what is wrong in red.
         """
         return self._bytes('POST', '/v1/automaton', body=body, accept='image/svg+xml, text/vnd.graphviz, application/problem+json')
 
@@ -91,9 +91,14 @@ class Api(Transport):
         """
         return self._events('GET', f"/v1/jobs/{quote(id, safe='')}/events", header={'Last-Event-ID': last_event_id}, accept='text/event-stream, application/problem+json')
 
-    def job_output(self, id: str, name: str, *, redirect: int | None = None) -> Answer:
-        """A job's output: 303 to its bytes, or the bytes with `?redirect=0`. `HEAD` gives the headers."""
-        return self._bytes('GET', f"/v1/jobs/{quote(id, safe='')}/outputs/{quote(name, safe='')}", query={'redirect': redirect}, accept='application/octet-stream, application/problem+json')
+    def job_output(self, id: str, name: str, *, redirect: int | None = None, format: str | None = None) -> Answer:
+        """A job's output: 303 to its bytes, or the bytes with `?redirect=0`. `HEAD` gives the headers.
+
+        A file name without its ending stands for all files of that name: `format`, or else `Accept`, says which
+        of them. `application/octet-stream` accepts every file. 406 where none is acceptable: nothing is
+        converted here.
+        """
+        return self._bytes('GET', f"/v1/jobs/{quote(id, safe='')}/outputs/{quote(name, safe='')}", query={'redirect': redirect, 'format': format}, accept='application/octet-stream, application/problem+json')
 
     def list_classics(self) -> LibraryPage:
         """Lists the library of classics."""
