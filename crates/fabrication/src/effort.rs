@@ -1,19 +1,19 @@
 //! How long the things take that a plan counts, in seconds of one core.
 //!
 //! Measured, not proven: a release build did every case of `fixtures/` on one of two shared cores of a virtual machine (AMD EPYC at 2.6 GHz), with simplification and without. The constants of
-//! dilations are those for which the largest ratio to the seconds of the processor was least, rounded; the others are quotients of single jobs. Another machine, or another build, has others; on
+//! dilations are those for which the sixth powers of the logarithms of the ratios to the seconds of the processor were least, rounded; the others are quotients of single jobs. Another machine, or another build, has others; on
 //! several cores less time passes. What is counted is the same on every run, and so is the estimate. `fixtures/estimates.py` measures again, and `fixtures/ESTIMATES.md` shows how well it does.
 
 use lacuna_kernel::dilation::Prediction;
 
 /// For each triangle of a lattice's surface: made, cleaned, joined, verified, written and read back.
-const TRIANGLE: f64 = 6.0e-6;
+const TRIANGLE: f64 = 5.0e-6;
 /// For each leaf cell that a block of the lattice meets: what is near to the block is sorted out, and its distances are found.
-const MET_CELL: f64 = 9.0e-6;
+const MET_CELL: f64 = 6.6e-6;
 /// For each triangle of a lattice that is simplified: trials to remove its corners.
-const SIMPLIFIED: f64 = 3.0e-6;
+const SIMPLIFIED: f64 = 1.5e-6;
 /// For each byte that the simplification looks at: the sites near a corner, all of which every trial asks.
-const LOOKED_AT_BYTE: f64 = 4.5e-9;
+const LOOKED_AT_BYTE: f64 = 4.0e-9;
 /// For each leaf cell that is drawn by itself, and for each that becomes part of a conforming complex.
 const CELL: f64 = 5.0e-7;
 const FACE: f64 = 2.0e-6;
