@@ -11,13 +11,15 @@
 //! depends on the face's values alone, so that neighbours fit, and the surface is a manifold: around a point inside a
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
+use super::affine::Affine;
 use super::critical::Critical;
 use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored};
 use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::surface::{BlockSurface, NameMap, UNNAMED, VertexName};
+use super::star::{Stars, note};
+use super::surface::{BlockSurface, Seam, NameMap, UNNAMED, VertexName};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
@@ -134,6 +136,7 @@ pub(super) struct Workshop<'a> {
     corners: Vec<u32>,
     numbers: Vec<u32>,
     critical: Critical,
+    stars: Stars,
     /// The cubes of the sub-block that are looked at, by their offset from its first.
     cubes: Vec<[i64; 3]>,
     leaves: Vec<Cube>,
@@ -176,6 +179,7 @@ impl<'a> Workshop<'a> {
             corners: Vec::new(),
             numbers: Vec::new(),
             critical: Critical::default(),
+            stars: Stars::default(),
             cubes: Vec::new(),
             leaves: Vec::new(),
             names: NameMap::default(),
@@ -198,6 +202,7 @@ impl<'a> Workshop<'a> {
         self.names.extend(surface.names.iter().zip(0..).filter(|&(&name, _)| name != UNNAMED).map(|(&name, number)| (name, number)));
         self.seed = None;
         let starts = self.tree.reset(candidates);
+        let kept = surface.triangles.len();
         let first_cube = surface.first_cube;
         for k in (0..SIDE).step_by(SUB) {
             for j in (0..SIDE).step_by(SUB) {
@@ -212,6 +217,9 @@ impl<'a> Workshop<'a> {
             }
         }
         surface.shared.sort_unstable();
+        if !setting.dense {
+            self.follow(setting, grading, &starts, kept, surface);
+        }
         surface.shrink();
         surface.critical.sort_unstable();
         surface.critical.dedup();
@@ -311,6 +319,57 @@ impl<'a> Workshop<'a> {
                 if is_mixed(between | p.1 | q.1) {
                     self.tetrahedron(setting, [own.0, other.0, p.0, q.0], 0, surface);
                 }
+            }
+        }
+    }
+
+    /// Looks at the stars of vertices with triangles from `first` on, and notes the cubes to subdivide where they do not follow the distance: see `star`.
+    fn follow(&mut self, setting: &Setting, grading: &Grading, starts: &[NodeId], first: usize, surface: &mut BlockSurface) {
+        let origin = setting.lattice.corner(surface.first_cube);
+        self.stars.list(surface, first, |vertex| {
+            let place: [usize; 3] = std::array::from_fn(|axis| {
+                let cubes = (vertex[axis] - origin[axis]) / (SUB as f64 * setting.lattice.pitch);
+                (cubes.max(0.0) as usize).min(SIDE / SUB - 1)
+            });
+            ((place[2] * SIDE / SUB + place[1]) * SIDE / SUB + place[0]) as u32
+        });
+        let mut at = u32::MAX;
+        for index in 0..self.stars.listed.len() {
+            let (sub_block, vertex) = self.stars.listed[index];
+            if sub_block != at {
+                at = sub_block;
+                let side = SIDE / SUB;
+                let place = [at as usize % side, at as usize / side % side, at as usize / side / side];
+                let corner = std::array::from_fn(|axis| surface.first_cube[axis] + (SUB * place[axis]) as i64);
+                let half = 0.5 * SUB as f64;
+                let middle: Point = setting.lattice.corner(corner).map(|x| x + half * setting.lattice.pitch);
+                let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+                let mut near = std::mem::take(&mut self.near);
+                self.tree.gather(&middle, starts, setting.sight + half, &mut near);
+                self.near = near;
+            }
+            let star = &mut self.stars.star;
+            star.reset(surface.vertices[vertex as usize]);
+            for &triangle in self.stars.incident.of(vertex) {
+                let corners = surface.triangles[triangle as usize].map(|corner| surface.vertices[corner as usize]);
+                star.add(setting, corners, surface.normals[triangle as usize]);
+            }
+            let centre = star.centre;
+            let reach = setting.outer + star.radius();
+            let mut found = std::mem::take(&mut self.found);
+            found.clear();
+            self.tree.collect(&centre, &self.near, reach, &mut found);
+            star.sites.extend(found.iter().map(|&id| self.tree.site(id)));
+            self.found = found;
+            let direction = star.outwards(setting);
+            if star.follows(setting, &direction) {
+                continue;
+            }
+            if self.stars.shared[vertex as usize] {
+                let name = surface.names[vertex as usize];
+                surface.seams.push(Seam { name, sites: std::mem::take(&mut star.sites) });
+            } else if !star.grows(setting) {
+                note(setting, grading, &centre, &mut surface.critical, &mut surface.uncertain);
             }
         }
     }
@@ -465,7 +524,7 @@ impl<'a> Workshop<'a> {
         let whole = smooth >> WHOLE & 1 == 1;
         if whole && frame.covered != 0 {
             // What one site leaves has no critical point: see `is_steep`.
-            self.march(&frame, surface);
+            self.march(setting, &frame, surface);
             return;
         }
         if self.cut_sites(setting, &frame) == Cut::Empty {
@@ -538,7 +597,7 @@ impl<'a> Workshop<'a> {
         if !frame.is_close(setting, &self.tree) && !self.is_served(setting, frame) {
             surface.critical.extend(frame.cubes());
         }
-        self.march(frame, surface);
+        self.march(setting, frame, surface);
     }
 
     /// Whether a site serves the whole tetrahedron: the nearest to a vertex, or to the middle of what is filled.
@@ -558,7 +617,7 @@ impl<'a> Workshop<'a> {
     }
 
     /// Emits the surface of marching tetrahedra.
-    fn march(&mut self, frame: &Frame, surface: &mut BlockSurface) {
+    fn march(&mut self, setting: &Setting, frame: &Frame, surface: &mut BlockSurface) {
         if frame.covered == WHOLE {
             return;
         }
@@ -599,6 +658,9 @@ impl<'a> Workshop<'a> {
         surface.triangles.push([polygon[0], polygon[1], polygon[2]]);
         if count == 4 {
             surface.triangles.push([polygon[0], polygon[2], polygon[3]]);
+        }
+        if !setting.dense {
+            surface.normals.resize(surface.triangles.len(), outwards(frame, frame.values.map(|value| value.least)));
         }
     }
 
@@ -714,12 +776,14 @@ impl<'a> Workshop<'a> {
             self.numbers.clear();
             self.numbers.extend(self.polygon.iter().map(|&corner| self.corners[usize::from(corner)]));
             self.numbers.dedup();
+            let normal = outwards(frame, outside.values(facet));
             let at = |k: usize| self.numbers[k];
             for k in 1..self.numbers.len().saturating_sub(1) {
                 // Counter-clockwise seen from the polytope's outside is clockwise seen from the solid's.
                 let triangle = if frame.mirrored { [at(0), at(k), at(k + 1)] } else { [at(0), at(k + 1), at(k)] };
                 if triangle[0] != triangle[1] && triangle[0] != triangle[2] {
                     surface.triangles.push(triangle);
+                    surface.normals.push(normal);
                 }
             }
         }
@@ -800,6 +864,13 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     let mut ends = (0..4).filter(|k| (faces | first ^ second) >> k & 1 == 0);
     let [p, q] = [ends.next()?, ends.next()?].map(|k| (k, values[k]));
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
+}
+
+/// The unit vector along which an affine function with these values grows.
+fn outwards(frame: &Frame, values: [i64; 4]) -> [f32; 3] {
+    let slope = Affine::new(&frame.positions, values.map(|value| value as f64)).slope;
+    let length = dot(&slope, &slope).sqrt();
+    slope.map(|part| (part / length) as f32)
 }
 
 /// The places of a cube of cubes.

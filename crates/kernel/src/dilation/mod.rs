@@ -17,6 +17,7 @@
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`. Triangles are then saved within the same bounds (`simplify`).
 
+mod affine;
 mod assemble;
 mod block;
 mod certificate;
@@ -29,9 +30,11 @@ mod outside;
 mod parting;
 mod plan;
 mod sample;
+mod seam;
 mod simplify;
 mod smooth;
 mod stability;
+mod star;
 mod stitch;
 mod surface;
 mod tree;

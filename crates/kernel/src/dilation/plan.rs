@@ -6,6 +6,7 @@ use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Changed, Node, Pass, Task};
 use super::outside::MOST;
+use super::seam;
 use super::smooth::MOST_NOISE;
 use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
@@ -144,11 +145,6 @@ impl Setting {
             tolerance,
             cells,
         }
-    }
-
-    /// The unit q of integer values, in mm^2.
-    pub(super) fn unit(&self) -> f64 {
-        self.inverse_unit.recip()
     }
 
     /// A squared distance less theta as an integer, never 0.
@@ -357,12 +353,11 @@ impl<'a> Plan<'a> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
         let mut grading = Grading::default();
-        let mut made = self.surfaces(&setting, &space, &grading, Task::Whole, budget)?;
+        let made = self.surfaces(&setting, &space, &grading, Task::Whole, budget)?;
         let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
         let (mut refined, mut uncertain) = (0, BTreeSet::new());
-        let mut critical = noted(&mut made, &mut uncertain);
         let mut blocks = Blocks::default();
-        add(&mut blocks, made);
+        let mut critical = add(&setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
         while !critical.is_empty() {
             let (mut finer, mut new) = (grading.clone(), Vec::new());
             critical.iter().for_each(|&cube| finer.subdivide(cube, &mut new));
@@ -372,9 +367,9 @@ impl<'a> Plan<'a> {
             }
             grading = finer;
             let task = Task::Changed(&Changed::new(&new), &blocks);
-            let mut made = self.surfaces(&setting, &space, &grading, task, budget)?;
-            critical = noted(&mut made, &mut uncertain);
-            let total = add(&mut blocks, made);
+            let made = self.surfaces(&setting, &space, &grading, task, budget)?;
+            critical = add(&setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
+            let total = blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
             if total > budget.limits.triangles {
                 return Err(DilationError::Triangles { tolerance_mm: self.aimed, made: total, allowed: budget.limits.triangles });
             }
@@ -418,7 +413,7 @@ impl<'a> Plan<'a> {
             site_error = site_error.max(surface.site_error);
             leaves += surface.leaves;
             // They are of no use any more.
-            (surface.names, surface.pieces) = (Vec::new(), Vec::new());
+            (surface.names, surface.pieces, surface.normals, surface.seams) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         }
         let solids: Vec<u32> = (0..self.rule.attractor().solids().len() as u32).collect();
         let assembly = Assembly { pass: &pass, blocks: &blocks, idle: Mutex::new(Vec::new()) };
@@ -489,16 +484,26 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Adds surfaces to those of blocks, in the place of what was there; returns how many triangles there are.
-fn add(blocks: &mut Blocks, made: Vec<BlockSurface>) -> u64 {
-    blocks.extend(made.into_iter().map(|surface| (surface.first_cube.map(|x| x / block::SIDE as i64), Mutex::new(surface))));
-    blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum()
-}
-
-/// What blocks have noted: the cubes to subdivide, and those where no level tells it, which are added to `uncertain`.
-fn noted(made: &mut [BlockSurface], uncertain: &mut BTreeSet<Cube>) -> BTreeSet<Cube> {
+/// Adds surfaces to those of blocks, in the place of what was there; returns the cubes to subdivide, and adds those where no level tells it to `uncertain`.
+fn add(
+    setting: &Setting,
+    grading: &Grading,
+    blocks: &mut Blocks,
+    mut made: Vec<BlockSurface>,
+    uncertain: &mut BTreeSet<Cube>,
+    budget: &Budget,
+) -> Result<BTreeSet<Cube>, DilationError> {
     uncertain.extend(made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.uncertain)));
-    made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect()
+    let mut critical: BTreeSet<Cube> = made.iter_mut().flat_map(|surface| std::mem::take(&mut surface.critical)).collect();
+    let place = |surface: &BlockSurface| surface.first_cube.map(|x| x / block::SIDE as i64);
+    let places: BTreeSet<[i64; 3]> = made.iter().map(place).collect();
+    blocks.extend(made.into_iter().map(|surface| (place(&surface), Mutex::new(surface))));
+    if !setting.dense {
+        let [own, open] = seam::noted(setting, grading, blocks, &places, budget)?;
+        critical.extend(own);
+        uncertain.extend(open);
+    }
+    Ok(critical)
 }
 
 #[cfg(test)]

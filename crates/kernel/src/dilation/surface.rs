@@ -3,6 +3,7 @@
 
 use super::lattice::Cube;
 use super::octree::Changed;
+use super::tree::Weighted;
 use crate::attractor::cell::Point;
 use crate::attractor::sites::SiteError;
 use crate::split_mix::mix;
@@ -19,6 +20,8 @@ pub(super) struct BlockSurface {
     pub(super) vertices: Vec<Point>,
     /// Corners.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The triangles' unit normals, which say the facet exactly where a triangle is a sliver; empty among dense sites, and with `names`.
+    pub(super) normals: Vec<[f32; 3]>,
     /// Whether a vertex was tried by the simplification with all of its star; empty before.
     pub(super) settled: Vec<bool>,
     /// Names of vertices that other blocks may have too.
@@ -33,8 +36,17 @@ pub(super) struct BlockSurface {
     pub(super) site_error: SiteError,
     /// Cubes to subdivide: the distance may have a critical point on the wrong side there, or, among dense sites, what would be filled is not near a site.
     pub(super) critical: Vec<Cube>,
+    /// Vertices whose triangles here do not follow the distance by themselves: those of other blocks have to be known, too.
+    pub(super) seams: Vec<Seam>,
     /// Places where no level tells it.
     pub(super) uncertain: Vec<Cube>,
+}
+
+/// A vertex that several blocks may have, and the sites near its star in all of them.
+#[derive(Debug)]
+pub(super) struct Seam {
+    pub(super) name: VertexName,
+    pub(super) sites: Vec<Weighted>,
 }
 
 /// Surfaces by the index of the block.
@@ -45,6 +57,8 @@ impl BlockSurface {
     pub(super) fn shrink(&mut self) {
         self.vertices.shrink_to_fit();
         self.triangles.shrink_to_fit();
+        self.normals.shrink_to_fit();
+        self.seams.shrink_to_fit();
         self.shared.shrink_to_fit();
         self.names.shrink_to_fit();
         self.pieces.shrink_to_fit();
@@ -53,6 +67,7 @@ impl BlockSurface {
     /// Drops the triangles of leaves whose tetrahedra are others now.
     pub(super) fn drop_changed(&mut self, changed: &Changed) {
         let mut kept = Vec::with_capacity(self.triangles.len());
+        let mut normals = Vec::with_capacity(self.normals.len());
         let mut pieces = Vec::with_capacity(self.pieces.len());
         let mut ends = self.pieces.iter().skip(1).map(|&(_, first)| first as usize).chain([self.triangles.len()]);
         for &(leaf, first) in &self.pieces {
@@ -60,9 +75,10 @@ impl BlockSurface {
             if !changed.is_new(leaf) {
                 pieces.push((leaf, kept.len() as u32));
                 kept.extend_from_slice(&self.triangles[first as usize..end]);
+                normals.extend_from_slice(self.normals.get(first as usize..end).unwrap_or_default());
             }
         }
-        (self.triangles, self.pieces) = (kept, pieces);
+        (self.triangles, self.normals, self.pieces) = (kept, normals, pieces);
         self.drop_unused();
     }
 
