@@ -131,6 +131,7 @@ pub(super) struct Workshop<'a> {
     seed: Option<NodeId>,
     outside: Outside,
     found: Vec<SiteId>,
+    seen: Vec<(SiteId, Point, f64)>,
     nearby: Vec<Nearby>,
     polygon: Vec<u16>,
     corners: Vec<u32>,
@@ -174,6 +175,7 @@ impl<'a> Workshop<'a> {
             seed: None,
             outside: Outside::default(),
             found: Vec::new(),
+            seen: Vec::new(),
             nearby: Vec::new(),
             polygon: Vec::new(),
             corners: Vec::new(),
@@ -356,18 +358,27 @@ impl<'a> Workshop<'a> {
             }
             let centre = star.centre;
             let reach = setting.outer + star.radius();
-            let mut found = std::mem::take(&mut self.found);
-            found.clear();
-            self.tree.collect(&centre, &self.near, reach, &mut found);
-            star.sites.extend(found.iter().map(|&id| self.tree.site(id)));
-            self.found = found;
-            let direction = star.outwards(setting);
+            self.seen.clear();
+            self.tree.visit_near(&centre, &self.near, reach, |id, closest, square| self.seen.push((id, *closest, square)));
+            self.seen.iter().for_each(|(id, closest, square)| star.see(self.tree.site(*id), closest, *square));
+            let is_shared = self.stars.shared[vertex as usize];
+            let direction = star.outwards(setting, !is_shared);
             if star.follows(setting, &direction) {
                 continue;
             }
-            if self.stars.shared[vertex as usize] {
-                let name = surface.names[vertex as usize];
-                surface.seams.push(Seam { name, sites: std::mem::take(&mut star.sites) });
+            if is_shared {
+                // Triangles of other blocks reach no farther than a tetrahedron.
+                let reach = setting.outer + setting.lattice.pitch;
+                let (tree, numbers, sites) = (&mut self.tree, &mut self.stars.numbers, &mut surface.seam_sites);
+                self.found.clear();
+                tree.collect(&centre, &self.near, reach, &mut self.found);
+                let number = |&id: &SiteId| {
+                    *numbers.entry(id).or_insert_with(|| {
+                        sites.push(tree.site(id));
+                        sites.len() as u32 - 1
+                    })
+                };
+                surface.seams.push(Seam { name: surface.names[vertex as usize], sites: self.found.iter().map(number).collect() });
             } else if !star.grows(setting) {
                 note(setting, grading, &centre, &mut surface.critical, &mut surface.uncertain);
             }

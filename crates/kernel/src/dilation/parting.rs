@@ -110,12 +110,12 @@ impl Simplex {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::split_mix;
 
     /// The distance of the origin from the hull of points: from the nearest of their triangles, unless it is in one of their tetrahedra.
-    fn distance_from_hull(points: &[Point]) -> f64 {
+    pub(in crate::dilation) fn distance_from_hull(points: &[Point]) -> f64 {
         let count = points.len();
         let mut least = f64::INFINITY;
         for i in 0..count {

@@ -104,7 +104,7 @@ const BYTES_PER_CELL: u64 = 400;
 const BYTES_PER_TRIANGLE: f64 = 120.0;
 
 impl Setting {
-    fn new(radius: f64, outer: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
+    pub(super) fn new(radius: f64, outer: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
         let extent = extent(bounds, radius + 2.0 * pitch);
         let margin = radius + 2.5 * pitch;
         // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
@@ -413,7 +413,7 @@ impl<'a> Plan<'a> {
             site_error = site_error.max(surface.site_error);
             leaves += surface.leaves;
             // They are of no use any more.
-            (surface.names, surface.pieces, surface.normals, surface.seams) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+            surface.drop_lattice();
         }
         let solids: Vec<u32> = (0..self.rule.attractor().solids().len() as u32).collect();
         let assembly = Assembly { pass: &pass, blocks: &blocks, idle: Mutex::new(Vec::new()) };

@@ -56,7 +56,9 @@ pub(super) fn noted(
     let look = |own: &[([i64; 3], &Seam)]| -> Result<[Vec<Cube>; 2], Stopped> {
         budget.cancel.check()?;
         let (mut star, mut critical, mut uncertain) = (Star::default(), Vec::new(), Vec::new());
-        let near: Vec<&Part<'_>> = own.first().map_or(Vec::new(), |&(block, _)| around(block).filter_map(|near| parts.get(&near)).collect());
+        let Some(&(block, _)) = own.first() else { return Ok([critical, uncertain]) };
+        let near: Vec<&Part<'_>> = around(block).filter_map(|near| parts.get(&near)).collect();
+        let sites = surfaces.get(&block).map_or(&[][..], |surface| &surface.seam_sites);
         for &(_, seam) in own {
             let mut is_begun = false;
             for part in &near {
@@ -64,7 +66,7 @@ pub(super) fn noted(
                 let Part { surface, incident } = part;
                 if !is_begun {
                     star.reset(surface.vertices[vertex as usize]);
-                    star.sites.extend_from_slice(&seam.sites);
+                    star.sites.extend(seam.sites.iter().map(|&site| sites[site as usize]));
                     is_begun = true;
                 }
                 for &triangle in incident.of(vertex) {

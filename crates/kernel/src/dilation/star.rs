@@ -8,12 +8,13 @@
 
 use super::critical::add_closest;
 use super::lattice::{Cube, Grading, LEVELS};
-use super::parting::{avoids_origin, parting};
+use super::parting::{avoids_origin, farthest, parting};
 use super::plan::Setting;
 use super::surface::{BlockSurface, VertexName};
-use super::tree::Weighted;
+use super::tree::{SiteId, Weighted};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_feature;
+use std::collections::BTreeMap;
 
 /// Simplices that the search around a vertex may look at.
 const MOST_WORK: usize = 400;
@@ -28,8 +29,12 @@ pub(super) struct Star {
     corners: Vec<Point>,
     /// The triangles' other corners, as indices of `corners`, and their normals, as long as the radius.
     triangles: Vec<([usize; 2], Point)>,
+    /// A bound of the triangles' R^2.
+    bulge: f64,
     /// The sites that may be nearest to points of the star, and others.
     pub(super) sites: Vec<Weighted>,
+    /// Where they are seen from the centre: from their closest points, and at which squared distances.
+    views: Vec<(Point, f64)>,
     scratch: Scratch,
 }
 
@@ -54,7 +59,15 @@ impl Star {
         self.corners.clear();
         self.corners.push(centre);
         self.triangles.clear();
+        self.bulge = 0.0;
         self.sites.clear();
+        self.views.clear();
+    }
+
+    /// Adds a site, with its closest point to the centre and that one's squared distance.
+    pub(super) fn see(&mut self, site: Weighted, closest: &Point, square: f64) {
+        self.sites.push(site);
+        self.views.push((subtract(&self.centre, closest), square));
     }
 
     /// Adds a triangle with the centre as a corner.
@@ -68,6 +81,7 @@ impl Star {
                 self.corners.len() - 1
             });
         }
+        self.bulge = self.bulge.max(bulge(&[centre, self.corners[others[0]], self.corners[others[1]]]));
         self.triangles.push((others, normal));
     }
 
@@ -76,37 +90,34 @@ impl Star {
         self.corners.iter().map(|corner| distance_squared(corner, &self.centre)).fold(0.0, f64::max).sqrt()
     }
 
-    /// A direction along which the distance grows at the centre, from what is known there alone, whatever triangles are given: the same in all blocks.
-    pub(super) fn outwards(&mut self, setting: &Setting) -> Point {
+    /// A direction along which the distance grows at the centre. Without the triangles' normals it does not depend on what triangles are given, and is the same in all blocks.
+    pub(super) fn outwards(&mut self, setting: &Setting, with_normals: bool) -> Point {
         let most = setting.outer * setting.outer;
         let vectors = &mut self.scratch.vectors;
         vectors.clear();
-        let mut nearest = (f64::INFINITY, [0.0; 3]);
-        for site in &self.sites {
-            let square = site.distance_squared(&self.centre);
-            let away = subtract(&self.centre, &site.closest(&self.centre));
-            if square <= most {
-                vectors.push(away);
-            }
-            if square < nearest.0 {
-                nearest = (square, away);
-            }
+        vectors.extend(self.views.iter().filter(|(_, square)| *square <= most).map(|(away, _)| *away));
+        if with_normals {
+            vectors.extend(self.triangles.iter().map(|(_, normal)| *normal));
         }
+        let nearest = self.views.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or([0.0; 3], |(away, _)| *away);
         let lowest = |direction: &Point| {
             let lowest = vectors.iter().min_by(|a, b| dot(a, direction).total_cmp(&dot(b, direction)));
-            lowest.copied().unwrap_or(nearest.1)
+            lowest.copied().unwrap_or(nearest)
         };
-        parting(nearest.1, 0.0, lowest, |direction, lowest| dot(direction, lowest) > 0.9 * dot(direction, direction)).unwrap_or(nearest.1)
+        parting(nearest, 0.0, lowest, |direction, lowest| dot(direction, lowest) > 0.9 * dot(direction, direction)).unwrap_or(nearest)
     }
 
     /// Whether a direction serves all points of the star.
     pub(super) fn follows(&mut self, setting: &Setting, direction: &Point) -> bool {
-        let least = LEAST * setting.reach * dot(direction, direction).sqrt();
+        let length = dot(direction, direction).sqrt();
+        let least = LEAST * setting.reach * length;
+        // y less its closest point in a convex set moves no farther than y does.
+        let enough = least + self.radius() * length;
         if self.triangles.iter().any(|(_, normal)| dot(normal, direction) <= least) {
             return false;
         }
-        let Self { corners, sites, scratch, .. } = self;
-        for index in 0..sites.len() {
+        let Self { corners, sites, views, scratch, bulge, .. } = self;
+        for index in (0..sites.len()).filter(|&index| dot(&views[index].0, direction) <= enough) {
             scratch.own.clear();
             let is_affine = closest_to(&sites[index].site, corners, &mut scratch.own);
             let along = |point: &Point| dot(point, direction);
@@ -116,7 +127,7 @@ impl Star {
                 let lowest = corners.iter().map(along).fold(f64::INFINITY, f64::min);
                 lowest - scratch.own.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
             };
-            if lowest <= least && scratch.may_be_nearest(sites, index, corners) {
+            if lowest <= least && scratch.may_be_nearest(sites, index, corners, *bulge) {
                 return false;
             }
         }
@@ -125,24 +136,29 @@ impl Star {
 
     /// Whether there are directions for all points of the star, one or several.
     pub(super) fn grows(&mut self, setting: &Setting) -> bool {
-        let Self { corners, triangles, sites, scratch, centre } = self;
+        let Self { corners, triangles, sites, scratch, centre, bulge, .. } = self;
+        scratch.narrow(sites, corners, *bulge);
         let normals: Vec<Point> = triangles.iter().map(|(_, normal)| *normal).collect();
         let least = LEAST * setting.reach;
-        // A point is nearer to the centre than the farthest corner: the square of that bounds R^2 of all triangles.
         if scratch.avoid_origin(sites, corners, &normals, least) {
             return true;
         }
-        if !scratch.avoid_origin(sites, &[*centre], &normals, least) {
-            return false;
-        }
         let mut work = MOST_WORK;
-        (1..corners.len()).all(|end| {
-            let own: Vec<Point> = triangles.iter().filter(|(others, _)| others.contains(&end)).map(|(_, normal)| *normal).collect();
-            scratch.settle(sites, &[*centre, corners[end]], &own, least, &mut work)
-        }) && triangles
-            .iter()
-            .all(|(others, normal)| scratch.settle(sites, &[*centre, corners[others[0]], corners[others[1]]], &[*normal], least, &mut work))
+        scratch.settle(sites, &[*centre], &normals, least, &mut work)
+            && (1..corners.len()).all(|end| {
+                let own: Vec<Point> = triangles.iter().filter(|(others, _)| others.contains(&end)).map(|(_, normal)| *normal).collect();
+                scratch.settle(sites, &[*centre, corners[end]], &own, least, &mut work)
+            })
+            && triangles.iter().all(|([p, q], normal)| {
+                scratch.settle(sites, &[*centre, corners[*p], corners[*q]], &[*normal], least, &mut work)
+            })
     }
+}
+
+/// A bound of R^2 for a simplex of up to three corners: the smallest ball around a triangle has at most a third of the longest side's square.
+fn bulge(corners: &[Point]) -> f64 {
+    let sides = (0..corners.len()).map(|k| distance_squared(&corners[k], &corners[(k + 1) % corners.len()]));
+    sides.fold(0.0, f64::max) / 3.0
 }
 
 /// The triangles around vertices.
@@ -189,6 +205,8 @@ pub(super) struct Stars {
     /// Whether a vertex may have triangles in other blocks.
     pub(super) shared: Vec<bool>,
     wanted: Vec<bool>,
+    /// Where sites are among those of the seams.
+    pub(super) numbers: BTreeMap<SiteId, u32>,
     /// The vertices to be looked at, by their place in the block.
     pub(super) listed: Vec<(u32, u32)>,
 }
@@ -197,6 +215,7 @@ impl Stars {
     /// Lists the vertices of triangles from `first` on, ordered by their place.
     pub(super) fn list(&mut self, surface: &mut BlockSurface, first: usize, place: impl Fn(&Point) -> u32) {
         let count = surface.vertices.len();
+        self.numbers.clear();
         self.wanted.clear();
         self.wanted.resize(count, false);
         surface.triangles[first..].iter().flatten().for_each(|&corner| self.wanted[corner as usize] = true);
@@ -231,11 +250,11 @@ pub(super) fn note(setting: &Setting, grading: &Grading, place: &Point, critical
 impl Scratch {
     /// Whether there are directions for all points of a simplex, which is halved until there is one for each part.
     fn settle(&mut self, sites: &[Weighted], corners: &[Point], normals: &[Point], least: f64, work: &mut usize) -> bool {
-        if *work == 0 {
-            return false;
-        }
-        *work -= 1;
-        if self.avoid_origin(sites, corners, normals, least) {
+        let Some(left) = work.checked_sub(1) else { return false };
+        *work = left;
+        let bulge = bulge(corners);
+        let near: Vec<Weighted> = (0..sites.len()).filter(|&index| self.may_be_nearest(sites, index, corners, bulge)).map(|index| sites[index]).collect();
+        if self.avoid_origin(&near, corners, normals, least) {
             return true;
         }
         let sides = (0..corners.len()).flat_map(|p| (0..p).map(move |q| (p, q)));
@@ -246,23 +265,20 @@ impl Scratch {
             let mut half = [[0.0; 3]; 3];
             half[..corners.len()].copy_from_slice(corners);
             half[replaced] = middle;
-            self.settle(sites, &half[..corners.len()], normals, least, work)
+            self.settle(&near, &half[..corners.len()], normals, least, work)
         })
     }
 
-    /// Whether one direction serves all points in the hull of some corners: those of a simplex, or of a star, which is in the ball around the first that holds all.
+    /// Whether one direction serves all points in the hull of some corners.
     fn avoid_origin(&mut self, sites: &[Weighted], corners: &[Point], normals: &[Point], least: f64) -> bool {
         self.vectors.clear();
         self.vectors.extend_from_slice(normals);
         self.closest.clear();
         self.groups.clear();
         let mut start = None;
-        for index in 0..sites.len() {
-            if !self.may_be_nearest(sites, index, corners) {
-                continue;
-            }
+        for site in sites {
             self.own.clear();
-            if closest_to(&sites[index].site, corners, &mut self.own) {
+            if closest_to(&site.site, corners, &mut self.own) {
                 self.vectors.extend(corners.iter().zip(&self.own).map(|(corner, closest)| subtract(corner, closest)));
             } else {
                 self.groups.push(self.closest.len());
@@ -271,30 +287,33 @@ impl Scratch {
             start = start.or(Some(subtract(&corners[0], &self.own[0])));
         }
         let Some(start) = start else { return true };
-        let lowest = |direction: &Point, _: &Point| {
-            let along = |point: &Point| dot(point, direction);
-            let best = |points: &[Point]| points.iter().copied().min_by(|a, b| along(a).total_cmp(&along(b)));
+        let lowest = |direction: &Point, backwards: &Point| {
             let ends = self.groups.iter().skip(1).copied().chain([self.closest.len()]);
-            let loose = self.groups.iter().zip(ends).filter_map(|(&first, end)| {
-                let own = &self.closest[first..end];
-                let farthest = own.iter().max_by(|a, b| along(a).total_cmp(&along(b)))?;
-                Some(subtract(&best(corners)?, farthest))
-            });
-            loose.min_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or(start)
+            let farthest_ones = self.groups.iter().zip(ends).filter_map(|(&first, end)| farthest(&self.closest[first..end], direction));
+            // One lowest corner does for all groups.
+            let farthest_one = farthest_ones.max_by(|a, b| dot(a, direction).total_cmp(&dot(b, direction)));
+            farthest_one.zip(farthest(corners, backwards)).map_or(start, |(closest, corner)| subtract(corner, closest))
         };
         avoids_origin(start, lowest, &self.vectors, least)
     }
 
-    /// Whether a site may be the nearest to a point in the hull of corners: no other is nearer by R^2 at all of them.
-    fn may_be_nearest(&mut self, sites: &[Weighted], index: usize, corners: &[Point]) -> bool {
-        // The smallest ball around a triangle, or a segment, has at most a third of the longest side's square; one around all corners of a star is centred at the first.
-        let square = match corners.len() {
-            1 => 0.0,
-            2 | 3 => (0..corners.len()).map(|k| distance_squared(&corners[k], &corners[(k + 1) % corners.len()])).fold(0.0, f64::max) / 3.0,
-            _ => corners.iter().map(|corner| distance_squared(corner, &corners[0])).fold(0.0, f64::max),
+    /// Keeps the sites that may be nearest to a point of simplices with these corners, R^2 of which is at most `bulge`.
+    fn narrow(&mut self, sites: &mut Vec<Weighted>, corners: &[Point], bulge: f64) {
+        let ends = |site: &Weighted| {
+            let squares = corners.iter().map(|corner| site.distance_squared(corner));
+            squares.fold((f64::INFINITY, 0.0_f64), |(low, high), square| (low.min(square), high.max(square)))
         };
+        let most = sites.iter().map(|site| ends(site).1).fold(f64::INFINITY, f64::min);
+        sites.retain(|site| ends(site).0 * (1.0 - 1e-12) <= most + bulge);
+        let near: Vec<bool> = (0..sites.len()).map(|index| self.may_be_nearest(sites, index, corners, bulge)).collect();
+        let mut near = near.into_iter();
+        sites.retain(|_| near.next() == Some(true));
+    }
+
+    /// Whether a site may be the nearest to a point of simplices with these corners, R^2 of which is at most `bulge`: no other is nearer by that at all of them.
+    fn may_be_nearest(&mut self, sites: &[Weighted], index: usize, corners: &[Point], bulge: f64) -> bool {
         self.squares.clear();
-        self.squares.extend(corners.iter().map(|corner| sites[index].distance_squared(corner) * (1.0 - 1e-12) - square));
+        self.squares.extend(corners.iter().map(|corner| sites[index].distance_squared(corner) * (1.0 - 1e-12) - bulge));
         let is_nearer = |other: &Weighted| corners.iter().zip(&self.squares).all(|(corner, square)| other.distance_squared(corner) < *square);
         !sites.iter().any(is_nearer)
     }
@@ -331,5 +350,175 @@ fn closest_to(site: &Site, corners: &[Point], closest: &mut Vec<Point>) -> bool 
             }
             is_affine
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attractor::cell::cross;
+    use crate::dilation::parting::tests::distance_from_hull;
+    use crate::measure::Interval;
+    use crate::measure::bounds::AxisBox;
+    use crate::split_mix::Random;
+
+    fn number(random: &mut Random) -> f64 {
+        (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn point(random: &mut Random, scale: f64) -> Point {
+        std::array::from_fn(|_| scale * number(random))
+    }
+
+    fn site(random: &mut Random, scale: f64) -> Site {
+        let at = point(random, scale);
+        let beside = |random: &mut Random| {
+            let offset = point(random, 0.7);
+            std::array::from_fn(|axis| at[axis] + offset[axis])
+        };
+        match random.next() % 3 {
+            0 => Site::Point(at),
+            1 => Site::Segment([at, beside(random)]),
+            _ => Site::Triangle([at, beside(random), beside(random)]),
+        }
+    }
+
+    /// A point in the hull of some corners, often on its border.
+    fn mean(random: &mut Random, corners: &[Point]) -> Point {
+        let shares: Vec<f64> = corners.iter().map(|_| number(random).max(0.0)).collect();
+        let total: f64 = shares.iter().sum();
+        if total == 0.0 {
+            return corners[0];
+        }
+        std::array::from_fn(|axis| corners.iter().zip(&shares).map(|(corner, share)| corner[axis] * share / total).sum())
+    }
+
+    fn weighted(random: &mut Random, scale: f64) -> Weighted {
+        Weighted { site: site(random, scale), deficit: 0.2 * number(random).max(0.0) }
+    }
+
+    #[test]
+    fn closest_points_are_affine_or_in_the_hull_that_is_given() {
+        let mut random = Random(3);
+        let mut affine = 0;
+        for _ in 0..4_000 {
+            let corners: Vec<Point> = (0..1 + random.next() % 7).map(|_| point(&mut random, 0.5)).collect();
+            let site = site(&mut random, 1.0);
+            let mut closest = Vec::new();
+            let is_affine = closest_to(&site, &corners, &mut closest);
+            affine += usize::from(is_affine);
+            for _ in 0..8 {
+                let y = mean(&mut random, &corners);
+                let direction = point(&mut random, 1.0);
+                let c = site.closest(&y);
+                let along = |points: &[Point]| points.iter().map(|point| dot(point, &direction)).fold(f64::INFINITY, f64::min);
+                let lowest = if is_affine {
+                    let away: Vec<Point> = corners.iter().zip(&closest).map(|(corner, closest)| subtract(corner, closest)).collect();
+                    assert!(along(&[subtract(&y, &c)]) >= along(&away) - 1e-12);
+                    continue;
+                } else {
+                    along(&closest)
+                };
+                assert!(dot(&c, &direction) >= lowest - 1e-12, "{site:?} {corners:?} {y:?}");
+            }
+        }
+        assert!(affine > 800 && affine < 3_900, "{affine}");
+    }
+
+    #[test]
+    fn the_nearest_site_is_never_left_out() {
+        let mut random = Random(5);
+        let (mut out, mut all) = (0, 0);
+        for _ in 0..3_000 {
+            let corners: Vec<Point> = (0..1 + random.next() % 3).map(|_| point(&mut random, 0.4)).collect();
+            let sites: Vec<Weighted> = (0..6).map(|_| weighted(&mut random, 1.5)).collect();
+            let mut near = sites.clone();
+            let mut scratch = Scratch::default();
+            scratch.narrow(&mut near, &corners, bulge(&corners));
+            (out, all) = (out + sites.len() - near.len(), all + sites.len());
+            for _ in 0..8 {
+                let y = mean(&mut random, &corners);
+                let least = |sites: &[Weighted]| sites.iter().map(|site| site.distance_squared(&y)).fold(f64::INFINITY, f64::min);
+                assert!(least(&near) <= least(&sites));
+            }
+        }
+        assert!(3 * out > all, "{out} of {all}");
+    }
+
+    /// Fans around the origin, with sites below them that compete, against the hull of normals and gradients at places on them.
+    #[test]
+    fn where_stars_are_said_to_grow_the_origin_is_in_no_hull() {
+        let mut random = Random(9);
+        let exactly = |x: f64| [Interval { low: x, high: x }; 3];
+        let bounds = AxisBox { low: exactly(-2.0), high: exactly(2.0) };
+        let setting = Setting::new(1.0, 1.1, 0.1, 0.6, 1_000, &bounds);
+        let (mut grown, mut refused, mut by_one) = (0, 0, 0);
+        for _ in 0..3_000 {
+            let count = 3 + (random.next() % 4) as usize;
+            let steep = 1.2 * number(&mut random).abs();
+            let ring: Vec<Point> = (0..count)
+                .map(|k| {
+                    let (sine, cosine) = (std::f64::consts::TAU * k as f64 / count as f64).sin_cos();
+                    let long = 0.35 + 0.15 * number(&mut random);
+                    [long * cosine, long * sine, steep * number(&mut random)]
+                })
+                .collect();
+            let mut star = Star::default();
+            star.reset([0.0; 3]);
+            let triangles: Vec<([Point; 3], Point)> = (0..count)
+                .map(|k| {
+                    let triangle = [[0.0; 3], ring[k], ring[(k + 1) % count]];
+                    let normal = cross(&triangle[1], &triangle[2]);
+                    let length = dot(&normal, &normal).sqrt();
+                    (triangle, normal.map(|part| part / length))
+                })
+                .collect();
+            for (triangle, normal) in &triangles {
+                star.add(&setting, *triangle, normal.map(|part| part as f32));
+            }
+            let mut sites = Vec::new();
+            for _ in 0..1 + random.next() % 4 {
+                let mut below = point(&mut random, 0.9);
+                below[2] = -0.4 + 0.6 * number(&mut random);
+                let end = point(&mut random, 0.5);
+                let site = if random.next() % 2 == 0 {
+                    Site::Point(below)
+                } else {
+                    Site::Segment([below, std::array::from_fn(|axis| below[axis] + end[axis])])
+                };
+                sites.push(Weighted { site, deficit: 0.0 });
+            }
+            for site in &sites {
+                let closest = site.closest(&[0.0; 3]);
+                star.see(*site, &closest, site.distance_squared(&[0.0; 3]));
+            }
+            let direction = star.outwards(&setting, random.next() % 2 == 0);
+            let by_direction = star.follows(&setting, &direction);
+            if !by_direction && !star.grows(&setting) {
+                refused += 1;
+                continue;
+            }
+            by_one += usize::from(by_direction);
+            grown += 1;
+            let gradients = |y: &Point| -> Vec<Point> {
+                let least = sites.iter().map(|site| site.distance_squared(y)).fold(f64::INFINITY, f64::min);
+                sites.iter().filter(|site| site.distance_squared(y) <= least + 1e-12).map(|site| subtract(y, &site.closest(y))).collect()
+            };
+            for (k, (triangle, normal)) in triangles.iter().enumerate() {
+                let at = |shares: [f64; 2]| -> Point { std::array::from_fn(|axis| shares[0] * triangle[1][axis] + shares[1] * triangle[2][axis]) };
+                for _ in 0..4 {
+                    let share = number(&mut random).abs();
+                    let inside = at([share, (1.0 - share) * number(&mut random).abs()]);
+                    let hull = [gradients(&inside), vec![*normal]].concat();
+                    assert!(distance_from_hull(&hull) > 0.0, "{triangle:?} {inside:?}");
+                    let on_edge = at([share, 0.0]);
+                    let hull = [gradients(&on_edge), vec![*normal, triangles[(k + count - 1) % count].1]].concat();
+                    assert!(distance_from_hull(&hull) > 0.0, "{triangle:?} {on_edge:?}");
+                }
+            }
+            let hull = [gradients(&[0.0; 3]), triangles.iter().map(|(_, normal)| *normal).collect()].concat();
+            assert!(distance_from_hull(&hull) > 0.0, "{ring:?}");
+        }
+        assert!(grown > 600 && refused > 100 && by_one < grown, "{grown} {refused} {by_one}");
     }
 }

@@ -38,15 +38,17 @@ pub(super) struct BlockSurface {
     pub(super) critical: Vec<Cube>,
     /// Vertices whose triangles here do not follow the distance by themselves: those of other blocks have to be known, too.
     pub(super) seams: Vec<Seam>,
+    /// The sites near them.
+    pub(super) seam_sites: Vec<Weighted>,
     /// Places where no level tells it.
     pub(super) uncertain: Vec<Cube>,
 }
 
-/// A vertex that several blocks may have, and the sites near its star in all of them.
+/// A vertex that several blocks may have, and the sites near its star in all of them, as indices of the block's.
 #[derive(Debug)]
 pub(super) struct Seam {
     pub(super) name: VertexName,
-    pub(super) sites: Vec<Weighted>,
+    pub(super) sites: Box<[u32]>,
 }
 
 /// Surfaces by the index of the block.
@@ -59,9 +61,16 @@ impl BlockSurface {
         self.triangles.shrink_to_fit();
         self.normals.shrink_to_fit();
         self.seams.shrink_to_fit();
+        self.seam_sites.shrink_to_fit();
         self.shared.shrink_to_fit();
         self.names.shrink_to_fit();
         self.pieces.shrink_to_fit();
+    }
+
+    /// Drops what only a lattice that is refined further needs.
+    pub(super) fn drop_lattice(&mut self) {
+        (self.names, self.pieces, self.normals) = (Vec::new(), Vec::new(), Vec::new());
+        (self.seams, self.seam_sites) = (Vec::new(), Vec::new());
     }
 
     /// Drops the triangles of leaves whose tetrahedra are others now.
