@@ -8,7 +8,7 @@ use lacuna_tests::support::root;
 use serde_json::Value;
 
 /// Names that documents may rely on: they keep their meaning.
-const CERTIFICATE: [&str; 28] = [
+const CERTIFICATE: [&str; 29] = [
     "requested_tolerance_mm",
     "achieved_bound_mm",
     "inner_bound_mm",
@@ -30,6 +30,7 @@ const CERTIFICATE: [&str; 28] = [
     "degenerate_triangles",
     "self_intersections",
     "topology_stable",
+    "topology_exact",
     "bbox_mm",
     "volume_mm3",
     "area_mm2",

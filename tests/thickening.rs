@@ -406,3 +406,35 @@ fn radii_that_make_no_sense_are_named() {
     assert_eq!(refused(cube(1.0), PartRadius::AtPoints(vec![1.0; 8])).0, "radius.solid");
     assert_eq!(refused(grouped(vec![with_radii(rod(), PartRadius::Constant(1.0))]), PartRadius::AtPoints(vec![1.0])).0, "radius.no-points");
 }
+
+/// Balls around the corners of a unit cube join along its edges at r = 1/2, close its faces at sqrt(2) / 2 and its inside at sqrt(3) / 2; wires along its edges close faces at 1/2 and the inside at sqrt(2) / 2.
+/// Beside each of these radii, within a fraction of the tolerance, the topology is the exact one, and proven.
+#[test]
+fn the_topology_is_exact_beside_critical_radii() {
+    let corner = |code: u32| DVec3::from_array(std::array::from_fn(|axis| f64::from(code >> axis as u32 & 1)));
+    // An angle that no axis of the lattice has.
+    let turned = |x: DVec3| glam::DQuat::from_scaled_axis(DVec3::new(0.3, 0.7, 0.2)) * x;
+    let vertices: Vec<DVec3> = (0..8).map(corner).map(turned).collect();
+    let of = |faces: Vec<Vec<u32>>| Shape::Mesh(PolygonMesh { vertices: vertices.clone(), faces, interior: Interior::Auto });
+    let corners = || of((0..8).map(|code| vec![code]).collect());
+    let edges =
+        || of((0..8).flat_map(|p: u32| [1, 2, 4].into_iter().filter(move |bit| p & bit == 0).map(move |bit| vec![p, p | bit])).collect());
+    // Components, handles and voids.
+    let found = |shape: Shape, radius: f64| {
+        let (_, certificate) = solid(shape, dilated(radius, 0.1 * radius));
+        assert_eq!(serde_json::to_value(&certificate).unwrap()["topology_exact"], true, "{radius}: {:?}", certificate.warnings);
+        (certificate.components.unwrap(), certificate.genus.unwrap(), certificate.cavities.unwrap())
+    };
+    let near = 0.003;
+    let [half, face, inside] = [0.5, 0.5_f64.sqrt(), 0.75_f64.sqrt()];
+    assert_eq!(found(corners(), half - near), (8, 0, 0));
+    assert_eq!(found(corners(), half + near), (1, 5, 0));
+    assert_eq!(found(corners(), face - near), (1, 5, 0));
+    assert_eq!(found(corners(), face + near), (1, 0, 1));
+    assert_eq!(found(corners(), inside - near), (1, 0, 1));
+    assert_eq!(found(corners(), inside + near), (1, 0, 0));
+    assert_eq!(found(edges(), half - near), (1, 5, 0));
+    assert_eq!(found(edges(), half + near), (1, 0, 1));
+    assert_eq!(found(edges(), face - near), (1, 0, 1));
+    assert_eq!(found(edges(), face + near), (1, 0, 0));
+}

@@ -210,6 +210,7 @@ export interface Certificate {
   stability?: StabilityStatement | null;
   thickness?: ThicknessStatement | null;
   /** Every point of D(r - inner) lies in a ball of this diameter inside the solid. */ thickness_min_mm?: number | null;
+  topology_exact?: "not_checked" | boolean;
   topology_stable: "not_checked" | boolean;
   /** Triangles of the result. */ triangles: number;
   /** Vertices of the result. */ vertices: number;

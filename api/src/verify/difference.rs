@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::report::{Row, aligned};
 
 /// Members that have one true value: counts and verdicts.
-const EXACT: [&str; 15] = [
+const EXACT: [&str; 16] = [
     "requested_tolerance_mm",
     "components",
     "shells",
@@ -29,6 +29,7 @@ const EXACT: [&str; 15] = [
     "degenerate_triangles",
     "self_intersections",
     "topology_stable",
+    "topology_exact",
     "closed_manifold",
 ];
 

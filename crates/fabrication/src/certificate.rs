@@ -113,6 +113,9 @@ pub struct Certificate {
     /// `true`, `false` or `"not_checked"`: the same topology at radius r - bound and r + bound.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::flag_schema))]
     pub topology_stable: Checked<bool>,
+    /// `true` or `"not_checked"`: proven that the solid has as many components, handles and voids as the exact dilation.
+    #[cfg_attr(feature = "wire", serde(default), schema(schema_with = wire::flag_schema))]
+    pub topology_exact: Checked<bool>,
     /// What was done to each input that is a mesh before anything else, when the job asks for a repair.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Vec::is_empty", default))]
     pub repair: Vec<RepairStatement>,
@@ -693,6 +696,7 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, tolerance:
         volume_mm3: Some([exact.low, exact.high]),
         area_mm2: Some([exact_area.low, exact_area.high]),
         lattice_pitch_mm: Some(dilation.pitch_mm),
+        topology_exact: if dilation.topology_exact { Checked::Found(true) } else { Checked::NotChecked },
         ..counted
     }
 }

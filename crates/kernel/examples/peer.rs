@@ -89,10 +89,11 @@ fn main() -> Outcome<()> {
     writeln!(
         std::io::stdout(),
         "{{\"wall\": {wall:?}, \"cpu\": {cpu:?}, \"rss_mb\": {}, \"claimed_inner\": {inner}, \"claimed_outer\": {outer}, \"pitch\": {pitch}, \
-         \"claimed_crossings\": {}, \"uncertain\": {}}}",
+         \"claimed_crossings\": {}, \"uncertain\": {}, \"topology_exact\": {}}}",
         peak_memory()?,
         dilation.crossings,
-        dilation.uncertain
+        dilation.uncertain,
+        dilation.topology_exact
     )?;
     Ok(())
 }

@@ -172,6 +172,7 @@ Certificate = TypedDict('Certificate', {
     'stability': 'NotRequired[StabilityStatement | None]',
     'thickness': 'NotRequired[ThicknessStatement | None]',
     'thickness_min_mm': 'NotRequired[float | None]',
+    'topology_exact': "NotRequired[Literal['not_checked'] | bool]",
     'topology_stable': "Literal['not_checked'] | bool",
     'triangles': 'int',
     'vertices': 'int',

@@ -19,6 +19,11 @@ pub(crate) struct SiteError {
 }
 
 impl SiteError {
+    /// Whether the sites are what they stand for.
+    pub(crate) fn is_zero(self) -> bool {
+        self.inner_square == 0.0 && self.inner == 0.0 && self.outer == 0.0
+    }
+
     /// The larger of each.
     pub(crate) fn max(self, other: Self) -> Self {
         Self {

@@ -19,7 +19,7 @@ use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::star::{Stars, note};
-use super::surface::{BlockSurface, Seam, NameMap, UNNAMED, VertexName};
+use super::surface::{BlockSurface, NameMap, Seam, UNNAMED, VertexName};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};

@@ -6,8 +6,8 @@
 //! for the sites (see `block`). theta = r^2, and R^2 = r^2 - (r - e)^2 is a pitch of some 2.5 sqrt(r e), whatever the shape, and
 //! 0.65 r at most: above that, which is where e is larger than r / 14, surfaces take longer for more triangles (see `plan`).
 //!
-//! Where the solid leaves out a critical point of the distance below r, or has one of its own, the lattice is refined until it does not: in every tetrahedron the solid then has
-//! D(r)'s topology (see `critical`, and there what is not shown). Where no level is fine enough, that is counted as uncertain.
+//! Where the solid leaves out a critical point of the distance below r, or its surface does not follow the distance, the lattice is refined until it does not: the solid then has
+//! D(r)'s topology (proven in `critical`, shown there and in `star`). Where no level is fine enough, that is counted as uncertain.
 //!
 //! Where points stand for cells, as in most fractals, there are too many of them to be told apart. There the least squared distance at the lattice's vertices alone decides
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
@@ -73,6 +73,9 @@ pub struct Dilation {
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain. Not counted where points stand for
     /// cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
+    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`): of points, wires and polygons, where nothing was uncertain
+    /// and no triangles cross.
+    pub topology_exact: bool,
 }
 
 /// Dilates an attractor by the closed ball of radius r, to the tolerance: both bounds of the result are at
@@ -111,7 +114,13 @@ fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Bud
     } else {
         bounding_box(attractor, budget)?.grown(radius.mm())
     };
-    Ok(Dilation { inner_mm: dilation.inner_mm + deviation_mm, outer_mm: dilation.outer_mm + deviation_mm, bounds, ..dilation })
+    Ok(Dilation {
+        inner_mm: dilation.inner_mm + deviation_mm,
+        outer_mm: dilation.outer_mm + deviation_mm,
+        bounds,
+        topology_exact: dilation.topology_exact && *deviation_mm == 0.0,
+        ..dilation
+    })
 }
 
 /// Share of the tolerance that triangles which stand for trimmed surfaces may use.

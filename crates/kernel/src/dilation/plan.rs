@@ -369,7 +369,8 @@ impl<'a> Plan<'a> {
             let task = Task::Changed(&Changed::new(&new), &blocks);
             let made = self.surfaces(&setting, &space, &grading, task, budget)?;
             critical = add(&setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
-            let total = blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
+            let total =
+                blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
             if total > budget.limits.triangles {
                 return Err(DilationError::Triangles { tolerance_mm: self.aimed, made: total, allowed: budget.limits.triangles });
             }
@@ -480,6 +481,7 @@ impl<'a> Plan<'a> {
             leaf_cells,
             bounds: self.bounds.grown(self.radius),
             uncertain,
+            topology_exact: !setting.dense && uncertain == 0 && crossings == 0 && site.is_zero(),
         })
     }
 }

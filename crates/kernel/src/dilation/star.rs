@@ -149,9 +149,9 @@ impl Star {
                 let own: Vec<Point> = triangles.iter().filter(|(others, _)| others.contains(&end)).map(|(_, normal)| *normal).collect();
                 scratch.settle(sites, &[*centre, corners[end]], &own, least, &mut work)
             })
-            && triangles.iter().all(|([p, q], normal)| {
-                scratch.settle(sites, &[*centre, corners[*p], corners[*q]], &[*normal], least, &mut work)
-            })
+            && triangles
+                .iter()
+                .all(|([p, q], normal)| scratch.settle(sites, &[*centre, corners[*p], corners[*q]], &[*normal], least, &mut work))
     }
 }
 
@@ -253,7 +253,8 @@ impl Scratch {
         let Some(left) = work.checked_sub(1) else { return false };
         *work = left;
         let bulge = bulge(corners);
-        let near: Vec<Weighted> = (0..sites.len()).filter(|&index| self.may_be_nearest(sites, index, corners, bulge)).map(|index| sites[index]).collect();
+        let near: Vec<Weighted> =
+            (0..sites.len()).filter(|&index| self.may_be_nearest(sites, index, corners, bulge)).map(|index| sites[index]).collect();
         if self.avoid_origin(&near, corners, normals, least) {
             return true;
         }
@@ -314,7 +315,8 @@ impl Scratch {
     fn may_be_nearest(&mut self, sites: &[Weighted], index: usize, corners: &[Point], bulge: f64) -> bool {
         self.squares.clear();
         self.squares.extend(corners.iter().map(|corner| sites[index].distance_squared(corner) * (1.0 - 1e-12) - bulge));
-        let is_nearer = |other: &Weighted| corners.iter().zip(&self.squares).all(|(corner, square)| other.distance_squared(corner) < *square);
+        let is_nearer =
+            |other: &Weighted| corners.iter().zip(&self.squares).all(|(corner, square)| other.distance_squared(corner) < *square);
         !sites.iter().any(is_nearer)
     }
 }
@@ -505,7 +507,9 @@ mod tests {
                 sites.iter().filter(|site| site.distance_squared(y) <= least + 1e-12).map(|site| subtract(y, &site.closest(y))).collect()
             };
             for (k, (triangle, normal)) in triangles.iter().enumerate() {
-                let at = |shares: [f64; 2]| -> Point { std::array::from_fn(|axis| shares[0] * triangle[1][axis] + shares[1] * triangle[2][axis]) };
+                let at = |shares: [f64; 2]| -> Point {
+                    std::array::from_fn(|axis| shares[0] * triangle[1][axis] + shares[1] * triangle[2][axis])
+                };
                 for _ in 0..4 {
                     let share = number(&mut random).abs();
                     let inside = at([share, (1.0 - share) * number(&mut random).abs()]);
