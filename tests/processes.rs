@@ -65,6 +65,39 @@ fn a_job_that_exceeds_its_memory_ends_alone() {
     assert_eq!(enough["reused"], false);
 }
 
+/// Pairs of tetrahedra x, y, z >= 0, x + y + z <= 2, apart from each other; the second of each pair is moved by 1 along x, so that what both have is one of 1.
+fn tetrahedra(pairs: u32, limits: &Value) -> Value {
+    let input = |number: u32| {
+        let (pair, second) = (number / 2, number % 2);
+        let at = [pair % 20, pair / 20 % 20, pair / 400].map(|step| 4.0 * f64::from(step));
+        let corner = |k: usize| -> [f64; 3] {
+            std::array::from_fn(|axis| at[axis] + if axis + 1 == k { 2.0 } else { 0.0 } + if axis == 0 { f64::from(second) } else { 0.0 })
+        };
+        let (vertices, faces) = ([0, 1, 2, 3].map(corner), json!([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]));
+        json!({ "name": format!("{number}"), "model": { "shape": { "family": "mesh", "vertices": vertices, "faces": faces } } })
+    };
+    json!({ "lacuna": 1, "kind": "intersect", "inputs": (0..2 * pairs).map(input).collect::<Vec<_>>(), "outputs": ["stl"],
+        "params": { "operation": "union", "tolerance_mm": 0.01 }, "limits": limits })
+}
+
+#[test]
+fn ten_thousand_operands_have_the_volume_of_their_union() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let start = Instant::now();
+    let job = service.done(&tetrahedra(5_000, &json!({ "memory_bytes": 512 << 20, "seconds": 60 })));
+    eprintln!("the union of 10,000 tetrahedra: {:?}", start.elapsed());
+    assert_eq!(job["state"], "succeeded", "{}", job["problem"]);
+    let certificate = &job["certificate"];
+    // Two of 8 / 6 each, less the one of 1 / 6 that they share.
+    let (exact, [low, high]) = (5_000.0 * (8.0 + 8.0 - 1.0) / 6.0, [0, 1].map(|end| certificate["volume_mm3"][end].as_f64().unwrap()));
+    assert!(low <= exact && exact <= high && high - low < 1e-2 * exact, "[{low}, {high}] for {exact}");
+    assert_eq!([&certificate["components"], &certificate["genus"], &certificate["cavities"]], [&json!(5_000), &json!(0), &json!(0)]);
+    // A hundredth of a second is not enough for as many.
+    let hurried = service.done(&tetrahedra(4_999, &json!({ "seconds": 0.01 })));
+    assert_eq!([&hurried["state"], &hurried["problem"]["code"]], [&json!("failed"), &json!("limit.seconds")], "{}", hurried["problem"]);
+}
+
 #[test]
 fn memory_is_given_back_after_a_large_result() {
     let scratch = Scratch::new();

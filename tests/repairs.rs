@@ -53,7 +53,7 @@ fn json_of(path: &Path) -> Value {
 /// The statement that all readers of the broken box come to; an STL file's corners are joined by reading it.
 fn done(input: &str, joined: u64) -> Value {
     json!([{ "input": input, "changed": true, "joined_vertices": joined, "removed_flat_triangles": 1, "removed_copies": 1, "closed_holes": 0, "closing_triangles": 0,
-        "longest_hole_edges": 0, "parted_edges": 0, "doubled_vertices": 0, "turned_triangles": 14, "crossings": 0 }])
+        "longest_hole_edges": 0, "parted_edges": 0, "doubled_vertices": 0, "turned_triangles": 14, "shells_made_voids": 1, "crossings": 0 }])
 }
 
 #[track_caller]
@@ -84,6 +84,8 @@ fn every_command_repairs_only_when_asked() {
         assert_eq!(measured["repair"], done("box", joined));
         holds(&measured["volume_mm3"], 56.0);
         assert!(measured["warnings"][0].as_str().unwrap().starts_with("input 'box' was repaired: "));
+        let said = measured["warnings"][1].as_str().unwrap();
+        assert!(said.starts_with("1 shells of input 'box'") && said.contains("\"operation\": \"union\""), "{said}");
     }
     let sliced = "slice FILE --tolerance 0.01 --at 2 -o FILE --certificate FILE --repair";
     let drawing = scratch.join("out.svg");
@@ -181,7 +183,7 @@ fn the_service_repairs_uploads_as_the_command_does_files() {
     assert_eq!(view["state"], "succeeded", "{view}");
     let certificate = &view["certificate"];
     let statement = json!([{ "input": "boxes", "changed": true, "joined_vertices": 0, "removed_flat_triangles": 0, "removed_copies": 0,
-        "closed_holes": 0, "closing_triangles": 0, "longest_hole_edges": 0, "parted_edges": 1, "doubled_vertices": 2, "turned_triangles": 12, "crossings": 0 }]);
+        "closed_holes": 0, "closing_triangles": 0, "longest_hole_edges": 0, "parted_edges": 1, "doubled_vertices": 2, "turned_triangles": 12, "shells_made_voids": 0, "crossings": 0 }]);
     assert_eq!((&certificate["repair"], &certificate["components"]), (&statement, &json!(2)));
     holds(&certificate["volume_mm3"], 1.0);
 

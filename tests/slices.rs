@@ -109,6 +109,36 @@ fn what_is_empty_or_counts_twice_is_said() {
     assert!(said.contains("counts twice"), "{said}");
 }
 
+/// Cubes from 0 to 1 and from 1 to 2 along all axes, with one vertex for the corner that both have: at that corner's height the upper one begins.
+#[test]
+fn solids_that_share_a_vertex_are_cut() {
+    let folder = Scratch::new();
+    let (model, svg, told) = (folder.join("cubes.json"), folder.join("cubes.svg"), folder.join("told.json"));
+    let corner = |low: f64, code: usize| [0, 1, 2].map(|axis| low + if code >> axis & 1 == 1 { 1.0 } else { 0.0 });
+    let vertices: Vec<[f64; 3]> = (0..8).map(|code| corner(0.0, code)).chain((1..8).map(|code| corner(1.0, code))).collect();
+    let outward = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces: Vec<[usize; 4]> = outward.into_iter().chain(outward.map(|face| face.map(|k| k + 7))).collect();
+    write(&model, &serde_json::json!({ "family": "mesh", "vertices": vertices, "faces": faces }));
+    let words = ["slice", "--tolerance", "0.001", "--at", "0.5,1,1.5", "-o"].map(std::ffi::OsStr::new);
+    binary::succeed(words.into_iter().chain([svg.as_os_str(), "--certificate".as_ref(), told.as_os_str(), model.as_os_str()]));
+    let certificate = certificate(&told);
+    for plane in certificate["sections"]["planes"].as_array().unwrap() {
+        assert!((plane["area_mm2"].as_f64().unwrap() - 1.0).abs() < 1e-5, "{plane}");
+        assert_eq!((plane["polygons"].as_u64(), plane["holes"].as_u64()), (Some(1), Some(0)), "{plane}");
+    }
+    assert_eq!(certificate["components"], 2);
+    // As a union with a cube elsewhere.
+    let (other, part) = (folder.join("other.json"), folder.join("part.stl"));
+    let apart: Vec<[f64; 3]> = (0..8).map(|code| corner(5.0, code)).collect();
+    write(&other, &serde_json::json!({ "family": "mesh", "vertices": apart, "faces": outward }));
+    let words = ["intersect", "--operation", "union", "--tolerance", "0.001", "-o"].map(std::ffi::OsStr::new);
+    let paths = [part.as_os_str(), "--certificate".as_ref(), told.as_os_str(), model.as_os_str(), other.as_os_str()];
+    binary::succeed(words.into_iter().chain(paths));
+    let bounds = serde_json::from_slice::<Value>(&std::fs::read(&told).unwrap()).unwrap()["volume_mm3"].clone();
+    let [low, high] = [0, 1].map(|end| bounds[end].as_f64().unwrap());
+    assert!(low <= 3.0 && 3.0 <= high && high - low < 0.01, "{bounds}");
+}
+
 #[test]
 fn what_cannot_be_cut_is_refused() {
     let folder = Scratch::new();

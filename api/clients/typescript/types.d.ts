@@ -1010,6 +1010,7 @@ export interface RepairStatement {
   /** Edges of four triangles or more, around which those were joined that bound the same wedge of material. */ parted_edges: number;
   /** Triangles with the corners of another that were taken away, and walls between pieces that fill the space on both sides. */ removed_copies: number;
   /** Triangles without area that were taken away; those across their longest edge were cut where that was needed. */ removed_flat_triangles: number;
+  /** Shells within others whose triangles looked outward for the most part, and which were taken as voids. Where such a shell is material, take the union of both: a job of kind `intersect` with `"operation": "union"`, each shell an input of its own. */ shells_made_voids: number;
   /** Triangles that were turned so that the material is behind them: a shell within another is a void. */ turned_triangles: number;
 }
 

@@ -34,7 +34,7 @@ pub enum Fault {
     #[error("its triangles intersect each other")]
     SelfIntersecting,
     /// Its shells are not nested as those of a solid are.
-    #[error("{0}; give each shell as an input of its own")]
+    #[error("{0}")]
     MisplacedShell(MisplacedShell),
 }
 

@@ -1,6 +1,6 @@
 //! Inputs as solids: dilated by a ball, or what their closed surfaces bound.
 
-use lacuna_boolean::{BooleanEngine, BooleanError, ManifoldRust};
+use lacuna_boolean::{BooleanEngine, BooleanError, Fault, ManifoldRust};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{dilate, predict};
@@ -180,7 +180,14 @@ pub(crate) fn at_fault<'n>(error: BooleanError, owner: impl Fn(usize) -> &'n str
     let (kind, code) = (error.kind(), error.code());
     match error {
         BooleanError::NotASolid { operand, fault } => {
-            let message = format!("input '{}' is no solid: {fault}; mend the mesh, or give it a \"radius_mm\"", owner(operand));
+            let way_out = match fault {
+                Fault::MisplacedShell(shell) if shell.winding > 1 => {
+                    "give each shell as an input of its own to an operation \"union\" first"
+                }
+                Fault::MisplacedShell(_) | Fault::InsideOut => "ask for a repair, which turns it (--repair, \"repair\": true)",
+                _ => "mend the mesh, or give it a \"radius_mm\"",
+            };
+            let message = format!("input '{}' is no solid: {fault}; {way_out}", owner(operand));
             JobError::new(kind, code, message)
         }
         BooleanError::Stopped(stopped) => stopped.into(),

@@ -38,6 +38,9 @@ pub struct RepairStatement {
     pub doubled_vertices: u64,
     /// Triangles that were turned so that the material is behind them: a shell within another is a void.
     pub turned_triangles: u64,
+    /// Shells within others whose triangles looked outward for the most part, and which were taken as voids. Where such a shell is material, take the union of
+    /// both: a job of kind `intersect` with `"operation": "union"`, each shell an input of its own.
+    pub shells_made_voids: u64,
     /// Pairs of triangles that meet elsewhere than in common corners and edges. No repair changes them.
     pub crossings: u64,
 }
@@ -56,6 +59,7 @@ impl RepairStatement {
             parted_edges: repair.parted_edges,
             doubled_vertices: repair.doubled_vertices,
             turned_triangles: repair.turned_triangles,
+            shells_made_voids: repair.shells_made_voids,
             crossings: repair.crossings,
         }
     }
@@ -77,6 +81,12 @@ impl RepairStatement {
         let mut warnings = Vec::new();
         if self.changed {
             warnings.push(format!("input '{}' was repaired: {}", self.input, done.join(", ")));
+        }
+        if self.shells_made_voids > 0 {
+            warnings.push(format!(
+                "{} shells of input '{}' lie within others and looked outward: the repair took them as voids; where they are material, give each shell as an input of its own to a job of kind intersect with \"operation\": \"union\"",
+                self.shells_made_voids, self.input
+            ));
         }
         if self.crossings > 0 {
             warnings.push(format!(

@@ -156,7 +156,9 @@ fn shells_within_shells() {
         let mesh = parts.reduce(|all, shell| both(&all, &shell)).unwrap();
         let found = repair(&mesh, &Budget::default()).unwrap();
         let turned = 12 * (code ^ 0b0010_u32).count_ones();
-        assert_eq!(found.repair, Repair { turned_triangles: u64::from(turned), ..Repair::default() });
+        // An outward shell becomes a void; in a mesh that is inside out as a whole it was one.
+        let shells_made_voids = u64::from(code & 0b0010 == 0 && turned < 48);
+        assert_eq!(found.repair, Repair { turned_triangles: u64::from(turned), shells_made_voids, ..Repair::default() });
         let solid = found.solid.unwrap_or_else(|| Solid::new(mesh, &Budget::default()).unwrap());
         assert_eq!((volume(solid.mesh()), shape(&solid)), (512.0 - 216.0 + 64.0 + 1.0, [3, 1, 0]));
     }

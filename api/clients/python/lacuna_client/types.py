@@ -722,6 +722,7 @@ RepairStatement = TypedDict('RepairStatement', {
     'parted_edges': 'int',
     'removed_copies': 'int',
     'removed_flat_triangles': 'int',
+    'shells_made_voids': 'int',
     'turned_triangles': 'int',
 })
 

@@ -25,7 +25,7 @@ pub(crate) mod trim;
 mod walk;
 
 use crate::automaton::topology::{Topology, TopologyError};
-use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, State, StateId, convergence};
+use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, State, StateId, SubdivisionOperator, convergence};
 use crate::budget::Budget;
 use crate::error::Kind;
 use crate::solid::TriMesh;
@@ -96,6 +96,8 @@ pub struct Attractor {
     state_hulls: Vec<OnceLock<Option<StateHull>>>,
     /// Of every state, when first asked for.
     enclosures: Vec<OnceLock<Option<Enclosure>>>,
+    /// Of every state, when first asked for.
+    enclosed_children: Vec<OnceLock<Vec<Option<SubdivisionOperator>>>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
     precisions: Vec<Option<LinearPrecision>>,
@@ -249,6 +251,7 @@ impl Attractor {
             hulls,
             state_hulls: vec![OnceLock::new(); count],
             enclosures: vec![OnceLock::new(); count],
+            enclosed_children: vec![OnceLock::new(); count],
             connected,
             precisions,
             contraction,
@@ -439,6 +442,14 @@ impl Attractor {
     /// A box of coordinates that holds the attractor of a state whose operators have negative entries, or a product of such.
     pub(crate) fn enclosure(&self, state: StateId) -> Option<&Enclosure> {
         self.enclosures[state.index()].get_or_init(|| enclosure::enclosure(self, state)).as_ref()
+    }
+
+    /// Of every child of a state, its operator times the columns of its own enclosure: what sees a functional of the parent as the child's enclosure does.
+    pub(crate) fn enclosed_children(&self, state: StateId) -> &[Option<SubdivisionOperator>] {
+        self.enclosed_children[state.index()].get_or_init(|| {
+            let transitions = &self.automaton.state(state).transitions;
+            transitions.iter().map(|transition| Some(transition.operator.times(&self.enclosure(transition.to)?.columns))).collect()
+        })
     }
 
     /// Parameters of a state's points, where its curves or faces are proven to have linear precision.

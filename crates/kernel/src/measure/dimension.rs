@@ -12,6 +12,11 @@
 //!
 //! In all other cases: cells at level n have diameters below a multiple of rate^n, with the bound of the joint spectral radius as the rate, and their number
 //! grows like the spectral radius of the automaton's graph; so the upper box dimension is at most the quotient of the logarithms.
+//!
+//! No dimension is above that of the smallest affine space that holds the shape. For every state s let b_s be a point of its attractor K_s, in barycentric
+//! coordinates, and D_s a space of directions, such that T b_t - b_s and T D_t lie in D_s for all transitions T from s to states t. Then T maps b_t + D_t into
+//! b_s + D_s. Start with the sets {b_s} and replace each by the union of its T times those of the t: all stay within the b_s + D_s, which are closed, and they
+//! converge to the K_s. So K_s lies in b_s + D_s, however the smallest such D_s are found: by adding what lacks until nothing does.
 
 use super::Interval;
 use super::bounds::support_of_cell;
@@ -59,8 +64,10 @@ const ROUNDING: f64 = 1e-13;
 const MOST_STATES: usize = 300;
 /// Transitions of a state whose hulls are compared in pairs, at most.
 const MOST_SIBLINGS: usize = 64;
-/// Steps of power iteration.
+/// Steps of power iteration, and towards points of attractors.
 const STEPS: usize = 2_000;
+/// Directions that are less than this, relative to barycentric coordinates, are rounding.
+const FLAT: f64 = 1e-12;
 
 /// The dimension of an attractor: the largest of its root cells'. Roots of the same state and similar control points count once.
 ///
@@ -71,7 +78,7 @@ const STEPS: usize = 2_000;
 pub fn dimension(attractor: &Attractor, budget: &Budget) -> Result<Dimension, Stopped> {
     let mut result = elementary(0.0);
     let mut known: Vec<(StateId, Vec<f64>, Dimension)> = Vec::new();
-    let mut growths: HashMap<StateId, f64> = HashMap::new();
+    let mut facts: HashMap<StateId, StateFacts> = HashMap::new();
     for (index, root) in attractor.roots().iter().enumerate() {
         budget.cancel.check()?;
         let points = projected(&root.points, root.rational);
@@ -88,8 +95,8 @@ pub fn dimension(attractor: &Attractor, budget: &Budget) -> Result<Dimension, St
             result = larger(result, found);
             continue;
         }
-        let growth = *growths.entry(root.state).or_insert_with(|| growth(attractor, root.state));
-        let found = of_root(attractor, index, growth, budget)?;
+        let facts = facts.entry(root.state).or_insert_with(|| StateFacts::of(attractor, root.state));
+        let found = of_root(attractor, index, facts, budget)?;
         if known.len() < MOST_STATES {
             known.push((root.state, edges, found));
         }
@@ -109,9 +116,35 @@ fn larger(a: Dimension, b: Dimension) -> Dimension {
     Dimension { bounds, knowledge: decides.knowledge }
 }
 
-fn of_root(attractor: &Attractor, index: usize, growth: f64, budget: &Budget) -> Result<Dimension, Stopped> {
+/// What bounds dimensions and does not depend on control points.
+struct StateFacts {
+    growth: f64,
+    /// A basis of the directions in which the attractor of the state extends, in barycentric coordinates; `None` when that is not known.
+    directions: Option<Vec<Vec<f64>>>,
+}
+
+impl StateFacts {
+    fn of(attractor: &Attractor, start: StateId) -> Self {
+        Self { growth: growth(attractor, start), directions: directions(attractor, start) }
+    }
+
+    /// The dimension of an affine space that holds the part of the attractor in a cell with these control points.
+    fn spread(&self, points: &[ControlPoint], rational: bool) -> u8 {
+        let points = projected(points, rational);
+        let Some(directions) = self.directions.as_ref().filter(|_| !rational) else { return rank(&points) };
+        // The entries of a direction sum to 0: seen from the first point, fewer digits cancel.
+        let along = |direction: &Vec<f64>| {
+            let terms = || direction.iter().zip(&points).map(|(share, point)| subtract(point, &points[0]).map(|x| share * x));
+            terms().fold([0.0; 3], |sum, term| std::array::from_fn(|axis| sum[axis] + term[axis]))
+        };
+        let ends: Vec<Point> = std::iter::once([0.0; 3]).chain(directions.iter().map(along)).collect();
+        rank(&ends).min(rank(&points))
+    }
+}
+
+fn of_root(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Budget) -> Result<Dimension, Stopped> {
     let root = &attractor.roots()[index];
-    let general = by_contraction(attractor, index, growth, budget)?;
+    let general = by_contraction(attractor, index, facts, budget)?;
     if root.rational || attractor.root_window(index).is_some() {
         return Ok(general);
     }
@@ -130,11 +163,12 @@ fn of_root(attractor: &Attractor, index: usize, growth: f64, budget: &Budget) ->
     Ok(Dimension { bounds, knowledge: DimensionKnowledge::OverlappingSimilarities })
 }
 
-/// Bounds for every shape: of the cells' number and size, of the space, and 1 for what is connected and not a point.
-fn by_contraction(attractor: &Attractor, index: usize, growth: f64, budget: &Budget) -> Result<Dimension, Stopped> {
+/// Bounds for every shape: of the cells' number and size, of the affine space that holds it, and 1 for what is connected and not a point.
+fn by_contraction(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Budget) -> Result<Dimension, Stopped> {
     let root = &attractor.roots()[index];
     let rate = attractor.contraction().upper;
-    let spread = f64::from(rank(&projected(&root.points, root.rational)));
+    let growth = facts.growth;
+    let spread = f64::from(facts.spread(&root.points, root.rational));
     let covering = match growth {
         _ if growth <= 1.0 => 0.0,
         _ if rate > 0.0 => growth.ln() / -rate.ln() * (1.0 + 1e-12),
@@ -180,6 +214,93 @@ fn growth(attractor: &Attractor, start: StateId) -> f64 {
         v = next.iter().zip(&v).map(|(next, v)| (next / largest + v * 1e-3).max(1e-300)).collect();
     }
     best
+}
+
+/// A basis of D_s of the module's comment for the first state, orthonormal but for rounding; `None` for leaves that are no simplices, where the points b do not
+/// converge, and for more than [`MOST_STATES`] states.
+fn directions(attractor: &Attractor, start: StateId) -> Option<Vec<Vec<f64>>> {
+    let reached = reached(attractor, start);
+    if reached.len() > MOST_STATES {
+        return None;
+    }
+    let state = |place: usize| attractor.automaton().state(reached[place]);
+    let place = |id: StateId| reached.iter().position(|other| *other == id);
+    let targets: Vec<Vec<usize>> = (0..reached.len())
+        .map(|own| state(own).transitions.iter().map(|transition| place(transition.to)).collect())
+        .collect::<Option<_>>()?;
+    let mut bases: Vec<Vec<Vec<f64>>> = vec![Vec::new(); reached.len()];
+    let mut points: Vec<Vec<f64>> = Vec::with_capacity(reached.len());
+    for (own, basis) in bases.iter_mut().enumerate() {
+        let n = state(own).dimension;
+        points.push(vec![1.0 / n as f64; n]);
+        if targets[own].is_empty() {
+            if !matches!(state(own).leaf, LeafPrimitive::Simplex) {
+                return None;
+            }
+            for corner in 1..n {
+                let edge = (0..n).map(|k| f64::from(u8::from(k == corner)) - f64::from(u8::from(k == 0)));
+                add_direction(basis, edge.collect(), 1.0);
+            }
+        }
+    }
+    // b of a state is the image of that of its first child's.
+    let mut is_settled = false;
+    for _ in 0..STEPS {
+        let mut change = 0.0_f64;
+        for own in (0..reached.len()).filter(|&own| !targets[own].is_empty()) {
+            let next = state(own).transitions[0].operator.apply(&points[targets[own][0]]);
+            let size = next.iter().map(|x| x.abs()).sum::<f64>();
+            let moved = next.iter().zip(&points[own]).map(|(a, b)| (a - b).abs()).sum::<f64>();
+            change = change.max(moved / size);
+            points[own] = next;
+        }
+        is_settled = change <= 1e-2 * FLAT;
+        if is_settled {
+            break;
+        }
+    }
+    if !is_settled {
+        return None;
+    }
+    // Ends, as every round but the last adds a direction.
+    loop {
+        let mut grew = false;
+        for own in 0..reached.len() {
+            for (transition, &to) in state(own).transitions.iter().zip(&targets[own]) {
+                let image = transition.operator.apply(&points[to]);
+                let size = image.iter().map(|x| x.abs()).sum::<f64>();
+                let step = image.iter().zip(&points[own]).map(|(a, b)| a - b).collect();
+                grew |= add_direction(&mut bases[own], step, size);
+                for known in 0..bases[to].len() {
+                    let turned = transition.operator.apply(&bases[to][known]);
+                    grew |= add_direction(&mut bases[own], turned, 1.0);
+                }
+            }
+        }
+        if !grew {
+            return bases.into_iter().next();
+        }
+    }
+}
+
+/// Adds what a basis lacks of a direction, unless that is rounding beside numbers of that size. Whether it did.
+fn add_direction(basis: &mut Vec<Vec<f64>>, mut direction: Vec<f64>, size: f64) -> bool {
+    let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // The second time takes away what rounding left.
+    for _ in 0..2 {
+        for known in basis.iter() {
+            let share: f64 = known.iter().zip(&direction).map(|(a, b)| a * b).sum();
+            direction.iter_mut().zip(known).for_each(|(x, known)| *x -= share * known);
+        }
+    }
+    let left = length(&direction);
+    // Directions sum to 0: there are fewer than coordinates.
+    let lacks = left > FLAT * size.max(1.0) && basis.len() + 1 < direction.len();
+    if lacks {
+        direction.iter_mut().for_each(|x| *x /= left);
+        basis.push(direction);
+    }
+    lacks
 }
 
 fn reached(attractor: &Attractor, start: StateId) -> Vec<StateId> {

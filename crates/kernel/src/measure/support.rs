@@ -32,7 +32,7 @@ use super::functional::Functional;
 use crate::attractor::cell::{Cell, ControlPoint, Point, dot};
 use crate::attractor::trim::{Rim, TrimmedSurface, Window};
 use crate::attractor::{Attractor, Enclosure, OwnRadius, StateBound};
-use crate::automaton::{LeafPrimitive, StateId};
+use crate::automaton::{LeafPrimitive, PullBack, StateId};
 use crate::budget::{Budget, Stopped};
 use crate::measure::Interval;
 
@@ -262,7 +262,9 @@ impl<'a> Search<'a> {
         let enclosure = candidate.state.and_then(|state| self.enclosure(state));
         let [floor, bound] = match enclosure {
             Some(enclosure) => {
-                candidate.seen = enclosure.columns.pull_back(&candidate.functional.values);
+                if candidate.seen.is_empty() {
+                    candidate.seen = enclosure.columns.pull_back(&candidate.functional.values);
+                }
                 self.missed = self.missed.max(enclosure.miss);
                 enclosure.range(candidate.seen.iter().copied())
             }
@@ -355,24 +357,27 @@ impl<'a> Search<'a> {
             return;
         };
         let mut functionals = functional.for_children();
+        // A child's bound needs no functional: most children go before they have one.
+        let mut seen_by_children = PullBack::new(&functional.values);
+        let enclosed = if self.enclosure(state).is_some() { attractor.enclosed_children(state) } else { &[] };
         for (index, transition) in attractor.automaton().state(state).transitions.iter().enumerate() {
             let window = window.as_ref().and_then(|window| attractor.child_window(root as usize, window, index));
             if window.as_ref().is_some_and(Window::is_outside) {
                 continue;
             }
+            let mut seen = Vec::new();
+            if let (Some(Some(columns)), Some(enclosure)) = (enclosed.get(index), self.enclosure(transition.to)) {
+                seen = seen_by_children.by(columns);
+                self.missed = self.missed.max(enclosure.miss);
+                if enclosure.range(seen.iter().copied())[1].min(bound) + slack <= self.reached {
+                    continue;
+                }
+            }
             let functional = match attractor.hull(state) {
                 Some(hull) => functionals.pulled_back(&hull.children[index]),
                 None => self.at_hull(transition.to, functionals.pulled_back(&transition.operator)),
             };
-            self.consider(Candidate {
-                root,
-                state: Some(transition.to),
-                functional,
-                bound,
-                slack,
-                seen: Vec::new(),
-                window: window.map(Box::new),
-            });
+            self.consider(Candidate { root, state: Some(transition.to), functional, bound, slack, seen, window: window.map(Box::new) });
         }
     }
 

@@ -122,11 +122,24 @@ impl Solid {
         Ok(Self { mesh, topology })
     }
 
-    /// Rounds a closed mesh to single precision, mends what that breaks, and proves that it is a solid. Cost: n log n.
+    /// Rounds a closed mesh to single precision, mends what that breaks, and proves that it is a solid. Where parts meet in edges or corners only, these are
+    /// doubled. Cost: n log n.
     ///
     /// # Errors
     /// As [`Solid::new`].
     pub fn rounded(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, SolidError> {
+        match Self::rounded_as_named(mesh, budget) {
+            // Most meshes have no such places: they are not looked for before.
+            Err(SolidError::NotManifold(topology)) if topology.nonmanifold_edges + topology.nonmanifold_vertices > 0 => {
+                let parted = fans::part(&|vertex| mesh.vertices[vertex as usize].to_array(), &mesh.triangles, budget)?;
+                let vertices = parted.origins.iter().map(|&vertex| mesh.vertices[vertex as usize]).collect();
+                Self::rounded_as_named(&TriMesh { vertices, triangles: parted.triangles }, budget)
+            }
+            result => result,
+        }
+    }
+
+    fn rounded_as_named(mesh: &TriMesh, budget: &Budget) -> Result<Rounded, SolidError> {
         let extent = mesh.vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max);
         let rounding = rounding(extent);
         let points = mesh.vertices.iter().map(|vertex| vertex.to_array().map(|x| f64::from(x as f32))).collect();

@@ -41,6 +41,11 @@ impl Shells {
         }
         shells
     }
+
+    /// The shell that a vertex of a triangle belongs to.
+    pub(crate) fn with(&self, vertex: u32) -> usize {
+        self.numbers[vertex as usize] as usize
+    }
 }
 
 /// A shell of a closed mesh on one side of which the mesh winds around space neither once nor not at all.
@@ -81,7 +86,7 @@ pub fn misplaced_shell(mesh: &TriMesh) -> Option<MisplacedShell> {
             return None;
         }
         let at = mesh.vertices[first as usize];
-        let others = inside.winding_of(at, |triangle| shells.numbers[mesh.triangles[triangle as usize][0] as usize] as usize != shell);
+        let others = inside.winding_of(at, |triangle| shells.with(mesh.triangles[triangle as usize][0]) != shell);
         let sides = [others, if volume > 0.0 { others + 1 } else { others - 1 }];
         sides.into_iter().find(|winding| !(0..=1).contains(winding)).map(|winding| MisplacedShell { at, winding })
     })

@@ -7,6 +7,7 @@ mod clean;
 mod facing;
 mod fill;
 
+use super::shells::Shells;
 use super::{Crossings, Solid, SolidError, TriMesh, fans};
 use crate::budget::{Budget, Stopped};
 use clean::{is_without_area, join, remove_collapsed, remove_copies, remove_flat};
@@ -36,6 +37,8 @@ pub struct Repair {
     pub doubled_vertices: u64,
     /// Triangles that were turned around.
     pub turned_triangles: u64,
+    /// Shells within others most of whose triangles looked outward, as those of material do, and which became voids, unless the whole mesh was inside out.
+    pub shells_made_voids: u64,
     /// Pairs of triangles that meet elsewhere than in common corners and edges, which no repair changes.
     pub crossings: u64,
 }
@@ -230,9 +233,23 @@ pub fn repair(mesh: &TriMesh, budget: &Budget) -> Result<Repaired, RepairError> 
         parted_edges,
         doubled_vertices,
         turned_triangles,
+        shells_made_voids: shells_made_voids(solid.mesh(), &turned),
         crossings: found.count,
     };
     Ok(Repaired { solid: Some(solid), repair })
+}
+
+/// How many shells became voids whose triangles, which are in their order, were turned for the most part.
+fn shells_made_voids(mesh: &TriMesh, turned: &[bool]) -> u64 {
+    if turned.iter().all(|&turned| turned) {
+        return 0;
+    }
+    let shells = Shells::of(mesh);
+    let mut surplus = vec![0_i64; shells.volumes.len()];
+    for (corners, &turned) in mesh.triangles.iter().zip(turned) {
+        surplus[shells.with(corners[0])] += if turned { 1 } else { -1 };
+    }
+    surplus.iter().zip(&shells.volumes).filter(|&(&surplus, &volume)| surplus > 0 && volume < 0.0).count() as u64
 }
 
 fn first_corner(mesh: &TriMesh, triangle: u32) -> DVec3 {
