@@ -74,7 +74,7 @@ pub(super) fn noted(
                     star.add(setting, corners, surface.normals[triangle as usize]);
                 }
             }
-            if !star.grows(setting) {
+            if is_begun && !star.grows(setting) {
                 note(setting, grading, &star.centre, &mut critical, &mut uncertain);
             }
         }

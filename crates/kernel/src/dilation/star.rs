@@ -14,6 +14,7 @@ use super::surface::{BlockSurface, VertexName};
 use super::tree::{SiteId, Weighted};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_feature;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 /// Simplices that the search around a vertex may look at.
@@ -98,8 +99,14 @@ impl Star {
         vectors.extend(self.views.iter().filter(|(_, square)| *square <= most).map(|(away, _)| *away));
         if with_normals {
             vectors.extend(self.triangles.iter().map(|(_, normal)| *normal));
+        } else {
+            // Blocks find sites in orders of their own, and many are equally far.
+            let order = |a: &Point, b: &Point| {
+                (0..3).map(|axis| a[axis].total_cmp(&b[axis])).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+            };
+            vectors.sort_unstable_by(order);
         }
-        let nearest = self.views.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or([0.0; 3], |(away, _)| *away);
+        let Some(nearest) = vectors.iter().min_by(|a, b| dot(a, a).total_cmp(&dot(b, b))).copied() else { return [0.0; 3] };
         let lowest = |direction: &Point| {
             let lowest = vectors.iter().min_by(|a, b| dot(a, direction).total_cmp(&dot(b, direction)));
             lowest.copied().unwrap_or(nearest)
