@@ -103,7 +103,7 @@ fn a_job_is_stopped_from_another_process_and_its_events_are_told_there() {
         let id = submit(&first, &long_order(number));
         let mut events = TcpStream::connect(second.address).unwrap();
         events.set_read_timeout(Some(PATIENCE)).unwrap();
-        write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: lacuna\r\n\r\n").unwrap();
+        write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: localhost\r\n\r\n").unwrap();
         until(PATIENCE, "progress", || view(&second, &id)["progress"]["phase"].is_string());
         let stopped = Instant::now();
         let answer = second.post(&format!("/v1/jobs/{id}/cancel"), &json!({}));

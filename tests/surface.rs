@@ -336,7 +336,7 @@ fn an_answer_that_takes_too_long_is_a_problem_and_a_job_s_id_comes_before() {
     // A body that never comes, with more time for itself than for the answer.
     let mut stream = TcpStream::connect(service.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
-    let head = "POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\nx-request-id: late-1\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{";
+    let head = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\nx-request-id: late-1\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{";
     stream.write_all(head.as_bytes()).unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).unwrap();
@@ -445,4 +445,54 @@ fn a_result_in_several_formats_comes_in_the_one_that_is_preferred() {
     assert_eq!(draw("image/svg+xml;q=0.5, text/vnd.graphviz").header("content-type"), "text/vnd.graphviz; charset=utf-8");
     let refused = draw("model/stl");
     assert_eq!((refused.status, refused.header("vary"), &refused.json()["code"]), (406, "Accept", &json!("not-acceptable")));
+}
+
+/// A request as a browser sends it for a page whose name leads to this machine.
+fn named(service: &Service, target: &str, fields: &str) -> (u16, Value) {
+    let mut stream = TcpStream::connect(service.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    write!(stream, "GET {target} HTTP/1.1\r\n{fields}connection: close\r\n\r\n").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    (head["HTTP/1.1 ".len()..][..3].parse().unwrap(), serde_json::from_str(body).unwrap_or_default())
+}
+
+#[test]
+fn without_keys_only_names_of_this_machine_are_answered() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(&scratch.join("open"), &[("LACUNA_HOST_NAMES", "cad.example, Other.Example")]);
+    let port = service.address.port();
+    for own in ["localhost", "a.localhost:1", "127.0.0.1", "127.3.2.1:80", "[::1]:80", "cad.example", "OTHER.example:8080"] {
+        assert_eq!(named(&service, "/v1/jobs", &format!("host: {own}\r\n")).0, 200, "{own}");
+    }
+    assert_eq!(named(&service, &format!("http://localhost:{port}/v1/jobs"), "host: localhost\r\n").0, 200);
+    assert_eq!(named(&service, "/v1/jobs", "").0, 200, "whoever names no host is no browser");
+    let rebound = format!("evil.example:{port}");
+    for (target, fields) in [
+        ("/v1/jobs".to_owned(), format!("host: {rebound}\r\n")),
+        ("/docs".to_owned(), format!("host: {rebound}\r\n")),
+        ("/metrics".to_owned(), format!("host: {rebound}\r\n")),
+        ("/nowhere".to_owned(), format!("host: {rebound}\r\n")),
+        ("/v1/jobs".to_owned(), format!("host: localhost\r\nhost: {rebound}\r\n")),
+        (format!("http://{rebound}/v1/jobs"), "host: localhost\r\n".to_owned()),
+    ] {
+        let (status, problem) = named(&service, &target, &fields);
+        assert_eq!((status, &problem["type"]), (421, &json!("/problems/misdirected")), "{target} {fields}");
+        for word in [rebound.as_str(), "localhost", "cad.example, other.example", "LACUNA_HOST_NAMES", "--host-names", "LACUNA_API_KEYS"] {
+            assert!(problem["detail"].as_str().unwrap().contains(word), "{word}: {problem}");
+        }
+    }
+    for probe in ["/livez", "/readyz"] {
+        assert_eq!(named(&service, probe, "host: 10.0.0.7:80\r\n").0, 200, "{probe}");
+    }
+
+    let keyed = Service::start_with(&scratch.join("keyed"), &[("LACUNA_API_KEYS", "ada")]);
+    assert_eq!(named(&keyed, "/v1/jobs", "host: any.example\r\nauthorization: Bearer ada\r\n").0, 200);
+    assert_eq!(named(&keyed, "/v1/jobs", "host: any.example\r\n").0, 401);
+
+    let told: Value = serde_json::from_slice(&succeed(["doctor", "--host-names", "a.example,b.example"])).unwrap();
+    let setting = told["settings"].as_array().unwrap().iter().find(|setting| setting["name"] == "LACUNA_HOST_NAMES").unwrap();
+    assert_eq!((&setting["value"], &setting["origin"]), (&json!("a.example, b.example"), &json!("flag")));
+    assert_eq!(run(["doctor", "--host-names", "http://a.example"]).status.code(), Some(2));
 }

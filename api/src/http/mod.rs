@@ -4,6 +4,7 @@ pub mod accept;
 pub mod auth;
 pub mod body;
 pub mod headers;
+pub mod hosts;
 pub mod layers;
 pub mod range;
 pub mod router;
