@@ -496,3 +496,56 @@ fn without_keys_only_names_of_this_machine_are_answered() {
     assert_eq!((&setting["value"], &setting["origin"]), (&json!("a.example, b.example"), &json!("flag")));
     assert_eq!(run(["doctor", "--host-names", "http://a.example"]).status.code(), Some(2));
 }
+
+#[test]
+fn text_is_compressed_for_those_who_ask() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order =
+        json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 }, "outputs": [] });
+    let view = service.done(&order);
+    let id = view["id"].as_str().unwrap();
+    let unzipped = |bytes: &[u8]| {
+        let mut zipped = std::process::Command::new("gzip");
+        let mut child = zipped.arg("-dc").stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped()).spawn().unwrap();
+        let (mut stdin, bytes) = (child.stdin.take().unwrap(), bytes.to_vec());
+        let writer = std::thread::spawn(move || stdin.write_all(&bytes).unwrap());
+        let output = child.wait_with_output().unwrap();
+        writer.join().unwrap();
+        assert!(output.status.success());
+        output.stdout
+    };
+    let gzip = [("accept-encoding", "br, gzip;q=0.8")];
+    for path in ["/v1/openapi.json", "/docs", "/metrics", "/v1/capabilities", "/v1/profiles", &format!("/v1/jobs/{id}"), "/v1/jobs"] {
+        let (plain, zipped) = (service.get(path), service.get_with(path, &gzip));
+        assert_eq!((plain.status, plain.header("content-encoding"), plain.header("vary")), (200, "", "Accept-Encoding"), "{path}");
+        assert_eq!((zipped.status, zipped.header("content-encoding"), zipped.header("vary")), (200, "gzip", "Accept-Encoding"), "{path}");
+        assert_eq!(zipped.header("content-type"), plain.header("content-type"), "{path}");
+        assert_eq!(zipped.header("content-length"), zipped.body.len().to_string(), "{path}");
+        assert!(zipped.body.len() * 10 < plain.body.len() * 8, "{path}: {} of {}", zipped.body.len(), plain.body.len());
+        if path != "/metrics" {
+            assert_eq!(unzipped(&zipped.body), plain.body, "{path}");
+            let head = service.request("HEAD", path, &gzip, b"");
+            let told = |answer: &lacuna_tests::support::service::Answer| {
+                ["content-length", "content-encoding", "vary"].map(|name| answer.header(name).to_owned())
+            };
+            assert_eq!(told(&head), told(&zipped), "{path}");
+        }
+    }
+    // A problem with a long list of findings.
+    let many: serde_json::Map<String, Value> = (0..60).map(|number| (format!("unknown_{number}"), json!(number))).collect();
+    let problem = service.post_with("/v1/jobs", &gzip, json!(many).to_string().as_bytes());
+    assert_eq!((problem.status, problem.header("content-encoding")), (422, "gzip"));
+    assert_eq!(problem.header("content-type"), "application/problem+json");
+    assert!(String::from_utf8(unzipped(&problem.body)).unwrap().contains("unknown_59"));
+
+    // What has a strong tag keeps the bytes that the tag is of; events are told one by one; what is short gains nothing.
+    let certificate = view["outputs"].as_array().unwrap().iter().find(|output| output["name"] == "certificate.json").unwrap();
+    let result = format!("/v1/results/{}", certificate["digest"].as_str().unwrap());
+    for path in [&result, "/v1/library/koch_curve", &format!("/v1/jobs/{id}/events"), "/version"] {
+        let answer = service.get_with(path, &gzip);
+        assert_eq!((answer.status, answer.header("content-encoding"), answer.header("vary")), (200, "", ""), "{path}");
+    }
+    let part = service.get_with(&result, &[gzip[0], ("range", "bytes=0-9")]);
+    assert_eq!((part.status, part.header("content-encoding"), part.body.len()), (206, "", 10));
+}

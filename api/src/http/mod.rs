@@ -3,6 +3,7 @@
 pub mod accept;
 pub mod auth;
 pub mod body;
+pub mod compression;
 pub mod headers;
 pub mod hosts;
 pub mod layers;

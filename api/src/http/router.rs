@@ -1,12 +1,12 @@
 //! The table of contents of the HTTP contract.
 
 use axum::Router;
-use axum::middleware::from_fn_with_state;
+use axum::middleware::{from_fn, from_fn_with_state};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::state::Shared;
-use super::{auth, hosts, layers};
+use super::{auth, compression, hosts, layers};
 use crate::problem::{Problem, ProblemKind};
 use crate::routes::{capabilities, docs, events, health, jobs, library, models, problems, results, shortcuts, studies, trades};
 
@@ -79,13 +79,12 @@ pub fn operation(state: Shared) -> Router {
 
 fn layered(state: Shared, public: OpenApiRouter<Shared>, private: Option<OpenApiRouter<Shared>>, by_name: bool) -> Router {
     let keyed = |private| Router::from(private).route_layer(from_fn_with_state(state.clone(), auth::require_key));
-    let all = Router::from(public)
-        .merge(private.map(keyed).unwrap_or_default())
-        .fallback(absent)
-        .method_not_allowed_fallback(not_allowed);
+    let all = Router::from(public).merge(private.map(keyed).unwrap_or_default()).fallback(absent).method_not_allowed_fallback(not_allowed);
     let named = if by_name { all.layer(from_fn_with_state(state.clone(), hosts::require_own_name)) } else { all };
     named
         .layer(from_fn_with_state(state.clone(), layers::observe))
+        // Around the layer that gives problems their form: they are compressed, too.
+        .layer(from_fn(compression::compress))
         .layer(from_fn_with_state(state.clone(), layers::cors))
         .with_state(state)
 }
