@@ -549,3 +549,63 @@ fn text_is_compressed_for_those_who_ask() {
     let part = service.get_with(&result, &[gzip[0], ("range", "bytes=0-9")]);
     assert_eq!((part.status, part.header("content-encoding"), part.body.len()), (206, "", 10));
 }
+
+#[test]
+fn a_job_that_has_expired_says_so_to_its_owner() {
+    let scratch = Scratch::new();
+    let order =
+        json!({ "lacuna": 1, "kind": "evaluate", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 }, "outputs": ["obj"] });
+    let ada = ("authorization", "Bearer ada");
+    let submit = |service: &Service| {
+        let headers = [ada, ("prefer", "wait=30"), ("idempotency-key", "k")];
+        service.post_with("/v1/jobs", &headers, order.to_string().as_bytes()).json()
+    };
+    let keys = ("LACUNA_API_KEYS", "ada,bob");
+    let made = {
+        let service = Service::start_with(scratch.path(), &[keys]);
+        submit(&service)
+    };
+    assert_eq!(made["state"], "succeeded", "{made}");
+    let place = format!("/v1/jobs/{}", made["id"].as_str().unwrap());
+    let output = format!("{place}/outputs/obj");
+    let result = format!("/v1/results/{}", made["outputs"][0]["digest"].as_str().unwrap());
+    // Jobs are kept for no time at all, so the sweep at the start lets this one expire; none comes for an hour after that.
+    let service = Service::start_with(scratch.path(), &[keys, ("LACUNA_RETENTION_HOURS", "0")]);
+    until(Duration::from_secs(20), "an expired job", || service.get_with(&place, &[ada]).json()["state"] == "expired");
+    let view = service.get_with(&place, &[ada]).json();
+    for member in ["id", "kind", "created", "started", "finished", "input_digest", "outputs"] {
+        assert_eq!(view[member], made[member], "{member}");
+    }
+    assert!(view["expired"].as_str() >= view["finished"].as_str() && view["warnings"] == json!([]), "{view}");
+    assert!(view.get("certificate").is_none() && view.get("problem").is_none(), "{view}");
+    for place in [&output, &format!("{output}?redirect=0"), &result] {
+        let gone = service.get_with(place, &[ada]);
+        assert_eq!((gone.status, &gone.json()["type"]), (410, &json!("/problems/result-expired")), "{place}");
+        assert!(gone.json()["detail"].as_str().unwrap().contains("POST /v1/jobs"), "{}", gone.json());
+        assert_eq!(service.get_with(place, &[("authorization", "Bearer bob")]).status, 404, "{place}");
+    }
+    assert_eq!(service.get_with(&format!("{place}/outputs/stl"), &[ada]).status, 404);
+    assert_eq!(service.get_with(&place, &[("authorization", "Bearer bob")]).status, 404);
+    let listed = |state: &str| service.get_with(&format!("/v1/jobs?state={state}"), &[ada]).json()["items"].as_array().unwrap().len();
+    assert_eq!((listed("expired"), listed("succeeded")), (1, 0));
+    let events = String::from_utf8(service.get_with(&format!("{place}/events"), &[ada]).body).unwrap();
+    assert!(events.contains("event: done") && events.contains("\"state\":\"expired\""), "{events}");
+    assert_eq!(service.request("POST", &format!("{place}/cancel"), &[ada], b"").json()["state"], "expired");
+
+    // The way out: the same job, with the same key even, makes it again.
+    let again = submit(&service);
+    assert_eq!((&again["state"], &again["reused"], &again["outputs"]), (&json!("succeeded"), &json!(false), &made["outputs"]));
+    assert_ne!(again["id"], made["id"]);
+    assert_eq!(service.get_with(&result, &[ada]).status, 200);
+    assert_eq!(service.request("DELETE", &place, &[ada], b"").status, 204);
+    assert_eq!(service.get_with(&place, &[ada]).status, 404);
+    let limits = service.get_with("/v1/capabilities", &[ada]).json()["limits"].clone();
+    assert_eq!((&limits["retention_hours"], &limits["expired_hours"]), (&json!(0), &json!(720)));
+    drop(service);
+
+    // Where no record is to be kept either, none is.
+    let nothing = [keys, ("LACUNA_RETENTION_HOURS", "0"), ("LACUNA_EXPIRED_HOURS", "0")];
+    let service = Service::start_with(scratch.path(), &nothing);
+    until(Duration::from_secs(20), "an absent job", || service.get_with("/v1/jobs", &[ada]).json()["items"] == json!([]));
+    assert_eq!(service.get_with(&result, &[ada]).status, 404);
+}

@@ -159,8 +159,12 @@ pub struct Config {
     pub calls_per_minute: u32,
     /// Time to end what runs when the service stops, in seconds.
     pub drain_seconds: u64,
-    /// Age at which ended jobs are forgotten, in hours.
+    /// Age at which ended jobs expire: what they made is given up; in hours.
     pub retention_hours: u64,
+    /// Time after that for which is kept that there was such a job, in hours.
+    pub expired_hours: u64,
+    /// Most expired jobs of which that is kept.
+    pub expired_jobs: usize,
     /// The most that a job may ask for; the default of what it does not ask for.
     pub job_limits: Limits,
     /// How much is logged: `error`, `warn`, `info`, `debug`, `trace` or `off`.
@@ -301,6 +305,8 @@ impl Config {
             calls_per_minute: reader.take("LACUNA_CALLS_PER_MINUTE", None, 6000, COUNT)?,
             drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
             retention_hours: reader.take("LACUNA_RETENTION_HOURS", None, 72, COUNT)?,
+            expired_hours: reader.take("LACUNA_EXPIRED_HOURS", None, 720, COUNT)?,
+            expired_jobs: reader.take("LACUNA_EXPIRED_JOBS", None, 10_000, COUNT)?,
             job_limits: Limits {
                 seconds: reader.take("LACUNA_LIMIT_SECONDS", None, 3600.0, "seconds are expected")?,
                 memory_bytes: reader.take("LACUNA_LIMIT_MEMORY_BYTES", None, defaults.memory_bytes, COUNT)?,

@@ -564,13 +564,14 @@ export interface JobParams {
 }
 
 /** Where a job stands. */
-export type JobState = "queued" | "running" | "cancelling" | "succeeded" | "failed" | "cancelled";
+export type JobState = "queued" | "running" | "cancelling" | "succeeded" | "failed" | "cancelled" | "expired";
 
 /** A job as its owner sees it. */
 export interface JobView {
   /** How often it was started; 2 after the service stopped during the first time. */ attempt: number;
   certificate?: Certificate | null;
   /** When it was accepted. */ created: string;
+  /** When what it made was given up, after the time for which ended jobs are kept; the digests of its outputs are still told. */ expired?: string | null;
   /** When it ended. */ finished?: string | null;
   /** How often a worker gave it back because it was told to end; those starts are not counted against the job. */ handed_back?: number;
   /** Its id. */ id: string;
@@ -624,10 +625,11 @@ export interface LimitCapability {
   /** Other calls per minute and key. */ calls_per_minute: number;
   /** Most leaf cells of a job. */ cells: number;
   /** Longest address. */ depth: number;
+  /** Hours after that for which an expired job is still known. */ expired_hours: number;
   /** Unfinished jobs that one key may have. */ jobs_per_key: number;
   /** Most accounted memory of a job, in bytes. */ memory_bytes: number;
   /** Jobs that may wait. */ queued_jobs: number;
-  /** Hours after which ended jobs are forgotten. */ retention_hours: number;
+  /** Hours after which ended jobs expire: what they made is given up. */ retention_hours: number;
   /** Most wall time of a job, in seconds. */ seconds: number;
   /** Bytes of all mesh files that one key may keep. */ stored_bytes: number;
   /** Submissions per minute and key. */ submissions_per_minute: number;

@@ -403,12 +403,13 @@ JobParams = TypedDict('JobParams', {
     'with': 'NotRequired[With]',
 })
 
-JobState: TypeAlias = Literal['queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled']
+JobState: TypeAlias = Literal['queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled', 'expired']
 
 JobView = TypedDict('JobView', {
     'attempt': 'int',
     'certificate': 'NotRequired[Certificate | None]',
     'created': 'str',
+    'expired': 'NotRequired[str | None]',
     'finished': 'NotRequired[str | None]',
     'handed_back': 'NotRequired[int]',
     'id': 'str',
@@ -447,6 +448,7 @@ LimitCapability = TypedDict('LimitCapability', {
     'calls_per_minute': 'int',
     'cells': 'int',
     'depth': 'int',
+    'expired_hours': 'int',
     'jobs_per_key': 'int',
     'memory_bytes': 'int',
     'queued_jobs': 'int',
