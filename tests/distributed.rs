@@ -103,7 +103,7 @@ fn a_job_is_stopped_from_another_process_and_its_events_are_told_there() {
         let id = submit(&first, &long_order(number));
         let mut events = TcpStream::connect(second.address).unwrap();
         events.set_read_timeout(Some(PATIENCE)).unwrap();
-        write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: lacuna\r\n\r\n").unwrap();
+        write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: localhost\r\n\r\n").unwrap();
         until(PATIENCE, "progress", || view(&second, &id)["progress"]["phase"].is_string());
         let stopped = Instant::now();
         let answer = second.post(&format!("/v1/jobs/{id}/cancel"), &json!({}));
@@ -275,4 +275,40 @@ fn parts_of_a_service_ask_for_what_they_share() {
     let output = doctor(&[("LACUNA_DATABASE_URL", "postgres://ada:s3cret@db/lacuna"), ("LACUNA_OBJECTS_URL", "s3://parts")]);
     let words = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success() && words.contains("postgres://ada:***@db/lacuna") && !words.contains("s3cret"), "{words}");
+}
+
+#[test]
+fn a_job_that_has_expired_is_known_to_every_front_end_for_a_while() {
+    let Some(stage) = Stage::set() else { return };
+    let first = stage.start("front", "first");
+    let _worker = stage.start("worker", "one");
+    let made = first.done(&order(7));
+    assert_eq!(made["state"], "succeeded", "{made}");
+    let id = made["id"].as_str().unwrap();
+    let result = format!("/v1/results/{}", made["outputs"][0]["digest"].as_str().unwrap());
+    // One that keeps ended jobs for no time at all sweeps as it starts.
+    let second = stage.start_with("front", "second", &[("LACUNA_RETENTION_HOURS", "0")]);
+    until(PATIENCE, "expired", || view(&first, id)["state"] == "expired");
+    for front in [&first, &second] {
+        let view = view(front, id);
+        assert_eq!((&view["state"], &view["outputs"], &view["finished"]), (&json!("expired"), &made["outputs"], &made["finished"]));
+        assert!(view.get("certificate").is_none() && view["expired"].as_str() >= view["finished"].as_str(), "{view}");
+        for place in [result.clone(), format!("/v1/jobs/{id}/outputs/stl")] {
+            assert_eq!(front.get(&place).status, 410, "{place}");
+        }
+    }
+    // It is made again, and then it is there again.
+    let again = second.done(&order(7));
+    assert_eq!((&again["outputs"], &again["reused"]), (&made["outputs"], &json!(false)));
+    assert_eq!(first.get(&result).status, 200);
+    // Two have expired when the next one sweeps, which keeps one record, the younger one's.
+    let third = stage.start_with("front", "third", &[("LACUNA_RETENTION_HOURS", "0"), ("LACUNA_EXPIRED_JOBS", "1")]);
+    let younger = again["id"].as_str().unwrap();
+    until(PATIENCE, "one record", || third.get("/v1/jobs").json()["items"].as_array().is_some_and(|items| items.len() == 1));
+    assert_eq!(view(&third, younger)["state"], "expired");
+    assert_eq!((third.get(&format!("/v1/jobs/{id}")).status, third.get(&result).status), (404, 410));
+    let nothing = [("LACUNA_RETENTION_HOURS", "0"), ("LACUNA_EXPIRED_HOURS", "0")];
+    let fourth = stage.start_with("front", "fourth", &nothing);
+    until(PATIENCE, "no record", || fourth.get("/v1/jobs").json()["items"] == json!([]));
+    assert_eq!(fourth.get(&result).status, 404);
 }

@@ -210,7 +210,7 @@ fn a_result_deleted_under_a_download_is_delivered_and_then_made_again() {
     assert!(bytes > 8 << 20, "{bytes} bytes would fit into the buffers of a socket");
     let mut stream = TcpStream::connect(service.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
-    write!(stream, "GET /v1/results/{digest} HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\n\r\n").unwrap();
+    write!(stream, "GET /v1/results/{digest} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n").unwrap();
     let mut first = [0; 1024];
     stream.read_exact(&mut first).unwrap();
     fs::remove_file(scratch.join("results").join(digest.trim_start_matches("sha256:"))).unwrap();
@@ -242,7 +242,7 @@ fn slow_clients_are_sent_away_and_keep_nobody_waiting() {
         stream
     };
     let half_head = "POST /v1/jobs HTTP/1.1\r\nhost: lac";
-    let half_body = "POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\ncontent-type: application/json\r\ncontent-length: 1000\r\n\r\n{\"lac";
+    let half_body = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 1000\r\n\r\n{\"lac";
     let mut slow: Vec<(bool, TcpStream)> = (0..100).map(|k| (k % 2 == 0, open(if k % 2 == 0 { half_body } else { half_head }))).collect();
     let start = Instant::now();
     for number in 0..20 {
@@ -272,7 +272,7 @@ resource.setrlimit(resource.RLIMIT_NOFILE, (4096, resource.getrlimit(resource.RL
 port, path, count = int(sys.argv[1]), sys.argv[2], int(sys.argv[3])
 streams = [socket.create_connection(('127.0.0.1', port)) for _ in range(count)]
 for stream in streams:
-    stream.sendall(f'GET {path} HTTP/1.1\\r\\nhost: lacuna\\r\\n\\r\\n'.encode())
+    stream.sendall(f'GET {path} HTTP/1.1\\r\\nhost: localhost\\r\\n\\r\\n'.encode())
 begun = sum(stream.recv(16).startswith(b'HTTP/1.1 200') for stream in streams)
 print(begun, flush=True)
 ended = 0
@@ -321,7 +321,7 @@ fn a_service_that_is_asked_to_end_drains_and_its_jobs_go_on_at_the_next_start() 
     let address = service.address;
     let mut waiter = TcpStream::connect(address).unwrap();
     let body = small(1).to_string();
-    let head = "POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\nprefer: wait=1\r\ncontent-type: application/json";
+    let head = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\nprefer: wait=1\r\ncontent-type: application/json";
     write!(waiter, "{head}\r\ncontent-length: {}\r\n\r\n{body}", body.len()).unwrap();
     until(PATIENCE, "the third job", || service.get("/v1/jobs").json()["items"].as_array().unwrap().len() == 3);
     service.signal("TERM");

@@ -217,13 +217,13 @@ fn requests_are_answered_whatever_their_headers() {
     let digest = done["outputs"][0]["digest"].as_str().unwrap();
     let id = done["id"].as_str().unwrap();
     let seeds: Vec<Vec<u8>> = [
-        format!("GET /v1/results/{digest} HTTP/1.1\r\nhost: x\r\nrange: bytes=0-9\r\nif-range: \"{digest}\"\r\nif-none-match: W/\"a\", *\r\n"),
-        format!("GET /v1/jobs/{id}/outputs/certificate.json?redirect=0 HTTP/1.1\r\nhost: x\r\nrange: bytes=-5\r\naccept: */*;q=0\r\n"),
-        "GET /v1/jobs?state=succeeded&kind=measure&limit=2&cursor=job_1 HTTP/1.1\r\nhost: x\r\nx-request-id: a-b:c\r\n".to_owned(),
-        format!("GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: x\r\nlast-event-id: 3\r\n"),
-        "POST /v1/jobs HTTP/1.1\r\nhost: x\r\nprefer: wait=0, respond-async\r\nidempotency-key: k\r\ncontent-type: application/json\r\ncontent-length: 2\r\n".to_owned(),
-        "POST /v1/models?format=off&name=a%20b HTTP/1.1\r\nhost: x\r\ncontent-type: model/stl\r\ncontent-disposition: attachment; filename=\"a.stl\"\r\ncontent-length: 2\r\n".to_owned(),
-        "OPTIONS /v1/models HTTP/1.1\r\nhost: x\r\norigin: http://a\r\naccess-control-request-method: POST\r\n".to_owned(),
+        format!("GET /v1/results/{digest} HTTP/1.1\r\nhost: localhost\r\nrange: bytes=0-9\r\nif-range: \"{digest}\"\r\nif-none-match: W/\"a\", *\r\n"),
+        format!("GET /v1/jobs/{id}/outputs/certificate.json?redirect=0 HTTP/1.1\r\nhost: localhost\r\nrange: bytes=-5\r\naccept: */*;q=0\r\n"),
+        "GET /v1/jobs?state=succeeded&kind=measure&limit=2&cursor=job_1 HTTP/1.1\r\nhost: localhost\r\nx-request-id: a-b:c\r\n".to_owned(),
+        format!("GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: localhost\r\nlast-event-id: 3\r\n"),
+        "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\nprefer: wait=0, respond-async\r\nidempotency-key: k\r\ncontent-type: application/json\r\ncontent-length: 2\r\n".to_owned(),
+        "POST /v1/models?format=off&name=a%20b HTTP/1.1\r\nhost: localhost\r\ncontent-type: model/stl\r\ncontent-disposition: attachment; filename=\"a.stl\"\r\ncontent-length: 2\r\n".to_owned(),
+        "OPTIONS /v1/models HTTP/1.1\r\nhost: localhost\r\norigin: http://a\r\naccess-control-request-method: POST\r\n".to_owned(),
     ]
     .map(String::into_bytes)
     .into();

@@ -268,3 +268,25 @@ fn a_service_that_is_killed_leaves_no_process_behind() {
     let jobs = again.get("/v1/jobs").json();
     assert_eq!(jobs["items"].as_array().unwrap().len(), 2);
 }
+
+/// What every thread of a process gives way to others by: 19 for the most, 0 as usual.
+fn niceness(process: u32) -> Vec<i32> {
+    let tasks = std::fs::read_dir(format!("/proc/{process}/task")).unwrap();
+    let lines = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("stat")).ok());
+    // The name of the thread comes second and may hold anything; niceness is the nineteenth.
+    lines.map(|line| line.rsplit_once(") ").unwrap().1.split(' ').nth(16).unwrap().parse().unwrap()).collect()
+}
+
+#[test]
+fn every_thread_of_a_job_gives_way_to_those_that_answer() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let (_, process) = running(&service, 0, &[]);
+    let computing = niceness(process);
+    assert!(computing.len() > 2 && computing.iter().all(|nice| *nice == 19), "{computing:?}");
+    let usual = niceness(std::process::id())[0];
+    assert!(niceness(service.id()).iter().all(|nice| *nice == usual), "the service keeps its priority");
+    // A question is waited for: who answers it does not stand behind jobs.
+    let answering = service.answering();
+    assert!(!answering.is_empty() && answering.iter().flat_map(|process| niceness(*process)).all(|nice| nice == usual));
+}

@@ -181,7 +181,7 @@ fn a_body_of_100_megabytes_is_refused_without_being_kept() {
     let service = Service::start(scratch.path());
     let before = service.resident_bytes();
     let length = 100 << 20;
-    let head = format!("POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\ncontent-type: application/json\r\ncontent-length: {length}\r\n\r\n");
+    let head = format!("POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {length}\r\n\r\n");
     let mut stream = TcpStream::connect(service.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     stream.write_all(head.as_bytes()).unwrap();
@@ -207,7 +207,7 @@ fn a_truncated_upload_ends_without_a_job() {
     let service = Service::start(scratch.path());
     let body = order().to_string();
     let head =
-        format!("POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n", body.len());
+        format!("POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n", body.len());
     let answer = service.raw((head + &body[..body.len() / 2]).as_bytes(), Duration::from_secs(10));
     assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 4"), "{answer}");
     assert_eq!(service.get("/v1/jobs").json()["items"], json!([]));

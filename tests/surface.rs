@@ -336,7 +336,7 @@ fn an_answer_that_takes_too_long_is_a_problem_and_a_job_s_id_comes_before() {
     // A body that never comes, with more time for itself than for the answer.
     let mut stream = TcpStream::connect(service.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
-    let head = "POST /v1/jobs HTTP/1.1\r\nhost: lacuna\r\nconnection: close\r\nx-request-id: late-1\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{";
+    let head = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\nx-request-id: late-1\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{";
     stream.write_all(head.as_bytes()).unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).unwrap();
@@ -445,4 +445,167 @@ fn a_result_in_several_formats_comes_in_the_one_that_is_preferred() {
     assert_eq!(draw("image/svg+xml;q=0.5, text/vnd.graphviz").header("content-type"), "text/vnd.graphviz; charset=utf-8");
     let refused = draw("model/stl");
     assert_eq!((refused.status, refused.header("vary"), &refused.json()["code"]), (406, "Accept", &json!("not-acceptable")));
+}
+
+/// A request as a browser sends it for a page whose name leads to this machine.
+fn named(service: &Service, target: &str, fields: &str) -> (u16, Value) {
+    let mut stream = TcpStream::connect(service.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    write!(stream, "GET {target} HTTP/1.1\r\n{fields}connection: close\r\n\r\n").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    (head["HTTP/1.1 ".len()..][..3].parse().unwrap(), serde_json::from_str(body).unwrap_or_default())
+}
+
+#[test]
+fn without_keys_only_names_of_this_machine_are_answered() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(&scratch.join("open"), &[("LACUNA_HOST_NAMES", "cad.example, Other.Example")]);
+    let port = service.address.port();
+    for own in ["localhost", "a.localhost:1", "127.0.0.1", "127.3.2.1:80", "[::1]:80", "cad.example", "OTHER.example:8080"] {
+        assert_eq!(named(&service, "/v1/jobs", &format!("host: {own}\r\n")).0, 200, "{own}");
+    }
+    assert_eq!(named(&service, &format!("http://localhost:{port}/v1/jobs"), "host: localhost\r\n").0, 200);
+    assert_eq!(named(&service, "/v1/jobs", "").0, 200, "whoever names no host is no browser");
+    let rebound = format!("evil.example:{port}");
+    for (target, fields) in [
+        ("/v1/jobs".to_owned(), format!("host: {rebound}\r\n")),
+        ("/docs".to_owned(), format!("host: {rebound}\r\n")),
+        ("/metrics".to_owned(), format!("host: {rebound}\r\n")),
+        ("/nowhere".to_owned(), format!("host: {rebound}\r\n")),
+        ("/v1/jobs".to_owned(), format!("host: localhost\r\nhost: {rebound}\r\n")),
+        (format!("http://{rebound}/v1/jobs"), "host: localhost\r\n".to_owned()),
+    ] {
+        let (status, problem) = named(&service, &target, &fields);
+        assert_eq!((status, &problem["type"]), (421, &json!("/problems/misdirected")), "{target} {fields}");
+        for word in [rebound.as_str(), "localhost", "cad.example, other.example", "LACUNA_HOST_NAMES", "--host-names", "LACUNA_API_KEYS"] {
+            assert!(problem["detail"].as_str().unwrap().contains(word), "{word}: {problem}");
+        }
+    }
+    for probe in ["/livez", "/readyz"] {
+        assert_eq!(named(&service, probe, "host: 10.0.0.7:80\r\n").0, 200, "{probe}");
+    }
+
+    let keyed = Service::start_with(&scratch.join("keyed"), &[("LACUNA_API_KEYS", "ada")]);
+    assert_eq!(named(&keyed, "/v1/jobs", "host: any.example\r\nauthorization: Bearer ada\r\n").0, 200);
+    assert_eq!(named(&keyed, "/v1/jobs", "host: any.example\r\n").0, 401);
+
+    let told: Value = serde_json::from_slice(&succeed(["doctor", "--host-names", "a.example,b.example"])).unwrap();
+    let setting = told["settings"].as_array().unwrap().iter().find(|setting| setting["name"] == "LACUNA_HOST_NAMES").unwrap();
+    assert_eq!((&setting["value"], &setting["origin"]), (&json!("a.example, b.example"), &json!("flag")));
+    assert_eq!(run(["doctor", "--host-names", "http://a.example"]).status.code(), Some(2));
+}
+
+#[test]
+fn text_is_compressed_for_those_who_ask() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let order =
+        json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 }, "outputs": [] });
+    let view = service.done(&order);
+    let id = view["id"].as_str().unwrap();
+    let unzipped = |bytes: &[u8]| {
+        let mut zipped = std::process::Command::new("gzip");
+        let mut child = zipped.arg("-dc").stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped()).spawn().unwrap();
+        let (mut stdin, bytes) = (child.stdin.take().unwrap(), bytes.to_vec());
+        let writer = std::thread::spawn(move || stdin.write_all(&bytes).unwrap());
+        let output = child.wait_with_output().unwrap();
+        writer.join().unwrap();
+        assert!(output.status.success());
+        output.stdout
+    };
+    let gzip = [("accept-encoding", "br, gzip;q=0.8")];
+    for path in ["/v1/openapi.json", "/docs", "/metrics", "/v1/capabilities", "/v1/profiles", &format!("/v1/jobs/{id}"), "/v1/jobs"] {
+        let (plain, zipped) = (service.get(path), service.get_with(path, &gzip));
+        assert_eq!((plain.status, plain.header("content-encoding"), plain.header("vary")), (200, "", "Accept-Encoding"), "{path}");
+        assert_eq!((zipped.status, zipped.header("content-encoding"), zipped.header("vary")), (200, "gzip", "Accept-Encoding"), "{path}");
+        assert_eq!(zipped.header("content-type"), plain.header("content-type"), "{path}");
+        assert_eq!(zipped.header("content-length"), zipped.body.len().to_string(), "{path}");
+        assert!(zipped.body.len() * 10 < plain.body.len() * 8, "{path}: {} of {}", zipped.body.len(), plain.body.len());
+        if path != "/metrics" {
+            assert_eq!(unzipped(&zipped.body), plain.body, "{path}");
+            let head = service.request("HEAD", path, &gzip, b"");
+            let told = |answer: &lacuna_tests::support::service::Answer| {
+                ["content-length", "content-encoding", "vary"].map(|name| answer.header(name).to_owned())
+            };
+            assert_eq!(told(&head), told(&zipped), "{path}");
+        }
+    }
+    // A problem with a long list of findings.
+    let many: serde_json::Map<String, Value> = (0..60).map(|number| (format!("unknown_{number}"), json!(number))).collect();
+    let problem = service.post_with("/v1/jobs", &gzip, json!(many).to_string().as_bytes());
+    assert_eq!((problem.status, problem.header("content-encoding")), (422, "gzip"));
+    assert_eq!(problem.header("content-type"), "application/problem+json");
+    assert!(String::from_utf8(unzipped(&problem.body)).unwrap().contains("unknown_59"));
+
+    // What has a strong tag keeps the bytes that the tag is of; events are told one by one; what is short gains nothing.
+    let certificate = view["outputs"].as_array().unwrap().iter().find(|output| output["name"] == "certificate.json").unwrap();
+    let result = format!("/v1/results/{}", certificate["digest"].as_str().unwrap());
+    for path in [&result, "/v1/library/koch_curve", &format!("/v1/jobs/{id}/events"), "/version"] {
+        let answer = service.get_with(path, &gzip);
+        assert_eq!((answer.status, answer.header("content-encoding"), answer.header("vary")), (200, "", ""), "{path}");
+    }
+    let part = service.get_with(&result, &[gzip[0], ("range", "bytes=0-9")]);
+    assert_eq!((part.status, part.header("content-encoding"), part.body.len()), (206, "", 10));
+}
+
+#[test]
+fn a_job_that_has_expired_says_so_to_its_owner() {
+    let scratch = Scratch::new();
+    let order =
+        json!({ "lacuna": 1, "kind": "evaluate", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 }, "outputs": ["obj"] });
+    let ada = ("authorization", "Bearer ada");
+    let submit = |service: &Service| {
+        let headers = [ada, ("prefer", "wait=30"), ("idempotency-key", "k")];
+        service.post_with("/v1/jobs", &headers, order.to_string().as_bytes()).json()
+    };
+    let keys = ("LACUNA_API_KEYS", "ada,bob");
+    let made = {
+        let service = Service::start_with(scratch.path(), &[keys]);
+        submit(&service)
+    };
+    assert_eq!(made["state"], "succeeded", "{made}");
+    let place = format!("/v1/jobs/{}", made["id"].as_str().unwrap());
+    let output = format!("{place}/outputs/obj");
+    let result = format!("/v1/results/{}", made["outputs"][0]["digest"].as_str().unwrap());
+    // Jobs are kept for no time at all, so the sweep at the start lets this one expire; none comes for an hour after that.
+    let service = Service::start_with(scratch.path(), &[keys, ("LACUNA_RETENTION_HOURS", "0")]);
+    until(Duration::from_secs(20), "an expired job", || service.get_with(&place, &[ada]).json()["state"] == "expired");
+    let view = service.get_with(&place, &[ada]).json();
+    for member in ["id", "kind", "created", "started", "finished", "input_digest", "outputs"] {
+        assert_eq!(view[member], made[member], "{member}");
+    }
+    assert!(view["expired"].as_str() >= view["finished"].as_str() && view["warnings"] == json!([]), "{view}");
+    assert!(view.get("certificate").is_none() && view.get("problem").is_none(), "{view}");
+    for place in [&output, &format!("{output}?redirect=0"), &result] {
+        let gone = service.get_with(place, &[ada]);
+        assert_eq!((gone.status, &gone.json()["type"]), (410, &json!("/problems/result-expired")), "{place}");
+        assert!(gone.json()["detail"].as_str().unwrap().contains("POST /v1/jobs"), "{}", gone.json());
+        assert_eq!(service.get_with(place, &[("authorization", "Bearer bob")]).status, 404, "{place}");
+    }
+    assert_eq!(service.get_with(&format!("{place}/outputs/stl"), &[ada]).status, 404);
+    assert_eq!(service.get_with(&place, &[("authorization", "Bearer bob")]).status, 404);
+    let listed = |state: &str| service.get_with(&format!("/v1/jobs?state={state}"), &[ada]).json()["items"].as_array().unwrap().len();
+    assert_eq!((listed("expired"), listed("succeeded")), (1, 0));
+    let events = String::from_utf8(service.get_with(&format!("{place}/events"), &[ada]).body).unwrap();
+    assert!(events.contains("event: done") && events.contains("\"state\":\"expired\""), "{events}");
+    assert_eq!(service.request("POST", &format!("{place}/cancel"), &[ada], b"").json()["state"], "expired");
+
+    // The way out: the same job, with the same key even, makes it again.
+    let again = submit(&service);
+    assert_eq!((&again["state"], &again["reused"], &again["outputs"]), (&json!("succeeded"), &json!(false), &made["outputs"]));
+    assert_ne!(again["id"], made["id"]);
+    assert_eq!(service.get_with(&result, &[ada]).status, 200);
+    assert_eq!(service.request("DELETE", &place, &[ada], b"").status, 204);
+    assert_eq!(service.get_with(&place, &[ada]).status, 404);
+    let limits = service.get_with("/v1/capabilities", &[ada]).json()["limits"].clone();
+    assert_eq!((&limits["retention_hours"], &limits["expired_hours"]), (&json!(0), &json!(720)));
+    drop(service);
+
+    // Where no record is to be kept either, none is.
+    let nothing = [keys, ("LACUNA_RETENTION_HOURS", "0"), ("LACUNA_EXPIRED_HOURS", "0")];
+    let service = Service::start_with(scratch.path(), &nothing);
+    until(Duration::from_secs(20), "an absent job", || service.get_with("/v1/jobs", &[ada]).json()["items"] == json!([]));
+    assert_eq!(service.get_with(&result, &[ada]).status, 404);
 }

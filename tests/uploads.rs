@@ -241,10 +241,11 @@ fn files_that_lie_are_refused_and_leave_nothing() {
     refused(&service.request("POST", "/v1/models?colour=red", &[("content-type", "model/stl")], b"x"), 400, "colour");
 
     // Too long, said beforehand or not; and too slow.
-    let announced = "POST /v1/models HTTP/1.1\r\nhost: x\r\ncontent-type: model/stl\r\ncontent-length: 1000001\r\n\r\n";
+    let announced = "POST /v1/models HTTP/1.1\r\nhost: localhost\r\ncontent-type: model/stl\r\ncontent-length: 1000001\r\n\r\n";
     let answer = service.raw(announced.as_bytes(), Duration::from_secs(10));
     assert!(answer.starts_with("HTTP/1.1 413") && answer.contains("upload_bytes"), "{answer}");
-    let mut chunked = b"POST /v1/models HTTP/1.1\r\nhost: x\r\ncontent-type: model/stl\r\ntransfer-encoding: chunked\r\n\r\n".to_vec();
+    let mut chunked =
+        b"POST /v1/models HTTP/1.1\r\nhost: localhost\r\ncontent-type: model/stl\r\ntransfer-encoding: chunked\r\n\r\n".to_vec();
     for _ in 0..11 {
         chunked.extend_from_slice(b"186a0\r\n");
         chunked.extend(std::iter::repeat_n(b' ', 100_000));
@@ -254,7 +255,7 @@ fn files_that_lie_are_refused_and_leave_nothing() {
     assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 413"), "{answer}");
     let mut slow = TcpStream::connect(service.address).unwrap();
     slow.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    slow.write_all(b"POST /v1/models HTTP/1.1\r\nhost: x\r\ncontent-type: model/stl\r\ncontent-length: 1000\r\n\r\nsolid").unwrap();
+    slow.write_all(b"POST /v1/models HTTP/1.1\r\nhost: localhost\r\ncontent-type: model/stl\r\ncontent-length: 1000\r\n\r\nsolid").unwrap();
     let mut answer = [0_u8; 12];
     slow.read_exact(&mut answer).unwrap();
     assert_eq!(&answer, b"HTTP/1.1 408");

@@ -67,7 +67,9 @@ class Operation:
         """`json` with its schema, `events`, `bytes` or `nothing`; and what to accept."""
         good = [value for status, value in item["responses"].items() if status.startswith("2")]
         content = {name: value for response in good for name, value in response.get("content", {}).items()}
-        accepts = ", ".join([*content, "application/problem+json"])
+        # Of several files a caller without a wish gets the one that the service puts first, not the first of this list.
+        files = "application/octet-stream" in content
+        accepts = ", ".join([*(["application/octet-stream"] if files else content), "application/problem+json"])
         if not content:
             return ("nothing", None), accepts
         if "text/event-stream" in content:

@@ -102,6 +102,8 @@ pub struct Flags {
     pub role: Option<Role>,
     /// `--objects-url`.
     pub objects: Option<String>,
+    /// `--host-names`; none when nothing was said.
+    pub host_names: Vec<String>,
     /// `--log-format`.
     pub log_json: Option<bool>,
 }
@@ -131,6 +133,8 @@ pub struct Config {
     pub keys: Vec<Key>,
     /// Origins whose pages may call the service.
     pub cors_origins: Vec<String>,
+    /// Names beside those of this machine under which a service without keys answers, in lower case.
+    pub host_names: Vec<String>,
     /// Longest JSON body in bytes.
     pub body_bytes: usize,
     /// Time for a request's head, in seconds.
@@ -155,8 +159,12 @@ pub struct Config {
     pub calls_per_minute: u32,
     /// Time to end what runs when the service stops, in seconds.
     pub drain_seconds: u64,
-    /// Age at which ended jobs are forgotten, in hours.
+    /// Age at which ended jobs expire: what they made is given up; in hours.
     pub retention_hours: u64,
+    /// Time after that for which is kept that there was such a job, in hours.
+    pub expired_hours: u64,
+    /// Most expired jobs of which that is kept.
+    pub expired_jobs: usize,
     /// The most that a job may ask for; the default of what it does not ask for.
     pub job_limits: Limits,
     /// How much is logged: `error`, `warn`, `info`, `debug`, `trace` or `off`.
@@ -234,8 +242,9 @@ impl Reader<'_> {
         value
     }
 
-    fn list(&mut self, name: &'static str, secret: bool) -> Vec<String> {
-        let (text, origin) = self.stated(name).unwrap_or((String::new(), Origin::Default));
+    fn list(&mut self, name: &'static str, flag: &[String], secret: bool) -> Vec<String> {
+        let stated = self.stated(name).unwrap_or((String::new(), Origin::Default));
+        let (text, origin) = if flag.is_empty() { stated } else { (flag.join(","), Origin::Flag) };
         let items: Vec<String> = text.split(',').map(str::trim).filter(|item| !item.is_empty()).map(str::to_owned).collect();
         let value = if secret { format!("{} set", items.len()) } else { items.join(", ") };
         self.told.push(Told { name, value, origin });
@@ -281,7 +290,8 @@ impl Config {
             workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
             threads: reader.take("LACUNA_THREADS", flags.threads, 0, COUNT)?,
             keys: read_keys(&mut reader, filed_keys),
-            cors_origins: reader.list("LACUNA_CORS_ORIGINS", false),
+            cors_origins: reader.list("LACUNA_CORS_ORIGINS", &[], false),
+            host_names: read_host_names(&mut reader, flags)?,
             body_bytes: reader.take("LACUNA_BODY_BYTES", None, 8 << 20, COUNT)?,
             header_seconds: reader.take("LACUNA_HEADER_SECONDS", None, 10, COUNT)?,
             body_seconds: reader.take("LACUNA_BODY_SECONDS", None, 30, COUNT)?,
@@ -295,6 +305,8 @@ impl Config {
             calls_per_minute: reader.take("LACUNA_CALLS_PER_MINUTE", None, 6000, COUNT)?,
             drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
             retention_hours: reader.take("LACUNA_RETENTION_HOURS", None, 72, COUNT)?,
+            expired_hours: reader.take("LACUNA_EXPIRED_HOURS", None, 720, COUNT)?,
+            expired_jobs: reader.take("LACUNA_EXPIRED_JOBS", None, 10_000, COUNT)?,
             job_limits: Limits {
                 seconds: reader.take("LACUNA_LIMIT_SECONDS", None, 3600.0, "seconds are expected")?,
                 memory_bytes: reader.take("LACUNA_LIMIT_MEMORY_BYTES", None, defaults.memory_bytes, COUNT)?,
@@ -331,12 +343,25 @@ impl Config {
 
 /// Keys of the environment, which may do everything, and those of the file, which have a scope.
 fn read_keys(reader: &mut Reader<'_>, filed: Vec<Key>) -> Vec<Key> {
-    let plain = reader.list("LACUNA_API_KEYS", true);
+    let plain = reader.list("LACUNA_API_KEYS", &[], true);
     if !filed.is_empty() {
         reader.told.push(Told { name: "keys", value: format!("{} set", filed.len()), origin: Origin::File });
     }
     let plain = plain.iter().map(|key| Key { digest: Digest::of(key.as_bytes()), scope: Scope::Admin });
     plain.chain(filed).collect()
+}
+
+/// Names as a request's `Host` has them, without what else an address has: one that no request can have would silently do nothing.
+fn read_host_names(reader: &mut Reader<'_>, flags: &Flags) -> Result<Vec<String>, BadSetting> {
+    const NAME: &str = "LACUNA_HOST_NAMES";
+    let expected = "names are expected, separated by commas, without scheme, port or wildcard: cad.example,[fd00::7]";
+    let read = |item: String| {
+        let name = item.trim_end_matches('.').to_ascii_lowercase();
+        let labels = !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-._".contains(&byte));
+        let address = name.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')?.parse::<std::net::Ipv6Addr>().ok());
+        if labels || address.is_some() { Ok(name) } else { Err(BadSetting { name: NAME, value: item, expected }) }
+    };
+    reader.list(NAME, &flags.host_names, false).into_iter().map(read).collect()
 }
 
 /// The collector's address: ours, or else the name that all programs share.
@@ -458,6 +483,19 @@ mod tests {
         assert!(config.role.works() && !config.role.answers());
         assert_eq!(told.iter().find(|t| t.name == DATABASE.0).unwrap().value, "postgres://ada:***@db.example:5432/lacuna");
         assert!(!format!("{config:?}{told:?}").contains("s3cret"));
+    }
+
+    #[test]
+    fn names_of_the_host_are_names_and_nothing_else() {
+        let with = |value: &'static str| Config::read(&Flags::default(), &move |name| (name == "LACUNA_HOST_NAMES").then(|| value.into()));
+        assert_eq!(with("CAD.example., box-7,[FD00::7],10.0.0.7").unwrap().0.host_names, ["cad.example", "box-7", "[fd00::7]", "10.0.0.7"]);
+        for bad in ["http://cad.example", "cad.example:80", "*", "*.example", "a b", "[cad]", "."] {
+            assert_eq!(with(bad).unwrap_err().name, "LACUNA_HOST_NAMES", "{bad}");
+        }
+        let flags = Flags { host_names: vec!["a".into(), "b".into()], ..Flags::default() };
+        let (config, told) = Config::read(&flags, &|name| (name == "LACUNA_HOST_NAMES").then(|| "c".into())).unwrap();
+        let told = told.iter().find(|told| told.name == "LACUNA_HOST_NAMES").unwrap();
+        assert_eq!((config.host_names.len(), told.value.as_str(), told.origin), (2, "a, b", Origin::Flag));
     }
 
     #[test]

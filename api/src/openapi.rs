@@ -1,5 +1,6 @@
 //! The HTTP contract as OpenAPI 3.1: addresses from the handlers, documents from the exchange crate.
 
+use lacuna_exchange::format::FORMATS;
 use serde_json::{Value, json};
 use utoipa::ToSchema;
 
@@ -56,6 +57,12 @@ pub fn document() -> Value {
     for (name, schema) in lacuna_exchange::document::schemas("#/components/schemas/") {
         document["components"]["schemas"][name] = schema;
     }
+    // A file comes in its own media type, a certificate as JSON; `application/octet-stream` stands for all of them in `Accept`.
+    for address in ["/v1/results/{digest}", "/v1/jobs/{id}/outputs/{name}"] {
+        for media_type in FORMATS.iter().map(|facts| facts.media_type).chain(["application/json"]) {
+            document["paths"][address]["get"]["responses"]["200"]["content"][media_type] = json!({});
+        }
+    }
     document["components"]["schemas"]["ShortOrder"] = short_order(&document["components"]["schemas"]["Job"]);
     document
 }
@@ -81,6 +88,18 @@ mod tests {
     fn the_committed_contract_is_the_served_one() {
         let committed = include_str!("../openapi.json");
         assert!(committed == text(), "api/openapi.json is out of date: run `cargo run -- openapi > api/openapi.json`");
+    }
+
+    #[test]
+    fn files_are_described_in_every_media_type_that_they_come_in() {
+        let document = document();
+        for address in ["/v1/results/{digest}", "/v1/jobs/{id}/outputs/{name}"] {
+            let content = document["paths"][address]["get"]["responses"]["200"]["content"].as_object();
+            let names: Vec<&str> = content.into_iter().flatten().map(|(name, _)| name.as_str()).collect();
+            for name in ["application/octet-stream", "application/json", "model/stl", "model/3mf", "image/png", "image/svg+xml"] {
+                assert!(names.contains(&name), "{name}: {names:?}");
+            }
+        }
     }
 
     #[test]

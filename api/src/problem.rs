@@ -95,6 +95,9 @@ pub enum ProblemKind {
     /// What the service needs is away or full for now.
     #[serde(rename = "/problems/unavailable")]
     Unavailable,
+    /// The request names a host that this service does not answer for.
+    #[serde(rename = "/problems/misdirected")]
+    Misdirected,
     /// The service is going down.
     #[serde(rename = "/problems/shutting-down")]
     ShuttingDown,
@@ -130,6 +133,7 @@ impl ProblemKind {
             Self::BodyTooLarge => (413, 4, "body-too-large", "The body is too large"),
             Self::UnsupportedMedia => (415, 3, "unsupported-media", "The media type is not read here"),
             Self::Range => (416, 2, "range", "The range lies outside of the file"),
+            Self::Misdirected => (421, 5, "misdirected", "The service does not answer for this host"),
             Self::InvalidModel => (422, 3, "invalid-model", "The document is not a legal model or job"),
             Self::InvalidFile => (422, 3, "invalid-file", "The file cannot be read"),
             Self::IdempotencyMismatch => (422, 2, "idempotency-mismatch", "The key was used with another body"),
@@ -152,7 +156,7 @@ impl ProblemKind {
     }
 
     /// All kinds.
-    pub const ALL: [Self; 32] = [
+    pub const ALL: [Self; 33] = [
         Self::MalformedJson,
         Self::BadRequest,
         Self::Unauthenticated,
@@ -180,6 +184,7 @@ impl ProblemKind {
         Self::Internal,
         Self::InputOutput,
         Self::Unavailable,
+        Self::Misdirected,
         Self::ShuttingDown,
         Self::Timeout,
         Self::Usage,
@@ -294,6 +299,7 @@ impl Problem {
             413 => ProblemKind::BodyTooLarge,
             415 => ProblemKind::UnsupportedMedia,
             416 => ProblemKind::Range,
+            421 => ProblemKind::Misdirected,
             504 => ProblemKind::Timeout,
             400..500 => ProblemKind::BadRequest,
             _ => ProblemKind::Internal,

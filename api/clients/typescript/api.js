@@ -96,7 +96,7 @@ export class Api extends Transport {
   }
 
   fetchModel(id, options = {}) {
-    return this._bytes("GET", `/v1/models/${encodeURIComponent(id)}`, { accept: "application/octet-stream, application/vnd.lacuna.model+json;v=1, model/3mf, model/obj, model/stl, model/vrml, application/problem+json", signal: options.signal });
+    return this._bytes("GET", `/v1/models/${encodeURIComponent(id)}`, { accept: "application/octet-stream, application/problem+json", signal: options.signal });
   }
 
   openapi(options = {}) {

@@ -565,13 +565,14 @@ export interface JobParams {
 }
 
 /** Where a job stands. */
-export type JobState = "queued" | "running" | "cancelling" | "succeeded" | "failed" | "cancelled";
+export type JobState = "queued" | "running" | "cancelling" | "succeeded" | "failed" | "cancelled" | "expired";
 
 /** A job as its owner sees it. */
 export interface JobView {
   /** How often it was started; 2 after the service stopped during the first time. */ attempt: number;
   certificate?: Certificate | null;
   /** When it was accepted. */ created: string;
+  /** When what it made was given up, after the time for which ended jobs are kept; the digests of its outputs are still told. */ expired?: string | null;
   /** When it ended. */ finished?: string | null;
   /** How often a worker gave it back because it was told to end; those starts are not counted against the job. */ handed_back?: number;
   /** Its id. */ id: string;
@@ -625,10 +626,11 @@ export interface LimitCapability {
   /** Other calls per minute and key. */ calls_per_minute: number;
   /** Most leaf cells of a job. */ cells: number;
   /** Longest address. */ depth: number;
+  /** Hours after that for which an expired job is still known. */ expired_hours: number;
   /** Unfinished jobs that one key may have. */ jobs_per_key: number;
   /** Most accounted memory of a job, in bytes. */ memory_bytes: number;
   /** Jobs that may wait. */ queued_jobs: number;
-  /** Hours after which ended jobs are forgotten. */ retention_hours: number;
+  /** Hours after which ended jobs expire: what they made is given up. */ retention_hours: number;
   /** Most wall time of a job, in seconds. */ seconds: number;
   /** Bytes of all mesh files that one key may keep. */ stored_bytes: number;
   /** Submissions per minute and key. */ submissions_per_minute: number;
@@ -928,7 +930,7 @@ export interface Problem {
 }
 
 /** The kinds of problem, one per `/problems/` address. */
-export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/forbidden" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/not-acceptable" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/result-expired" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/precondition-failed" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/unavailable" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
+export type ProblemKind = "/problems/malformed-json" | "/problems/bad-request" | "/problems/unauthenticated" | "/problems/forbidden" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/not-acceptable" | "/problems/request-timeout" | "/problems/idempotency-in-progress" | "/problems/state-conflict" | "/problems/result-expired" | "/problems/body-too-large" | "/problems/unsupported-media" | "/problems/range" | "/problems/invalid-model" | "/problems/invalid-file" | "/problems/idempotency-mismatch" | "/problems/precondition-failed" | "/problems/unreachable" | "/problems/limit" | "/problems/too-many-jobs" | "/problems/rate-limited" | "/problems/cancelled" | "/problems/interrupted" | "/problems/internal" | "/problems/input-output" | "/problems/unavailable" | "/problems/misdirected" | "/problems/shutting-down" | "/problems/timeout" | "/problems/usage" | "/problems/check-failed" | "/problems/service-unreachable";
 
 /** A kind of problem. */
 export interface ProblemPage {

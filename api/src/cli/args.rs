@@ -590,6 +590,9 @@ pub(super) struct ServeArgs {
     /// Bucket for documents and results that several processes share.
     #[arg(long, value_name = "s3://BUCKET/FOLDER")]
     pub(super) objects_url: Option<String>,
+    /// Names beside those of this machine under which a service without keys answers, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(super) host_names: Vec<String>,
     /// Log as JSON.
     #[arg(long)]
     pub(super) log_json: bool,

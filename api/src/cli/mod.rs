@@ -71,8 +71,10 @@ fn dispatch(cli: Cli) -> Result<(), Problem> {
         },
         Command::Serve(args) => operate::serve(args),
         Command::DoJobs { threads, purpose } => {
+            // In this order: a thread takes its priority from the one that starts it, and keeps it.
+            crate::jobs::apart::take_place(purpose);
             work::use_threads(Some(threads))?;
-            crate::jobs::apart::serve(purpose)
+            crate::jobs::apart::serve()
         }
         Command::Healthcheck { url } => operate::healthcheck(url.as_deref()),
         Command::Openapi => print(crate::openapi::text().as_bytes()),

@@ -25,6 +25,7 @@ impl From<&ServeArgs> for Flags {
             threads: args.threads,
             role: args.role,
             objects: args.objects_url.clone(),
+            host_names: args.host_names.clone(),
             log_json: args.log_json.then_some(true),
         }
     }

@@ -3,7 +3,9 @@
 pub mod accept;
 pub mod auth;
 pub mod body;
+pub mod compression;
 pub mod headers;
+pub mod hosts;
 pub mod layers;
 pub mod range;
 pub mod router;

@@ -86,12 +86,16 @@ pub async fn answer(request: &HeaderMap, store: &Store, file: File, output: &Out
 fn gone(file: File, output: &Output) -> Problem {
     let name = &output.file_name;
     match file {
-        File::Result(_) => {
-            let detail = format!("{name} is no longer kept; submit its job again, and it is made again");
-            Problem::new(ProblemKind::ResultExpired, detail)
-        }
+        File::Result(_) => expired(name),
         File::Upload(_) => Problem::new(ProblemKind::NotFound, format!("{name} is no longer kept; send it again")),
     }
+}
+
+/// What a job made that is no longer kept, with the way to it.
+#[must_use]
+pub fn expired(name: &str) -> Problem {
+    let detail = format!("{name} is no longer kept; submit its job again (POST /v1/jobs with the same document), and it is made again");
+    Problem::new(ProblemKind::ResultExpired, detail)
 }
 
 fn immutable_headers(headers: &mut HeaderMap, output: &Output, etag: &str) -> Result<(), Problem> {

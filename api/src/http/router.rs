@@ -1,12 +1,12 @@
 //! The table of contents of the HTTP contract.
 
 use axum::Router;
-use axum::middleware::from_fn_with_state;
+use axum::middleware::{from_fn, from_fn_with_state};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::state::Shared;
-use super::{auth, layers};
+use super::{auth, compression, hosts, layers};
 use crate::problem::{Problem, ProblemKind};
 use crate::routes::{capabilities, docs, events, health, jobs, library, models, problems, results, shortcuts, studies, trades};
 
@@ -57,13 +57,13 @@ pub fn description() -> utoipa::openapi::OpenApi {
 /// The service as a router: addresses and layers over a state.
 pub fn router(state: Shared) -> Router {
     let (public, private) = tables();
-    layered(state, public, Some(private))
+    layered(state, public, Some(private), true)
 }
 
 /// What a worker without a front end answers: how it is.
 pub fn probes(state: Shared) -> Router {
     let public = OpenApiRouter::new().routes(routes!(health::livez)).routes(routes!(health::readyz)).routes(routes!(health::version));
-    layered(state, public, Some(OpenApiRouter::new().routes(routes!(health::metrics))))
+    layered(state, public, Some(OpenApiRouter::new().routes(routes!(health::metrics))), true)
 }
 
 /// What an address of its own answers to whoever looks after the service, without a key.
@@ -73,16 +73,18 @@ pub fn operation(state: Shared) -> Router {
         .routes(routes!(health::readyz))
         .routes(routes!(health::version))
         .routes(routes!(health::metrics));
-    layered(state, public, None)
+    // A collector of metrics comes by whatever name it has for the place, and is told nothing of anybody's.
+    layered(state, public, None, false)
 }
 
-fn layered(state: Shared, public: OpenApiRouter<Shared>, private: Option<OpenApiRouter<Shared>>) -> Router {
+fn layered(state: Shared, public: OpenApiRouter<Shared>, private: Option<OpenApiRouter<Shared>>, by_name: bool) -> Router {
     let keyed = |private| Router::from(private).route_layer(from_fn_with_state(state.clone(), auth::require_key));
-    Router::from(public)
-        .merge(private.map(keyed).unwrap_or_default())
-        .fallback(absent)
-        .method_not_allowed_fallback(not_allowed)
+    let all = Router::from(public).merge(private.map(keyed).unwrap_or_default()).fallback(absent).method_not_allowed_fallback(not_allowed);
+    let named = if by_name { all.layer(from_fn_with_state(state.clone(), hosts::require_own_name)) } else { all };
+    named
         .layer(from_fn_with_state(state.clone(), layers::observe))
+        // Around the layer that gives problems their form: they are compressed, too.
+        .layer(from_fn(compression::compress))
         .layer(from_fn_with_state(state.clone(), layers::cors))
         .with_state(state)
 }

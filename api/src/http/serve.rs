@@ -17,6 +17,7 @@ use tower::ServiceExt;
 use super::router::{operation, probes, router};
 use super::state::{AppState, Shared};
 use crate::config::Config;
+use crate::jobs::desk::Retention;
 use crate::jobs::worker;
 use crate::problem::Problem;
 use crate::traces;
@@ -142,9 +143,11 @@ fn end_workers(desk: &crate::jobs::desk::Desk, workers: Vec<std::thread::JoinHan
 }
 
 async fn sweep(state: Shared) {
-    let age = Duration::from_secs(state.config.retention_hours.saturating_mul(3600));
+    let hours = |hours: u64| Duration::from_secs(hours.saturating_mul(3600));
+    let age = hours(state.config.retention_hours);
+    let retention = Retention { jobs: age, records: hours(state.config.expired_hours), most_records: state.config.expired_jobs };
     loop {
-        match state.beside(move |state| state.desk.sweep(age)).await {
+        match state.beside(move |state| state.desk.sweep(retention)).await {
             Ok(removed) => tracing::info!(removed, "swept"),
             Err(problem) => tracing::error!(detail = %problem.detail, "not swept"),
         }

@@ -26,15 +26,19 @@ use crate::questions::{self, Question};
 /// Shortest time between two words on the progress of a phase; the service tells its listeners less often.
 const PROGRESS_EVERY: Duration = Duration::from_millis(50);
 
-/// Does jobs until nobody asks for more.
-///
-/// # Errors
-/// When stdin or stdout fails, or what comes in is not understood.
-pub fn serve(purpose: Purpose) -> Result<(), Problem> {
+/// Takes its place behind the service, before there is a second thread in this process.
+pub fn take_place(purpose: Purpose) {
     if purpose == Purpose::Jobs {
         memory::give_way();
     }
     memory::go_first();
+}
+
+/// Does jobs until nobody asks for more.
+///
+/// # Errors
+/// When stdin or stdout fails, or what comes in is not understood.
+pub fn serve() -> Result<(), Problem> {
     let (sender, heard) = mpsc::sync_channel(1);
     let listener = std::thread::Builder::new().name("listener".into()).spawn(move || listen(&sender));
     listener.map_err(|error| Problem::io("no thread to listen", &error))?;

@@ -48,6 +48,26 @@ pub struct DeskLimits {
     pub per_owner: usize,
 }
 
+/// What is kept of jobs that have ended, and how long.
+#[derive(Clone, Copy, Debug)]
+pub struct Retention {
+    /// Time for which a job is kept with all that it made.
+    pub jobs: Duration,
+    /// Time after that for which is kept that there was such a job.
+    pub records: Duration,
+    /// Most of such records; the oldest go first.
+    pub most_records: usize,
+}
+
+/// An output that an owner's job made.
+#[derive(Clone, Debug)]
+pub struct Made {
+    /// What is known of it.
+    pub output: Output,
+    /// Whether all jobs of the owner that made it have expired.
+    pub expired: bool,
+}
+
 /// Which jobs are listed.
 #[derive(Clone, Debug, Default)]
 pub struct JobFilter {
@@ -164,11 +184,11 @@ impl Desk {
         }
     }
 
-    /// The output with this digest, if one of the owner's jobs made it.
+    /// The output with this digest, if one of the owner's jobs made it; one that is kept goes before those that have expired.
     ///
     /// # Errors
     /// As [`Desk::find`].
-    pub async fn find_output(&self, owner: &str, digest: Digest) -> Result<Option<Output>, Problem> {
+    pub async fn find_output(&self, owner: &str, digest: Digest) -> Result<Option<Made>, Problem> {
         match &self.ledger {
             Ledger::Embedded(ledger) => Ok(ledger.find_output(owner, digest)),
             Ledger::Shared(ledger) => ledger.find_output(owner, digest).await,
@@ -255,14 +275,14 @@ impl Desk {
         }
     }
 
-    /// Forgets jobs that ended longer ago than `age`, then removes files that no job has. Tells how many went.
+    /// Lets jobs expire and forgets expired ones, as old as each may become, then removes files that no job has. Tells how many files went.
     ///
     /// # Errors
     /// When the ledger or the store fails.
-    pub fn sweep(&self, age: Duration) -> Result<usize, Problem> {
+    pub fn sweep(&self, retention: Retention) -> Result<usize, Problem> {
         match &self.ledger {
-            Ledger::Embedded(ledger) => ledger.sweep(age).map_err(|error| Problem::io("sweeping", &error)),
-            Ledger::Shared(ledger) => ledger.sweep(age),
+            Ledger::Embedded(ledger) => ledger.sweep(retention).map_err(|error| Problem::io("sweeping", &error)),
+            Ledger::Shared(ledger) => ledger.sweep(retention),
         }
     }
 
@@ -305,6 +325,7 @@ fn new_record(submission: Submission, document: Digest) -> JobRecord {
         created: crate::clock::now(),
         started: None,
         finished: None,
+        expired: None,
         progress: None,
         input_digest: submission.input_digest.to_string(),
         reused: false,
@@ -427,6 +448,54 @@ mod tests {
         desk.take().unwrap();
         desk.conclude(&first, &Ending::Failed(Box::new(Problem::internal("as asked"))));
         desk.submit(submission("4", None)).unwrap();
+        std::fs::remove_dir_all(root).unwrap();
+    }
+
+    fn made(desk: &Desk, owner: &str, digest: Digest) -> Option<bool> {
+        let Ledger::Embedded(ledger) = &desk.ledger else { panic!("a data folder is embedded") };
+        ledger.find_output(owner, digest).map(|made| made.expired)
+    }
+
+    #[test]
+    fn what_expires_leaves_a_small_record_for_a_while() {
+        let root = folder();
+        let desk_of = || desk(&root);
+        let desk = desk_of();
+        let digest = Digest::of(b"a file");
+        let output = Output { name: "obj".into(), file_name: "a.obj".into(), media_type: "model/obj".into(), bytes: 6, digest };
+        let answer = super::super::record::Answer { outputs: vec![output.clone()], certificate: Default::default() };
+        let finish = |body: &str| {
+            let (job, replayed) = desk.submit(submission(body, Some("k"))).unwrap();
+            assert!(!replayed);
+            desk.conclude(&desk.take().unwrap(), &Ending::Done(Box::new(answer.clone())));
+            // Times are told to the millisecond, and what is kept for no time at all is older than that.
+            std::thread::sleep(Duration::from_millis(3));
+            job.id()
+        };
+        let hour = Duration::from_secs(3600);
+        let sweep = |jobs, records, most_records| desk.sweep(Retention { jobs, records, most_records }).unwrap();
+        let first = finish("{}");
+        sweep(hour, hour, 10);
+        assert_eq!((look(&desk, "ada", &first).unwrap().state(), made(&desk, "ada", digest)), (JobState::Succeeded, Some(false)));
+        sweep(Duration::ZERO, hour, 10);
+        let record = look(&desk, "ada", &first).unwrap().record();
+        assert_eq!((record.view.state, &record.view.outputs, record.view.attempt), (JobState::Expired, &vec![output], 1));
+        assert!(record.view.finished.is_some() && record.view.expired >= record.view.finished);
+        assert!(record.view.certificate.is_none() && record.view.problem.is_none() && record.idempotency.is_none());
+        assert_eq!((made(&desk, "ada", digest), made(&desk, "bob", digest)), (Some(true), None));
+        // Its key is free, and what is made again is there again.
+        let second = finish("[]");
+        assert_ne!(first, second);
+        assert_eq!(made(&desk, "ada", digest), Some(false));
+        // It outlives the process, and no more of them than may be are kept, nor for longer.
+        assert_eq!(look(&desk_of(), "ada", &first).unwrap().record(), record);
+        sweep(Duration::ZERO, hour, 1);
+        assert!(look(&desk, "ada", &first).is_none());
+        assert_eq!(look(&desk, "ada", &second).unwrap().state(), JobState::Expired);
+        std::thread::sleep(Duration::from_millis(3));
+        sweep(Duration::ZERO, Duration::ZERO, 1);
+        assert!(look(&desk, "ada", &second).is_none() && made(&desk, "ada", digest).is_none());
+        assert_eq!(std::fs::read_dir(root.join("jobs")).unwrap().count(), 0);
         std::fs::remove_dir_all(root).unwrap();
     }
 

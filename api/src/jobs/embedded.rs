@@ -4,14 +4,13 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::io;
 use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::Duration;
 
 use lacuna_kernel::budget::StopReason;
 
-use super::desk::{DeskLimits, Gauges, JobFilter};
+use super::desk::{DeskLimits, Gauges, JobFilter, Made, Retention};
 use super::journal::Journal;
 use super::live::LiveJob;
-use super::record::{Ending, Idempotency, JobRecord, JobState, JobView, Output};
+use super::record::{Ending, Idempotency, JobRecord, JobState, JobView};
 use super::refusal;
 use crate::digest::Digest;
 use crate::problem::Problem;
@@ -219,14 +218,23 @@ impl Embedded {
         theirs.take(length).map(|job| job.view()).collect()
     }
 
-    pub(super) fn find_output(&self, owner: &str, digest: Digest) -> Option<Output> {
+    pub(super) fn find_output(&self, owner: &str, digest: Digest) -> Option<Made> {
         let book = self.book();
-        book.makers.get(&digest)?.iter().rev().find_map(|id| {
+        let all = book.makers.get(&digest)?.iter().rev().filter_map(|id| {
             book.jobs.get(id)?.with(|record| {
                 let outputs = (record.owner == owner).then_some(&record.view.outputs)?;
-                outputs.iter().find(|output| output.digest == digest).cloned()
+                let output = outputs.iter().find(|output| output.digest == digest)?.clone();
+                Some(Made { output, expired: record.view.state == JobState::Expired })
             })
-        })
+        });
+        let mut expired = None;
+        for made in all {
+            if !made.expired {
+                return Some(made);
+            }
+            expired.get_or_insert(made);
+        }
+        expired
     }
 
     pub(super) fn cancel(&self, job: &LiveJob) -> io::Result<JobView> {
@@ -369,22 +377,53 @@ impl Embedded {
         Ok(())
     }
 
-    /// Forgets jobs that ended longer ago than `age`, then removes answers and files that no job has.
-    pub(super) fn sweep(&self, age: Duration) -> io::Result<usize> {
-        let oldest = crate::clock::ago(age);
-        let jobs: Vec<Arc<LiveJob>> = self.book().jobs.values().cloned().collect();
+    /// Lets jobs expire, forgets expired ones, then removes answers and files that no other job has.
+    pub(super) fn sweep(&self, retention: Retention) -> io::Result<usize> {
+        let oldest = crate::clock::ago(retention.jobs);
+        let (jobs, _) = self.by_expiry();
         for job in &jobs {
             if job.with(|record| record.view.finished.as_ref().is_some_and(|finished| *finished < oldest)) {
+                self.expire(job)?;
+            }
+        }
+        let oldest = crate::clock::ago(retention.records);
+        let (_, expired) = self.by_expiry();
+        let surplus = expired.len().saturating_sub(retention.most_records);
+        for (place, job) in expired.iter().enumerate() {
+            if place < surplus || job.with(|record| record.view.expired.as_ref().is_none_or(|expired| *expired <= oldest)) {
                 self.forget(job)?;
             }
         }
-        let needed: HashSet<Digest> = self.book().jobs.values().map(|job| job.with(|record| record.work)).collect();
+        let needed: HashSet<Digest> = self.by_expiry().0.iter().map(|job| job.with(|record| record.work)).collect();
         self.journal.sweep(|work| needed.contains(&work))?;
         self.store.sweep(|| {
-            let book = self.book();
             let of = |job: &Arc<LiveJob>| job.with(|r| r.view.outputs.iter().map(|o| o.digest).chain([r.document]).collect::<Vec<_>>());
-            Ok(book.jobs.values().flat_map(of).collect())
+            Ok(self.by_expiry().0.iter().flat_map(of).collect())
         })
+    }
+
+    /// Jobs that have not expired, and those that have, the oldest first.
+    fn by_expiry(&self) -> (Vec<Arc<LiveJob>>, Vec<Arc<LiveJob>>) {
+        self.book().jobs.values().cloned().partition(|job| job.state() != JobState::Expired)
+    }
+
+    /// Leaves of a job that has ended what [`JobRecord::expire`] says. Its events go with the old object.
+    fn expire(&self, job: &LiveJob) -> io::Result<()> {
+        let mut record = job.record();
+        let (id, key) = (record.view.id.clone(), record.idempotency.as_ref().map(|used| (record.owner.clone(), used.key)));
+        record.expire();
+        self.journal.keep(&record)?;
+        let mut book = self.book();
+        let Some(place) = book.jobs.get_mut(&id) else {
+            // Its owner has just forgotten it.
+            drop(book);
+            return self.journal.forget(&id);
+        };
+        *place = Arc::new(LiveJob::new(record));
+        if let Some(key) = key {
+            book.keys.remove(&key);
+        }
+        Ok(())
     }
 
     pub(super) fn gauges(&self) -> Gauges {

@@ -12,7 +12,7 @@ const NICENESS: i32 = 19;
 const ROUNDING_BYTES: u64 = 32 << 20;
 
 /// Geometry takes all cores for minutes, and an answer takes one for a moment: the answer goes first. Where that is not allowed,
-/// they share.
+/// they share. On Linux this is the priority of the calling thread, and of those that it starts from then on.
 pub(super) fn give_way() {
     #[cfg(unix)]
     if let Err(error) = rustix::process::nice(NICENESS) {

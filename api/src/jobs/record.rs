@@ -28,16 +28,19 @@ pub enum JobState {
     Failed,
     /// Stopped by its owner.
     Cancelled,
+    /// Ended so long ago that nothing but this record is kept of it.
+    Expired,
 }
 
 impl JobState {
     /// All states, in the order of a job's life.
-    pub const ALL: [Self; 6] = [Self::Queued, Self::Running, Self::Cancelling, Self::Succeeded, Self::Failed, Self::Cancelled];
+    pub const ALL: [Self; 7] =
+        [Self::Queued, Self::Running, Self::Cancelling, Self::Succeeded, Self::Failed, Self::Cancelled, Self::Expired];
 
-    /// Whether nothing will change any more.
+    /// Whether the work is over.
     #[must_use]
     pub fn is_final(self) -> bool {
-        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
+        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled | Self::Expired)
     }
 
     /// The state of a word in documents.
@@ -56,6 +59,7 @@ impl JobState {
             Self::Succeeded => "succeeded",
             Self::Failed => "failed",
             Self::Cancelled => "cancelled",
+            Self::Expired => "expired",
         }
     }
 }
@@ -115,6 +119,9 @@ pub struct JobView {
     /// When it ended.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub finished: Option<String>,
+    /// When what it made was given up, after the time for which ended jobs are kept; the digests of its outputs are still told.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub expired: Option<String>,
     /// How far it has come, while it runs.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub progress: Option<Step>,
@@ -241,6 +248,21 @@ pub struct JobRecord {
     /// The span of the request that ordered it, if anybody wants traces.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub trace: Option<Context>,
+}
+
+impl JobRecord {
+    /// Leaves of it that there was such a job, when, and what it had made: document, certificate and files are given up, and its idempotency key
+    /// is free for another.
+    pub fn expire(&mut self) {
+        self.view.state = JobState::Expired;
+        self.view.expired = Some(crate::clock::now());
+        self.view.progress = None;
+        self.view.certificate = None;
+        self.view.warnings = Vec::new();
+        self.view.problem = None;
+        self.idempotency = None;
+        self.trace = None;
+    }
 }
 
 /// What finished work left, so that the same work need not be done again.

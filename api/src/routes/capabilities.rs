@@ -71,8 +71,10 @@ pub struct LimitCapability {
     submissions_per_minute: u32,
     /// Other calls per minute and key.
     calls_per_minute: u32,
-    /// Hours after which ended jobs are forgotten.
+    /// Hours after which ended jobs expire: what they made is given up.
     retention_hours: u64,
+    /// Hours after that for which an expired job is still known.
+    expired_hours: u64,
 }
 
 /// Kinds of jobs, formats and limits of this service.
@@ -105,6 +107,7 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
             submissions_per_minute: config.submissions_per_minute,
             calls_per_minute: config.calls_per_minute,
             retention_hours: config.retention_hours,
+            expired_hours: config.expired_hours,
         },
         library: CLASSICS.iter().map(|classic| classic.name).collect(),
         profiles: PROFILES.iter().map(|profile| profile.name).collect(),

@@ -5,10 +5,13 @@ use std::sync::OnceLock;
 use axum::http::header;
 use axum::response::IntoResponse;
 
+use crate::problem::Problem;
+
 /// The OpenAPI description.
 #[utoipa::path(
     get, path = "/v1/openapi.json", tag = "operation", security(()),
-    responses((status = 200, content_type = "application/json", description = "OpenAPI 3.1"))
+    responses((status = 200, content_type = "application/json", description = "OpenAPI 3.1"),
+        (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn openapi() -> impl IntoResponse {
     static TEXT: OnceLock<String> = OnceLock::new();
@@ -19,7 +22,7 @@ pub async fn openapi() -> impl IntoResponse {
 /// The description as a page that needs nothing from elsewhere.
 #[utoipa::path(
     get, path = "/docs", tag = "operation", security(()),
-    responses((status = 200, content_type = "text/html", body = String))
+    responses((status = 200, content_type = "text/html", body = String), (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn docs() -> impl IntoResponse {
     const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; base-uri 'none'; form-action 'none'";

@@ -32,7 +32,7 @@ const RETRY: Duration = Duration::from_secs(2);
     get, path = "/v1/jobs/{id}/events", operation_id = "job_events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
         ("Last-Event-ID" = Option<u64>, Header, description = "The last event that arrived")),
-    responses((status = 200, content_type = "text/event-stream", body = String),
+    responses((status = 200, content_type = "text/event-stream", description = "One event after the other, with id and name; the data of each is JSON"),
         (status = "4XX", body = Problem, content_type = "application/problem+json"))
 )]
 pub async fn events(

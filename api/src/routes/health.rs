@@ -53,7 +53,8 @@ pub async fn readyz(State(state): State<Shared>) -> Result<Json<Health>, Problem
 }
 
 /// The program's version.
-#[utoipa::path(get, path = "/version", tag = "operation", security(()), responses((status = 200, body = Version)))]
+#[utoipa::path(get, path = "/version", tag = "operation", security(()),
+    responses((status = 200, body = Version), (status = "4XX", body = Problem, content_type = "application/problem+json")))]
 pub async fn version() -> Json<Version> {
     Json(Version { name: "lacuna", version: env!("CARGO_PKG_VERSION"), api: "v1" })
 }

@@ -16,7 +16,7 @@ use crate::http::auth::Owner;
 use crate::http::headers::QueryOf;
 use crate::http::range;
 use crate::http::state::Shared;
-use crate::jobs::record::Output;
+use crate::jobs::record::{JobState, Output};
 use crate::problem::{Problem, ProblemKind};
 use crate::store::File;
 
@@ -55,7 +55,11 @@ pub async fn output(
         let detail = format!("the job is {}; its outputs are there when it has ended", view.state.word());
         return Err(Problem::new(ProblemKind::StateConflict, detail).retry_after(1));
     }
-    let output = choose(&named(&view.outputs, &name)?, query.format.as_deref(), &headers)?;
+    let there = named(&view.outputs, &name)?;
+    if view.state == JobState::Expired {
+        return Err(range::expired(&name));
+    }
+    let output = choose(&there, query.format.as_deref(), &headers)?;
     let mut response = if query.redirect == Some(0) {
         range::answer(&headers, &state.store, File::Result(output.digest), output).await?
     } else {
@@ -123,6 +127,10 @@ pub async fn result(
     let absent = || Problem::new(ProblemKind::NotFound, "no job of yours made such a result, or it is no longer kept");
     let digest: Digest = digest.parse().map_err(|_| absent())?;
     // A digest is not a permission: only who owns a job that made the bytes may read them.
-    let output = state.desk.find_output(&owner.0, digest).await?.ok_or_else(absent)?;
+    let made = state.desk.find_output(&owner.0, digest).await?.ok_or_else(absent)?;
+    if made.expired {
+        return Err(range::expired(&made.output.file_name));
+    }
+    let output = made.output;
     range::answer(&headers, &state.store, File::Result(output.digest), &output).await
 }

@@ -139,7 +139,7 @@ class Api(Transport):
 
     def fetch_model(self, id: str) -> Answer:
         """The canonical document of a model, or a mesh file as it was uploaded. `HEAD` gives the headers."""
-        return self._bytes('GET', f"/v1/models/{quote(id, safe='')}", accept='application/octet-stream, application/vnd.lacuna.model+json;v=1, model/3mf, model/obj, model/stl, model/vrml, application/problem+json')
+        return self._bytes('GET', f"/v1/models/{quote(id, safe='')}", accept='application/octet-stream, application/problem+json')
 
     def openapi(self) -> Any:
         """The OpenAPI description."""

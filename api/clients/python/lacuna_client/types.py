@@ -404,12 +404,13 @@ JobParams = TypedDict('JobParams', {
     'with': 'NotRequired[With]',
 })
 
-JobState: TypeAlias = Literal['queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled']
+JobState: TypeAlias = Literal['queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled', 'expired']
 
 JobView = TypedDict('JobView', {
     'attempt': 'int',
     'certificate': 'NotRequired[Certificate | None]',
     'created': 'str',
+    'expired': 'NotRequired[str | None]',
     'finished': 'NotRequired[str | None]',
     'handed_back': 'NotRequired[int]',
     'id': 'str',
@@ -448,6 +449,7 @@ LimitCapability = TypedDict('LimitCapability', {
     'calls_per_minute': 'int',
     'cells': 'int',
     'depth': 'int',
+    'expired_hours': 'int',
     'jobs_per_key': 'int',
     'memory_bytes': 'int',
     'queued_jobs': 'int',
@@ -676,7 +678,7 @@ Problem = TypedDict('Problem', {
     'type': 'ProblemKind',
 })
 
-ProblemKind: TypeAlias = Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/forbidden', '/problems/not-found', '/problems/method-not-allowed', '/problems/not-acceptable', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/result-expired', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/precondition-failed', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/unavailable', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']
+ProblemKind: TypeAlias = Literal['/problems/malformed-json', '/problems/bad-request', '/problems/unauthenticated', '/problems/forbidden', '/problems/not-found', '/problems/method-not-allowed', '/problems/not-acceptable', '/problems/request-timeout', '/problems/idempotency-in-progress', '/problems/state-conflict', '/problems/result-expired', '/problems/body-too-large', '/problems/unsupported-media', '/problems/range', '/problems/invalid-model', '/problems/invalid-file', '/problems/idempotency-mismatch', '/problems/precondition-failed', '/problems/unreachable', '/problems/limit', '/problems/too-many-jobs', '/problems/rate-limited', '/problems/cancelled', '/problems/interrupted', '/problems/internal', '/problems/input-output', '/problems/unavailable', '/problems/misdirected', '/problems/shutting-down', '/problems/timeout', '/problems/usage', '/problems/check-failed', '/problems/service-unreachable']
 
 ProblemPage = TypedDict('ProblemPage', {'exit_code': 'int', 'status': 'int', 'title': 'str', 'type': 'ProblemKind'})
 

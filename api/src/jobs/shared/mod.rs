@@ -16,9 +16,9 @@ use tokio::sync::Notify;
 use tokio_postgres::error::SqlState;
 use tokio_postgres::types::{ToSql, Type};
 
-use super::desk::{DeskLimits, Gauges, JobFilter};
+use super::desk::{DeskLimits, Gauges, JobFilter, Made, Retention};
 use super::live::LiveJob;
-use super::record::{Answer, Ending, JobRecord, JobState, JobView, Output};
+use super::record::{Answer, Ending, JobRecord, JobState, JobView};
 use super::refusal;
 use crate::digest::Digest;
 use crate::documents::kind_word;
@@ -223,11 +223,12 @@ impl Shared {
         self.within(asked).await
     }
 
-    pub(super) async fn find_output(&self, owner: &str, digest: Digest) -> Result<Option<Output>, Problem> {
+    pub(super) async fn find_output(&self, owner: &str, digest: Digest) -> Result<Option<Made>, Problem> {
         let asked = async {
             let client = self.pool.get().await?;
             let question = format!(
-                "SELECT {} FROM lacuna_jobs WHERE owner = $1 AND results @> ARRAY[$2::text] ORDER BY id DESC LIMIT 1",
+                "SELECT {} FROM lacuna_jobs WHERE owner = $1 AND results @> ARRAY[$2::text]
+                ORDER BY state = 'expired', id DESC LIMIT 1",
                 rows::COLUMNS
             );
             let row = client.query_typed_opt(&question, &[(&owner, Type::TEXT), (&digest.hex(), Type::TEXT)]).await?;
@@ -235,7 +236,11 @@ impl Shared {
             row.map(|row| rows::read(&row)).transpose()
         };
         let found = self.within(asked).await?;
-        Ok(found.and_then(|(record, _)| record.view.outputs.into_iter().find(|output| output.digest == digest)))
+        Ok(found.and_then(|(record, _)| {
+            let expired = record.view.state == JobState::Expired;
+            let output = record.view.outputs.into_iter().find(|output| output.digest == digest)?;
+            Some(Made { output, expired })
+        }))
     }
 
     pub(super) async fn gauges(&self) -> Result<Gauges, Problem> {
@@ -388,17 +393,18 @@ impl Shared {
         self.runtime.block_on(self.within(asked))
     }
 
-    /// Forgets jobs that ended longer ago than `age`, then the answers and files that no job has.
-    pub(super) fn sweep(&self, age: Duration) -> Result<usize, Problem> {
+    /// Lets jobs expire, forgets expired ones, then the answers and files that no other job has.
+    pub(super) fn sweep(&self, retention: Retention) -> Result<usize, Problem> {
+        while self.runtime.block_on(self.within(self.expire_some(retention.jobs)))? > 0 {}
         let forgotten = async {
             let client = self.pool.get().await?;
-            let old = "now() - $1 * interval '1 second'";
-            client.execute(&format!("DELETE FROM lacuna_jobs WHERE finished < {old}"), &[&age.as_secs_f64()]).await?;
-            let statement = format!(
-                "DELETE FROM lacuna_answers WHERE made < {old}
-                AND NOT EXISTS (SELECT FROM lacuna_jobs WHERE lacuna_jobs.work = lacuna_answers.work)"
-            );
-            client.execute(&statement, &[&age.as_secs_f64()]).await?;
+            let most = i64::try_from(retention.most_records).unwrap_or(i64::MAX);
+            let statement = "DELETE FROM lacuna_jobs WHERE state = 'expired' AND (finished <= now() - $1 * interval '1 second'
+                OR id IN (SELECT id FROM lacuna_jobs WHERE state = 'expired' ORDER BY id DESC OFFSET $2))";
+            client.execute_typed(statement, &[(&retention.records.as_secs_f64(), Type::FLOAT8), (&most, Type::INT8)]).await?;
+            let statement = "DELETE FROM lacuna_answers WHERE made < now() - $1 * interval '1 second' AND NOT EXISTS
+                (SELECT FROM lacuna_jobs WHERE lacuna_jobs.work = lacuna_answers.work AND state <> 'expired')";
+            client.execute_typed(statement, &[(&retention.jobs.as_secs_f64(), Type::FLOAT8)]).await?;
             client.done();
             Ok(())
         };
@@ -411,11 +417,39 @@ impl Shared {
         self.store.sweep(needed).map_err(|error| Problem::io("sweeping", &error))
     }
 
+    /// Lets some jobs expire that ended longer ago than `age`, no more than are done well within the time for a question; tells how many.
+    async fn expire_some(&self, age: Duration) -> Result<usize, Failure> {
+        let mut client = self.pool.get().await?;
+        let transaction = client.transaction().await?;
+        let question = format!(
+            "SELECT id, {} FROM lacuna_jobs WHERE finished < now() - $1 * interval '1 second' AND state <> 'expired'
+            ORDER BY finished LIMIT 100 FOR UPDATE SKIP LOCKED",
+            rows::COLUMNS
+        );
+        let old = transaction.query_typed(&question, &[(&age.as_secs_f64(), Type::FLOAT8)]).await?;
+        for row in &old {
+            match rows::read(row) {
+                Ok((mut record, _)) => {
+                    record.expire();
+                    rows::expire(&transaction, &record).await?;
+                }
+                Err(_) => {
+                    let id: &str = row.get("id");
+                    tracing::error!(job = %id, "a record that cannot be read is forgotten: it is too old to be kept");
+                    transaction.execute_typed("DELETE FROM lacuna_jobs WHERE id = $1", &[(&id, Type::TEXT)]).await?;
+                }
+            }
+        }
+        transaction.commit().await?;
+        client.done();
+        Ok(old.len())
+    }
+
     async fn needed(&self) -> Result<HashSet<Digest>, Failure> {
         let client = self.pool.get().await?;
         let digest = |hex: &str| format!("sha256:{hex}").parse::<Digest>().ok();
         let mut needed = HashSet::new();
-        for row in client.query("SELECT document, results FROM lacuna_jobs", &[]).await? {
+        for row in client.query("SELECT document, results FROM lacuna_jobs WHERE state <> 'expired'", &[]).await? {
             needed.extend(digest(row.get(0)));
             needed.extend(row.get::<_, Vec<&str>>(1).into_iter().filter_map(digest));
         }

@@ -82,6 +82,23 @@ pub(super) async fn update(transaction: &Transaction<'_>, record: &JobRecord, le
     Ok(())
 }
 
+/// Leaves of a job what [`JobRecord::expire`] says, and tells of it; from then on `finished` is the time of that.
+pub(super) async fn expire(transaction: &Transaction<'_>, record: &JobRecord) -> Result<(), Failure> {
+    let statement =
+        "UPDATE lacuna_jobs SET state = $2, record = $3, idempotency_key = NULL, progress = NULL, revision = revision + 1, finished = now()
+        WHERE id = $1 RETURNING pg_notify($4, $5)::text";
+    let view = &record.view;
+    let values: [(&(dyn ToSql + Sync), Type); 5] = [
+        (&view.id, Type::TEXT),
+        (&view.state.word(), Type::TEXT),
+        (&serde_json::to_string(record)?, Type::TEXT),
+        (&CHANNEL, Type::TEXT),
+        (&told(view), Type::TEXT),
+    ];
+    transaction.query_typed(statement, &values).await?;
+    Ok(())
+}
+
 /// What the same work left.
 pub(super) async fn keep_answer(transaction: &Transaction<'_>, record: &JobRecord, answer: &Answer) -> Result<(), Failure> {
     let statement = "INSERT INTO lacuna_answers (work, answer) VALUES ($1, $2)

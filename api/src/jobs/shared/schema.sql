@@ -21,6 +21,7 @@ CREATE TABLE lacuna_jobs (
     results text[] NOT NULL DEFAULT '{}',
     -- When the worker that is at it counts as gone.
     lease_until timestamptz,
+    -- When it ended, or expired.
     finished timestamptz
 );
 
