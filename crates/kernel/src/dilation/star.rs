@@ -490,7 +490,7 @@ mod tests {
                 let mut below = point(&mut random, 0.9);
                 below[2] = -0.4 + 0.6 * number(&mut random);
                 let end = point(&mut random, 0.5);
-                let site = if random.next() % 2 == 0 {
+                let site = if random.next().is_multiple_of(2) {
                     Site::Point(below)
                 } else {
                     Site::Segment([below, std::array::from_fn(|axis| below[axis] + end[axis])])
@@ -501,7 +501,7 @@ mod tests {
                 let closest = site.closest(&[0.0; 3]);
                 star.see(*site, &closest, site.distance_squared(&[0.0; 3]));
             }
-            let direction = star.outwards(&setting, random.next() % 2 == 0);
+            let direction = star.outwards(&setting, random.next().is_multiple_of(2));
             let by_direction = star.follows(&setting, &direction);
             if !by_direction && !star.grows(&setting) {
                 refused += 1;
