@@ -18,7 +18,7 @@ use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::star::{Stars, note};
+use super::star::{Star, Stars, note};
 use super::surface::{BlockSurface, NameMap, Seam, UNNAMED, VertexName};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
@@ -131,7 +131,6 @@ pub(super) struct Workshop<'a> {
     seed: Option<NodeId>,
     outside: Outside,
     found: Vec<SiteId>,
-    seen: Vec<(SiteId, Point, f64)>,
     nearby: Vec<Nearby>,
     polygon: Vec<u16>,
     corners: Vec<u32>,
@@ -175,7 +174,6 @@ impl<'a> Workshop<'a> {
             seed: None,
             outside: Outside::default(),
             found: Vec::new(),
-            seen: Vec::new(),
             nearby: Vec::new(),
             polygon: Vec::new(),
             corners: Vec::new(),
@@ -357,14 +355,21 @@ impl<'a> Workshop<'a> {
                 star.add(setting, corners, surface.normals[triangle as usize]);
             }
             let centre = star.centre;
-            let reach = setting.outer + star.radius();
-            self.seen.clear();
-            self.tree.visit_near(&centre, &self.near, reach, |id, closest, square| self.seen.push((id, *closest, square)));
-            self.seen.iter().for_each(|(id, closest, square)| star.see(self.tree.site(*id), closest, *square));
             let is_shared = self.stars.shared[vertex as usize];
-            let direction = star.outwards(setting, !is_shared);
-            if star.follows(setting, &direction) {
-                continue;
+            if is_shared {
+                see(&mut self.tree, &self.near, setting.outer, star, &mut self.found);
+            }
+            let direction = if is_shared { star.outwards(setting, false) } else { star.normal() };
+            if star.leaves(setting, &direction) {
+                // Most sites lie below all of the star, and most nodes.
+                star.forget_sites();
+                let (reach, lowest) = (setting.outer + star.radius(), star.lowest(setting, &direction));
+                self.found.clear();
+                self.tree.collect_above(&centre, &self.near, reach, &direction, lowest, &mut self.found);
+                self.found.iter().for_each(|&id| star.see(self.tree.site(id)));
+                if star.follows(setting, &direction) {
+                    continue;
+                }
             }
             if is_shared {
                 // Triangles of other blocks reach no farther than a tetrahedron.
@@ -379,7 +384,13 @@ impl<'a> Workshop<'a> {
                     })
                 };
                 surface.seams.push(Seam { name: surface.names[vertex as usize], sites: self.found.iter().map(number).collect() });
-            } else if !star.grows(setting) {
+                continue;
+            }
+            star.forget_sites();
+            let reach = setting.outer + star.radius();
+            see(&mut self.tree, &self.near, reach, star, &mut self.found);
+            let direction = star.outwards(setting, true);
+            if !(star.leaves(setting, &direction) && star.follows(setting, &direction)) && !star.grows(setting) {
                 note(setting, grading, &centre, &mut surface.critical, &mut surface.uncertain);
             }
         }
@@ -875,6 +886,13 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     let mut ends = (0..4).filter(|k| (faces | first ^ second) >> k & 1 == 0);
     let [p, q] = [ends.next()?, ends.next()?].map(|k| (k, values[k]));
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
+}
+
+/// Shows a star the sites that are within `reach` of its centre.
+fn see(tree: &mut Tree<'_>, near: &[NodeId], reach: f64, star: &mut Star, found: &mut Vec<SiteId>) {
+    found.clear();
+    tree.collect(&star.centre, near, reach, found);
+    found.iter().for_each(|&id| star.see(tree.site(id)));
 }
 
 /// The unit vector along which an affine function with these values grows.

@@ -34,23 +34,22 @@ pub(super) struct Star {
     bulge: f64,
     /// The sites that may be nearest to points of the star, and others.
     pub(super) sites: Vec<Weighted>,
-    /// Where they are seen from the centre: from their closest points, and at which squared distances.
-    views: Vec<(Point, f64)>,
     scratch: Scratch,
 }
 
-/// What is asked of one simplex.
+/// What is asked of one simplex, or of a star.
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Squared distances of the corners from the sites.
+    /// Of every site: the closest points to the corners, their squared distances, and whether y - c(y) is affine.
+    points: Vec<Point>,
     squares: Vec<f64>,
+    affine: Vec<bool>,
     /// Normals, and y - c where it is affine.
     vectors: Vec<Point>,
     /// Closest points of sites for which it is not.
     closest: Vec<Point>,
     /// Where each site's begin.
     groups: Vec<usize>,
-    own: Vec<Point>,
 }
 
 impl Star {
@@ -62,13 +61,20 @@ impl Star {
         self.triangles.clear();
         self.bulge = 0.0;
         self.sites.clear();
-        self.views.clear();
     }
 
-    /// Adds a site, with its closest point to the centre and that one's squared distance.
-    pub(super) fn see(&mut self, site: Weighted, closest: &Point, square: f64) {
+    /// Adds a site.
+    pub(super) fn see(&mut self, site: Weighted) {
         self.sites.push(site);
-        self.views.push((subtract(&self.centre, closest), square));
+    }
+
+    pub(super) fn forget_sites(&mut self) {
+        self.sites.clear();
+    }
+
+    /// The mean of the normals, a unit vector where they have one.
+    pub(super) fn normal(&self) -> Point {
+        unit(&self.triangles.iter().fold([0.0; 3], |sum, (_, normal)| std::array::from_fn(|axis| sum[axis] + normal[axis])))
     }
 
     /// Adds a triangle with the centre as a corner.
@@ -91,12 +97,13 @@ impl Star {
         self.corners.iter().map(|corner| distance_squared(corner, &self.centre)).fold(0.0, f64::max).sqrt()
     }
 
-    /// A direction along which the distance grows at the centre. Without the triangles' normals it does not depend on what triangles are given, and is the same in all blocks.
+    /// A unit vector along which the distance grows at the centre, as far as the sites seen tell. Without the triangles' normals it does not depend on what triangles are given, and is the same in all blocks.
     pub(super) fn outwards(&mut self, setting: &Setting, with_normals: bool) -> Point {
         let most = setting.outer * setting.outer;
         let vectors = &mut self.scratch.vectors;
         vectors.clear();
-        vectors.extend(self.views.iter().filter(|(_, square)| *square <= most).map(|(away, _)| *away));
+        let near = self.sites.iter().filter(|site| site.distance_squared(&self.centre) <= most);
+        vectors.extend(near.map(|site| subtract(&self.centre, &site.closest(&self.centre))));
         if with_normals {
             vectors.extend(self.triangles.iter().map(|(_, normal)| *normal));
         } else {
@@ -111,34 +118,39 @@ impl Star {
             let lowest = vectors.iter().min_by(|a, b| dot(a, direction).total_cmp(&dot(b, direction)));
             lowest.copied().unwrap_or(nearest)
         };
-        parting(nearest, 0.0, lowest, |direction, lowest| dot(direction, lowest) > 0.9 * dot(direction, direction)).unwrap_or(nearest)
+        let found = parting(nearest, 0.0, lowest, |direction, lowest| dot(direction, lowest) > 0.9 * dot(direction, direction));
+        unit(&found.unwrap_or(nearest))
     }
 
-    /// Whether a direction serves all points of the star.
+    /// Whether a unit vector leaves all triangles.
+    pub(super) fn leaves(&self, setting: &Setting, direction: &Point) -> bool {
+        self.triangles.iter().all(|(_, normal)| dot(normal, direction) > LEAST * setting.reach)
+    }
+
+    /// Points lower than this along a unit vector are surely left behind by it at all points of the star.
+    pub(super) fn lowest(&self, setting: &Setting, direction: &Point) -> f64 {
+        self.corners.iter().map(|corner| dot(corner, direction)).fold(f64::INFINITY, f64::min) - LEAST * setting.reach
+    }
+
+    /// Whether the distance grows along a unit vector at all points of the star, as far as the sites seen may be nearest.
     pub(super) fn follows(&mut self, setting: &Setting, direction: &Point) -> bool {
-        let length = dot(direction, direction).sqrt();
-        let least = LEAST * setting.reach * length;
-        // y less its closest point in a convex set moves no farther than y does.
-        let enough = least + self.radius() * length;
-        if self.triangles.iter().any(|(_, normal)| dot(normal, direction) <= least) {
-            return false;
-        }
-        let Self { corners, sites, views, scratch, bulge, .. } = self;
-        for index in (0..sites.len()).filter(|&index| dot(&views[index].0, direction) <= enough) {
-            scratch.own.clear();
-            let is_affine = closest_to(&sites[index].site, corners, &mut scratch.own);
-            let along = |point: &Point| dot(point, direction);
-            let lowest = if is_affine {
-                corners.iter().zip(&scratch.own).map(|(corner, closest)| along(&subtract(corner, closest))).fold(f64::INFINITY, f64::min)
+        let least = LEAST * setting.reach;
+        let Self { corners, sites, scratch, bulge, .. } = self;
+        scratch.measure(sites, corners);
+        let count = corners.len();
+        let along = |point: &Point| dot(point, direction);
+        (0..sites.len()).filter(|&index| scratch.may_be_nearest(index, count, *bulge)).collect::<Vec<_>>().into_iter().all(|index| {
+            let own = &scratch.points[index * count..][..count];
+            let lowest = if scratch.affine[index] {
+                corners.iter().zip(own).map(|(corner, closest)| along(&subtract(corner, closest))).fold(f64::INFINITY, f64::min)
             } else {
+                scratch.closest.clear();
+                add_closest(&sites[index].site, corners, &mut scratch.closest);
                 let lowest = corners.iter().map(along).fold(f64::INFINITY, f64::min);
-                lowest - scratch.own.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
+                lowest - scratch.closest.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
             };
-            if lowest <= least && scratch.may_be_nearest(sites, index, corners, *bulge) {
-                return false;
-            }
-        }
-        true
+            lowest > least
+        })
     }
 
     /// Whether there are directions for all points of the star, one or several.
@@ -160,6 +172,11 @@ impl Star {
                 .iter()
                 .all(|([p, q], normal)| scratch.settle(sites, &[*centre, corners[*p], corners[*q]], &[*normal], least, &mut work))
     }
+}
+
+fn unit(vector: &Point) -> Point {
+    let length = dot(vector, vector).sqrt().max(f64::MIN_POSITIVE);
+    vector.map(|part| part / length)
 }
 
 /// A bound of R^2 for a simplex of up to three corners: the smallest ball around a triangle has at most a third of the longest side's square.
@@ -259,9 +276,8 @@ impl Scratch {
     fn settle(&mut self, sites: &[Weighted], corners: &[Point], normals: &[Point], least: f64, work: &mut usize) -> bool {
         let Some(left) = work.checked_sub(1) else { return false };
         *work = left;
-        let bulge = bulge(corners);
-        let near: Vec<Weighted> =
-            (0..sites.len()).filter(|&index| self.may_be_nearest(sites, index, corners, bulge)).map(|index| sites[index]).collect();
+        let mut near = sites.to_vec();
+        self.narrow(&mut near, corners, bulge(corners));
         if self.avoid_origin(&near, corners, normals, least) {
             return true;
         }
@@ -277,23 +293,24 @@ impl Scratch {
         })
     }
 
-    /// Whether one direction serves all points in the hull of some corners.
+    /// Whether one direction serves all points in the hull of some corners, where all sites were measured.
     fn avoid_origin(&mut self, sites: &[Weighted], corners: &[Point], normals: &[Point], least: f64) -> bool {
         self.vectors.clear();
         self.vectors.extend_from_slice(normals);
         self.closest.clear();
         self.groups.clear();
-        let mut start = None;
-        for site in sites {
-            self.own.clear();
-            if closest_to(&site.site, corners, &mut self.own) {
-                self.vectors.extend(corners.iter().zip(&self.own).map(|(corner, closest)| subtract(corner, closest)));
+        let count = corners.len();
+        for (index, site) in sites.iter().enumerate() {
+            if self.affine[index] {
+                let own = &self.points[index * count..][..count];
+                self.vectors.extend(corners.iter().zip(own).map(|(corner, closest)| subtract(corner, closest)));
             } else {
                 self.groups.push(self.closest.len());
-                self.closest.extend_from_slice(&self.own);
+                add_closest(&site.site, corners, &mut self.closest);
             }
-            start = start.or(Some(subtract(&corners[0], &self.own[0])));
         }
+        let start =
+            corners.first().zip(self.points.first()).filter(|_| !sites.is_empty()).map(|(corner, closest)| subtract(corner, closest));
         let Some(start) = start else { return true };
         let lowest = |direction: &Point, backwards: &Point| {
             let ends = self.groups.iter().skip(1).copied().chain([self.closest.len()]);
@@ -305,34 +322,47 @@ impl Scratch {
         avoids_origin(start, lowest, &self.vectors, least)
     }
 
-    /// Keeps the sites that may be nearest to a point of simplices with these corners, R^2 of which is at most `bulge`.
-    fn narrow(&mut self, sites: &mut Vec<Weighted>, corners: &[Point], bulge: f64) {
-        let ends = |site: &Weighted| {
-            let squares = corners.iter().map(|corner| site.distance_squared(corner));
-            squares.fold((f64::INFINITY, 0.0_f64), |(low, high), square| (low.min(square), high.max(square)))
-        };
-        let most = sites.iter().map(|site| ends(site).1).fold(f64::INFINITY, f64::min);
-        sites.retain(|site| ends(site).0 * (1.0 - 1e-12) <= most + bulge);
-        let near: Vec<bool> = (0..sites.len()).map(|index| self.may_be_nearest(sites, index, corners, bulge)).collect();
-        let mut near = near.into_iter();
-        sites.retain(|_| near.next() == Some(true));
+    /// Finds the closest points of all sites.
+    fn measure(&mut self, sites: &[Weighted], corners: &[Point]) {
+        self.points.clear();
+        self.squares.clear();
+        self.affine.clear();
+        for site in sites {
+            let first = self.points.len();
+            self.affine.push(closest_to(&site.site, corners, &mut self.points));
+            let own = corners.iter().zip(&self.points[first..]);
+            self.squares.extend(own.map(|(corner, closest)| distance_squared(corner, closest) + site.deficit));
+        }
     }
 
-    /// Whether a site may be the nearest to a point of simplices with these corners, R^2 of which is at most `bulge`: no other is nearer by that at all of them.
-    fn may_be_nearest(&mut self, sites: &[Weighted], index: usize, corners: &[Point], bulge: f64) -> bool {
-        self.squares.clear();
-        self.squares.extend(corners.iter().map(|corner| sites[index].distance_squared(corner) * (1.0 - 1e-12) - bulge));
-        let is_nearer =
-            |other: &Weighted| corners.iter().zip(&self.squares).all(|(corner, square)| other.distance_squared(corner) < *square);
-        !sites.iter().any(is_nearer)
+    /// Keeps the sites that may be nearest to a point of simplices with these corners, R^2 of which is at most `bulge`, and measures them.
+    fn narrow(&mut self, sites: &mut Vec<Weighted>, corners: &[Point], bulge: f64) {
+        self.measure(sites, corners);
+        let near: Vec<bool> = (0..sites.len()).map(|index| self.may_be_nearest(index, corners.len(), bulge)).collect();
+        let mut keeps = near.iter().copied();
+        sites.retain(|_| keeps.next() == Some(true));
+        let mut kept = 0;
+        for index in (0..near.len()).filter(|&index| near[index]) {
+            let count = corners.len();
+            self.points.copy_within(index * count..(index + 1) * count, kept * count);
+            self.affine[kept] = self.affine[index];
+            kept += 1;
+        }
+    }
+
+    /// Whether a site that was measured may be the nearest to a point of simplices with these corners, R^2 of which is at most `bulge`: no other is nearer by that at all of them.
+    fn may_be_nearest(&self, index: usize, count: usize, bulge: f64) -> bool {
+        let own = &self.squares[index * count..][..count];
+        let is_nearer = |other: &[f64]| other.iter().zip(own).all(|(other, own)| *other < *own * (1.0 - 1e-12) - bulge);
+        !self.squares.chunks_exact(count).any(is_nearer)
     }
 }
 
-/// The closest points of a site to some corners, where y - c(y) is affine in their hull; else points whose hull holds all closest points.
+/// Adds the closest points of a site to some corners, and tells whether y - c(y) is affine in their hull.
 fn closest_to(site: &Site, corners: &[Point], closest: &mut Vec<Point>) -> bool {
     match site {
         Site::Point(point) => {
-            closest.resize(corners.len(), *point);
+            closest.extend(corners.iter().map(|_| *point));
             true
         }
         Site::Segment(ends) => {
@@ -347,16 +377,12 @@ fn closest_to(site: &Site, corners: &[Point], closest: &mut Vec<Point>) -> bool 
             })
         }
         Site::Triangle([a, b, c]) => {
-            let mut same = None;
-            let is_affine = corners.iter().all(|corner| {
+            let (mut same, mut is_affine) = (None, true);
+            closest.extend(corners.iter().map(|corner| {
                 let (point, feature) = closest_feature(corner, a, b, c);
-                closest.push(point);
-                *same.get_or_insert(feature) == feature
-            });
-            if !is_affine {
-                closest.clear();
-                add_closest(site, corners, closest);
-            }
+                is_affine &= *same.get_or_insert(feature) == feature;
+                point
+            }));
             is_affine
         }
     }
@@ -415,6 +441,10 @@ mod tests {
             let site = site(&mut random, 1.0);
             let mut closest = Vec::new();
             let is_affine = closest_to(&site, &corners, &mut closest);
+            if !is_affine {
+                closest.clear();
+                add_closest(&site, &corners, &mut closest);
+            }
             affine += usize::from(is_affine);
             for _ in 0..8 {
                 let y = mean(&mut random, &corners);
@@ -497,12 +527,12 @@ mod tests {
                 };
                 sites.push(Weighted { site, deficit: 0.0 });
             }
-            for site in &sites {
-                let closest = site.closest(&[0.0; 3]);
-                star.see(*site, &closest, site.distance_squared(&[0.0; 3]));
-            }
-            let direction = star.outwards(&setting, random.next().is_multiple_of(2));
-            let by_direction = star.follows(&setting, &direction);
+            sites.iter().for_each(|site| star.see(*site));
+            let direction = match random.next() % 3 {
+                0 => star.normal(),
+                code => star.outwards(&setting, code == 1),
+            };
+            let by_direction = star.leaves(&setting, &direction) && star.follows(&setting, &direction);
             if !by_direction && !star.grows(&setting) {
                 refused += 1;
                 continue;

@@ -6,8 +6,9 @@
 //! `slack` of the best distance, and among equal distances the lexicographically first closest point wins.
 //! So blocks agree on shared lattice vertices, and results do not depend on the number of threads.
 
+use super::certificate::highest;
 use crate::attractor::Attractor;
-use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared};
+use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared, dot};
 use crate::attractor::sites::{SiteError, SiteRule};
 
 /// A cell with its control points, as a candidate for holding the nearest site.
@@ -397,6 +398,49 @@ impl<'a> Tree<'a> {
     /// All sites below `starts` that are within `reach` of x.
     pub(super) fn collect(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<SiteId>) {
         self.visit_near(x, starts, reach, |id, _, _| found.push(id));
+    }
+
+    /// All sites below `starts` that are within `reach` of x and reach higher than `lowest` along a unit vector.
+    pub(super) fn collect_above(
+        &mut self,
+        x: &Point,
+        starts: &[NodeId],
+        reach: f64,
+        direction: &Point,
+        lowest: f64,
+        found: &mut Vec<SiteId>,
+    ) {
+        let mut stack = std::mem::take(&mut self.stack);
+        stack.clear();
+        stack.extend_from_slice(starts);
+        let limit = (reach + self.slack).powi(2);
+        let lowest = lowest - self.slack;
+        while let Some(id) = stack.pop() {
+            let node = &self.nodes[id as usize];
+            let threshold = self.threshold(id, reach);
+            if dot(&node.centre, direction) + node.radius < lowest || distance_squared(x, &node.centre) > threshold * threshold {
+                continue;
+            }
+            let deficit = self.deficit(id);
+            match node.content {
+                Content::Points(first, count) => found.extend((first..first + count).map(SiteId::Point).filter(|&id| {
+                    let (SiteId::Point(index) | SiteId::Listed(index)) = id;
+                    let point = &self.point_sites[index as usize];
+                    dot(point, direction) >= lowest && distance_squared(x, point) + deficit <= limit
+                })),
+                Content::Sites(first, count) => found.extend((first..first + count).map(SiteId::Listed).filter(|&id| {
+                    let (SiteId::Point(index) | SiteId::Listed(index)) = id;
+                    let site = &self.sites[index as usize];
+                    highest(site, direction) >= lowest && site.distance_squared(x) + deficit <= limit
+                })),
+                Content::Open(first, count) => stack.extend(first..first + count),
+                Content::Closed(points) => {
+                    let (first, count) = self.expand(id, points);
+                    stack.extend(first..first + count);
+                }
+            }
+        }
+        self.stack = stack;
     }
 
     /// Calls `visit` with all sites below `starts` that are within `reach` of x, their closest points and squared distances.
