@@ -1,4 +1,4 @@
-//! Every solid case as STL and 3MF, read back by libraries that we did not write (`independent/check.py`).
+//! Every solid case as STL and 3MF, and sections of solids, read back by libraries that we did not write (`independent/check.py`).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -221,5 +221,105 @@ fn the_judge_does_not_read_rubbish() {
         let file = scratch.join(name);
         fs::write(&file, "rubbish").unwrap();
         assert!(judge.report(&file, false).get("problem").is_some(), "{name}");
+    }
+}
+
+/// What is wrong with drawn sections, as trimesh and shapely see them.
+///
+/// Both programs take a corner as p + t (q - p) of the same single-precision ends, with t from differences of heights that are rounded once: a few roundings of the greatest
+/// coordinate, so outlines lie within 16 of them of each other, and the area between them within that times the perimeter.
+fn judge_sections(name: &str, report: &Value, count: usize, found: &mut Findings) {
+    let sections = report["sections"].as_array().map_or(&[][..], Vec::as_slice);
+    found.expect(sections.len() == count, || format!("{name}: {count} sections were asked for: {report}"));
+    let size = [0, 1].iter().flat_map(|&end| (0..3).map(move |axis| number(&report["box"][end][axis]).abs())).fold(0.0, f64::max);
+    for section in sections {
+        let (ours, theirs) = (&section["ours"], &section["theirs"]);
+        let same = ["outlines", "holes", "valid"].iter().all(|what| ours[what] == theirs[what]) && ours["valid"] == true;
+        found.expect(same, || format!("{name}: other outlines: {section}"));
+        let allowed = 16.0 * f64::EPSILON * size * number(&theirs["perimeter"]);
+        found.expect(number(&section["apart"]) <= allowed, || format!("{name}: more than {allowed} mm2 apart: {section}"));
+    }
+}
+
+/// Draws sections of a mesh file across Z.
+fn slice(file: &Path, heights: &[f64], drawing: &Path) {
+    let at = format!("--at={}", heights.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+    let words = ["slice", "--tolerance", "0.001", &at, "-o"].map(std::ffi::OsStr::new);
+    succeed(words.into_iter().chain([drawing.as_os_str(), file.as_os_str()]));
+}
+
+const OCTAHEDRON: [[f64; 3]; 6] = [[4., 0., 0.], [0., 4., 0.], [-4., 0., 0.], [0., -4., 0.], [0., 0., 4.], [0., 0., -4.]];
+const OCTAHEDRON_FACES: [[usize; 3]; 8] = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]];
+
+#[test]
+fn sections_are_those_of_another_library() {
+    if skipped() {
+        return;
+    }
+    let scratch = Scratch::new();
+    let (ring, menger) = (scratch.join("ring.json"), scratch.join("menger.json"));
+    let corners = [[0, 0, 0], [20, 0, 0], [20, 20, 0], [0, 20, 0]];
+    let shape = serde_json::json!({ "family": "corner_cutting", "a": 0.25, "b": 0.25, "closed": true, "control_points": corners });
+    fs::write(&ring, serde_json::json!({ "lacuna": 1, "shape": shape }).to_string()).unwrap();
+    fs::write(&menger, succeed(["library", "menger_sponge"])).unwrap();
+    let tetrahedron = lacuna_tests::support::root().join("fixtures/ifs/sierpinski_tetrahedron/model.json");
+    // Where a face of the sponge is in the file, in single precision.
+    let ninth = 11.111_111_f32;
+    let faces = [0.0, 5.0, f64::from(ninth), 50.0];
+    // Planes between vertices, and along faces, where the solid above them is cut.
+    let solids: [(&str, &Path, &[&str], &[f64]); 3] = [
+        ("tetrahedron", &tetrahedron, &["--tolerance", "2", "--radius", "4"], &[0.0, 1.0, 20.0, 50.0]),
+        ("ring", &ring, &["--tolerance", "0.1", "--radius", "1"], &[-0.5, 0.0, 0.7]),
+        ("sponge", &menger, &["--level", "2"], &faces),
+    ];
+    let mut judge = Judge::start();
+    let mut found = Findings::default();
+    let (file, drawing) = (scratch.join("part.stl"), scratch.join("part.svg"));
+    let (mut outlines, mut holes) = (0, 0);
+    for (name, model, words, heights) in solids {
+        let words = ["solidify"].iter().chain(words).map(std::ffi::OsStr::new);
+        succeed(words.chain(["-o".as_ref(), file.as_os_str(), model.as_os_str()]));
+        if name == "sponge" {
+            assert!(fs::read(&file).unwrap().windows(4).any(|bytes| bytes == ninth.to_le_bytes()), "no face is at {ninth}");
+        }
+        slice(&file, heights, &drawing);
+        let report = judge.sections(&file, heights, &drawing);
+        judge_sections(name, &report, heights.len(), &mut found);
+        let most = |what: &str| report["sections"].as_array().unwrap().iter().filter_map(|section| section["ours"][what].as_u64()).max();
+        (outlines, holes) = (outlines.max(most("outlines").unwrap()), holes.max(most("holes").unwrap()));
+    }
+    // Through four vertices and along four edges.
+    fs::write(&file, stl(&OCTAHEDRON, &OCTAHEDRON_FACES)).unwrap();
+    let heights = [-1.3, 0.0, 3.0];
+    slice(&file, &heights, &drawing);
+    judge_sections("octahedron", &judge.sections(&file, &heights, &drawing), heights.len(), &mut found);
+    assert!(found.0.is_empty(), "{} findings:\n{}", found.0.len(), found.0.join("\n"));
+    // Of the sponge: a plane through its middle leaves 16 squares, one through its lowest cells 9 holes.
+    assert_eq!((outlines, holes), (16, 9));
+}
+
+/// One corner moved by a millionth of a micrometre is seen, and so is an outline too few.
+#[test]
+fn the_judge_sees_outlines_that_are_moved() {
+    if skipped() {
+        return;
+    }
+    let scratch = Scratch::new();
+    let (file, drawing) = (scratch.join("octahedron.stl"), scratch.join("octahedron.svg"));
+    fs::write(&file, stl(&OCTAHEDRON, &OCTAHEDRON_FACES)).unwrap();
+    slice(&file, &[1.0], &drawing);
+    let sound = fs::read_to_string(&drawing).unwrap();
+    let start = sound.find("d=\"M").unwrap() + 4;
+    let end = start + sound[start..].find(' ').unwrap();
+    let corner: f64 = sound[start..end].parse().unwrap();
+    let moved = format!("{}{}{}", &sound[..start], corner + 1e-9, &sound[end..]);
+    let path = start - 10..start + sound[start..].find("/>").unwrap() + 2;
+    let missing = format!("{}{}", &sound[..path.start], &sound[path.end..]);
+    let mut judge = Judge::start();
+    for (words, text, findings) in [("sound", &sound, 0), ("moved", &moved, 1), ("missing", &missing, 2)] {
+        fs::write(&drawing, text).unwrap();
+        let mut found = Findings::default();
+        judge_sections(words, &judge.sections(&file, &[1.0], &drawing), 1, &mut found);
+        assert_eq!(found.0.len(), findings, "{words}: {:?}", found.0);
     }
 }

@@ -2,19 +2,22 @@
 
     check.py < requests > reports
 
-One JSON document per line: a request is `{"file": PATH, "opinions": true}`, its report follows at once.
+One JSON document per line: a request is `{"file": PATH, "opinions": true}`, its report follows at once. With `"sections": SVG` and `"heights"`, the
+drawing of the file's sections across Z is held against those of trimesh, as polygons of shapely.
 STL is read by trimesh and 3MF by lib3mf in strict mode, the reader of the 3MF consortium. PLY is read by trimesh, as a map of thickness, which is held
 against rays. Counts come from our
 own page of numpy below; if asked, also from trimesh and from Manifold, and self-intersections from CGAL through libigl
 with exact arithmetic. Whoever reads the reports compares them; nothing is judged here.
 """
 import json
+import re
 import sys
 
 import igl.copyleft.cgal as cgal
 import lib3mf
 import manifold3d
 import numpy as np
+import shapely
 import trimesh
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -157,11 +160,51 @@ def second_opinions(vertices, triangles):
     }
 
 
+def drawn_sections(path):
+    """The polygons of every group of a drawing: a path is one of them, its outline first; v is upwards, SVG's y downwards."""
+    with open(path, encoding="utf-8") as file:
+        groups = file.read().split('<g id="z_')[1:]
+    sections = []
+    for group in groups:
+        polygons = []
+        for drawn in re.findall(r'<path d="([^"]*)"', group):
+            runs = [re.split("[L ]", run.rstrip("z")) for run in drawn.split("M")[1:]]
+            rings = [np.array(run, dtype=np.float64).reshape(-1, 2) * [1, -1] for run in runs]
+            polygons.append(shapely.Polygon(rings[0], rings[1:]))
+        sections.append(shapely.MultiPolygon(polygons))
+    return sections
+
+
+def cut_section(mesh, height):
+    """Trimesh's loops in a plane; what an odd number of them surrounds is inside."""
+    cut = mesh.section(plane_origin=[0, 0, height], plane_normal=[0, 0, 1])
+    inside = shapely.MultiPolygon()
+    for loop in cut.discrete if cut is not None else []:
+        inside = inside.symmetric_difference(shapely.Polygon(loop[:, :2]))
+    return inside
+
+
+def compared_sections(mesh, heights, drawing):
+    """Of each section the area, perimeter, outlines and holes on both sides, and the area that only one of them covers."""
+    found = []
+    for height, ours in zip(heights, drawn_sections(drawing), strict=True):
+        theirs = cut_section(mesh, height)
+        sides = [{"area": side.area, "perimeter": side.length, "outlines": len(parts),
+                  "holes": sum(len(part.interiors) for part in parts), "valid": bool(side.is_valid)}
+                 for side, parts in ((ours, shapely.get_parts(ours)), (theirs, shapely.get_parts(theirs)))]
+        apart = ours.symmetric_difference(theirs).area if ours.is_valid else None
+        found.append({"height": height, "ours": sides[0], "theirs": sides[1], "apart": apart})
+    return found
+
+
 def report(request):
     """The report on one file."""
     path = request["file"]
     vertices, triangles, remarks = READERS.get(path[-4:], read_stl)(path)
     opinions = second_opinions(vertices, triangles) if request.get("opinions") else {}
+    if "sections" in request:
+        mesh = trimesh.Trimesh(vertices, triangles, process=False)
+        remarks["sections"] = compared_sections(mesh, request["heights"], request["sections"])
     return {**remarks, "finite": bool(np.isfinite(vertices).all()), **counts(vertices, triangles), **opinions}
 
 

@@ -70,11 +70,22 @@ impl Judge {
     /// # Panics
     /// When the judge has ended.
     pub fn report(&mut self, file: &std::path::Path, opinions: bool) -> serde_json::Value {
-        let request = serde_json::json!({ "file": file, "opinions": opinions });
+        self.ask(&serde_json::json!({ "file": file, "opinions": opinions }))
+    }
+
+    /// The report on a file whose sections across Z at some heights are drawn in another, beside those that trimesh cuts.
+    ///
+    /// # Panics
+    /// When the judge has ended.
+    pub fn sections(&mut self, file: &std::path::Path, heights: &[f64], drawing: &std::path::Path) -> serde_json::Value {
+        self.ask(&serde_json::json!({ "file": file, "heights": heights, "sections": drawing }))
+    }
+
+    fn ask(&mut self, request: &serde_json::Value) -> serde_json::Value {
         writeln!(self.questions, "{request}").unwrap();
         let mut line = String::new();
         self.reports.read_line(&mut line).unwrap();
-        assert!(!line.is_empty(), "check.py ended while it read {}", file.display());
+        assert!(!line.is_empty(), "check.py ended at {request}");
         serde_json::from_str(&line).unwrap()
     }
 }
