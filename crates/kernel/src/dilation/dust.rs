@@ -4,6 +4,10 @@
 //! solid. A piece of the solid that holds a point of D(s) holds a whole ball of radius s, and its box is no narrower than 2 s. So a narrower piece lies outside D(s), and
 //! without it the solid still contains D(s). A void that lies in D(r) is not one of the dilation's: it is filled.
 //!
+//! Where the topology is proven (see `critical`) there are no such pieces and voids, and simplification makes none. It may leave of a shallow void only what lies in D(r):
+//! that stays, as the dilation's. It may also turn one inside out that is hardly wider than the band, which shows as a piece too narrow to be one, and is turned back. What such a shell bounds holds no point of D(s):
+//! on the way to its closest point the distance becomes less, and on the shell it is at least s, so that point would be in the shell, too, which then were wider than 2 s.
+//!
 //! A shell no longer than rounding may move what it bounds, see [`NUDGE`], has no volume to speak of, nor a sign of it: it goes, and the bound for rounding covers that. As a void
 //! of D(r) it would have held a critical point of the distance, which has two sites at one distance at least; where there is one site alone, there was none.
 
@@ -30,13 +34,21 @@ const EMPTY: Shell = Shell { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 
 #[derive(Clone, Copy, PartialEq)]
 enum Fate {
     Stays,
+    /// It is turned inside out.
+    Turns,
     Goes,
     /// It may have been a void of the dilation, smaller than rounding.
     GoesInDoubt,
 }
 
-/// Removes such shells; how many of them may have been the dilation's.
-pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, surface: &mut BlockSurface) -> usize {
+/// Removes such shells; how many of them may have been the dilation's. `is_proven` says that all shells were before simplification.
+pub(super) fn remove(
+    setting: &Setting,
+    rule: &SiteRule<'_>,
+    candidates: &Candidates,
+    is_proven: bool,
+    surface: &mut BlockSurface,
+) -> usize {
     let (numbers, mut shells) = shells(surface);
     for (triangle, &number) in surface.triangles.iter().zip(&numbers) {
         let shell = &mut shells[number as usize];
@@ -53,9 +65,12 @@ pub(super) fn remove(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candid
         shell.volume += dot(&a, &cross(&b, &c));
     }
     let mut tree = None;
-    let fates: Vec<Fate> = shells.iter().map(|shell| fate(setting, rule, candidates, shell, &mut tree)).collect();
+    let fates: Vec<Fate> = shells.iter().map(|shell| fate(setting, rule, candidates, is_proven, shell, &mut tree)).collect();
     if fates.iter().any(|&fate| fate != Fate::Stays) {
-        let mut kept = numbers.iter().map(|&number| fates[number as usize] == Fate::Stays);
+        for (triangle, _) in surface.triangles.iter_mut().zip(&numbers).filter(|&(_, &number)| fates[number as usize] == Fate::Turns) {
+            triangle.swap(1, 2);
+        }
+        let mut kept = numbers.iter().map(|&number| matches!(fates[number as usize], Fate::Stays | Fate::Turns));
         surface.triangles.retain(|_| kept.next().unwrap_or(true));
         surface.drop_unused();
     }
@@ -66,12 +81,18 @@ fn fate<'a>(
     setting: &Setting,
     rule: &'a SiteRule<'a>,
     candidates: &Candidates,
+    is_proven: bool,
     shell: &Shell,
     tree: &mut Option<(Tree<'a>, Vec<u32>)>,
 ) -> Fate {
     let width = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(f64::INFINITY, f64::min);
+    let longest = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(0.0, f64::max);
+    let is_tiny = longest <= NUDGE * setting.rounding;
     if width >= 2.0 * (setting.thinnest - 2.0 * setting.rounding) {
         return Fate::Stays;
+    }
+    if is_proven && !is_tiny {
+        return if shell.volume > 0.0 { Fate::Turns } else { Fate::Stays };
     }
     if shell.volume > 0.0 {
         return Fate::Goes;
@@ -91,8 +112,7 @@ fn fate<'a>(
     if distance + around <= setting.reach {
         return Fate::Goes;
     }
-    let longest = (0..3).map(|axis| shell.high[axis] - shell.low[axis]).fold(0.0, f64::max);
-    if longest > NUDGE * setting.rounding {
+    if !is_tiny {
         return Fate::Stays;
     }
     let mut near = Vec::new();

@@ -377,7 +377,7 @@ impl<'a> Plan<'a> {
         }
         let uncertain = uncertain.len() + critical.len();
         let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
-        let uncertain = uncertain + dust::remove(&setting, &self.rule, &space.candidates, &mut surface);
+        let uncertain = uncertain + dust::remove(&setting, &self.rule, &space.candidates, !setting.dense && uncertain == 0, &mut surface);
         let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
         budget.report("dilate", 1.0, mended.triangles.len() as u64);
         surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
@@ -526,6 +526,12 @@ mod tests {
 
     /// What is left of a surface with a tetrahedron of the given size at a place, besides a larger one, and how many shells went in doubt.
     fn without_dust(at: Point, size: f64) -> (usize, usize) {
+        let (surface, doubtful) = dusted(at, size, false, [0, 1, 2]);
+        (surface.triangles.len(), doubtful)
+    }
+
+    /// The same with the tetrahedron's corners in some order, and whether the topology was proven.
+    fn dusted(at: Point, size: f64, is_proven: bool, order: [usize; 3]) -> (BlockSurface, usize) {
         let (attractor, budget) = (rods(), Budget::default());
         let balls = Balls { least: Radius::new(1.4).unwrap().mm(), most: 1.4 };
         let plan = Plan::new(&attractor, balls, Tolerance::new(0.14).unwrap(), true, &budget).unwrap();
@@ -538,11 +544,11 @@ mod tests {
         let faces = |first: u32| [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]].map(|face: [u32; 3]| face.map(|corner| first + corner));
         let mut surface = BlockSurface {
             vertices: tetrahedron([5.0, -10.0, 0.0], 8.0).into_iter().chain(tetrahedron(at, size)).collect(),
-            triangles: faces(0).into_iter().chain(faces(4)).collect(),
+            triangles: faces(0).into_iter().chain(faces(4).map(|face| order.map(|corner| face[corner]))).collect(),
             ..BlockSurface::default()
         };
-        let doubtful = dust::remove(&setting, &plan.rule, &plan.space(&setting).candidates, &mut surface);
-        (surface.triangles.len(), doubtful)
+        let doubtful = dust::remove(&setting, &plan.rule, &plan.space(&setting).candidates, is_proven, &mut surface);
+        (surface, doubtful)
     }
 
     #[test]
@@ -554,5 +560,22 @@ mod tests {
         assert_eq!(without_dust([10.0, 1.5, 0.0], 0.0), (4, 1));
         // A void that can be seen there stays.
         assert_eq!(without_dust([10.0, 1.5, 0.0], 0.02), (8, 0));
+    }
+
+    #[test]
+    fn proven_voids_stay_and_are_turned_back() {
+        // In what one rod covers: no void of the dilation, unless it is what simplification left of one.
+        let at = [10.0, 0.8, 0.0];
+        assert_eq!(without_dust(at, 0.02), (4, 0));
+        let (void, doubtful) = dusted(at, 0.02, true, [0, 1, 2]);
+        assert_eq!((void.triangles.len(), doubtful), (8, 0));
+        let (turned, doubtful) = dusted(at, 0.02, true, [0, 2, 1]);
+        assert_eq!(doubtful, 0);
+        let directed = |surface: &BlockSurface| -> BTreeSet<[u32; 2]> {
+            surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect()
+        };
+        assert_eq!(directed(&void), directed(&turned));
+        // A piece too narrow for one without the proof.
+        assert_eq!(dusted(at, 0.02, false, [0, 2, 1]).0.triangles.len(), 4);
     }
 }
