@@ -390,7 +390,8 @@ impl<'a> Workshop<'a> {
             let reach = setting.outer + star.radius();
             see(&mut self.tree, &self.near, reach, star, &mut self.found);
             let direction = star.outwards(setting, true);
-            if !(star.leaves(setting, &direction) && star.follows(setting, &direction)) && !star.grows(setting) {
+            let is_followed = star.leaves(setting, &direction) && star.follows(setting, &direction);
+            if !(is_followed || star.grows(setting)) {
                 note(setting, grading, &centre, &mut surface.critical, &mut surface.uncertain);
             }
         }

@@ -341,12 +341,10 @@ impl Scratch {
         let near: Vec<bool> = (0..sites.len()).map(|index| self.may_be_nearest(index, corners.len(), bulge)).collect();
         let mut keeps = near.iter().copied();
         sites.retain(|_| keeps.next() == Some(true));
-        let mut kept = 0;
-        for index in (0..near.len()).filter(|&index| near[index]) {
-            let count = corners.len();
+        let count = corners.len();
+        for (kept, index) in (0..near.len()).filter(|&index| near[index]).enumerate() {
             self.points.copy_within(index * count..(index + 1) * count, kept * count);
             self.affine[kept] = self.affine[index];
-            kept += 1;
         }
     }
 
