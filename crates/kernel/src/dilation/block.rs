@@ -246,10 +246,7 @@ impl<'a> Workshop<'a> {
         first: [i64; 3],
         surface: &mut BlockSurface,
     ) {
-        // Its vertices span the corners 0 to SUB and centres -1/2 to SUB + 1/2.
-        let half = 0.5 * SUB as f64;
-        let middle: Point = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
-        let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+        let (middle, half) = ball_around(setting, first);
         // Farther away no vertex is covered, and no critical point has a value below r.
         let hit = self.tree.nearest(&middle, starts, self.seed, setting.reach + setting.gap + half, setting.reach - half);
         let Some(hit) = hit else { return };
@@ -341,9 +338,7 @@ impl<'a> Workshop<'a> {
                 let side = SIDE / SUB;
                 let place = [at as usize % side, at as usize / side % side, at as usize / side / side];
                 let corner = std::array::from_fn(|axis| surface.first_cube[axis] + (SUB * place[axis]) as i64);
-                let half = 0.5 * SUB as f64;
-                let middle: Point = setting.lattice.corner(corner).map(|x| x + half * setting.lattice.pitch);
-                let half = (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001;
+                let (middle, half) = ball_around(setting, corner);
                 let mut near = std::mem::take(&mut self.near);
                 self.tree.gather(&middle, starts, setting.sight + half, &mut near);
                 self.near = near;
@@ -887,6 +882,13 @@ fn coincidence(outside: &Outside, corner: &Corner, faces: u8) -> Option<((usize,
     let mut ends = (0..4).filter(|k| (faces | first ^ second) >> k & 1 == 0);
     let [p, q] = [ends.next()?, ends.next()?].map(|k| (k, values[k]));
     Some(if p.1 < q.1 { (p, q) } else { (q, p) })
+}
+
+/// A ball around all vertices of the sub-block that begins with a cube: corners 0 to SUB, and centres -1/2 to SUB + 1/2.
+fn ball_around(setting: &Setting, first: [i64; 3]) -> (Point, f64) {
+    let half = 0.5 * SUB as f64;
+    let middle = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
+    (middle, (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001)
 }
 
 /// Shows a star the sites that are within `reach` of its centre.

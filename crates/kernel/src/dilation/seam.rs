@@ -3,7 +3,7 @@
 use super::lattice::{Cube, Grading, around};
 use super::plan::Setting;
 use super::star::{Incident, Star, note};
-use super::surface::{BlockSurface, Blocks, Seam, VertexName};
+use super::surface::{BlockSurface, Blocks, Seam};
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,17 +16,11 @@ struct Part<'a> {
 
 impl<'a> Part<'a> {
     fn new(surface: &'a BlockSurface) -> Self {
-        let mut is_shared = vec![false; surface.vertices.len()];
-        surface.shared.iter().for_each(|&(_, number)| is_shared[number as usize] = true);
+        let mut is_shared = Vec::new();
+        surface.list_shared(&mut is_shared);
         let mut incident = Incident::default();
         incident.list(&surface.triangles, &is_shared);
         Self { surface, incident }
-    }
-
-    fn vertex(&self, name: VertexName) -> Option<u32> {
-        let shared = &self.surface.shared;
-        let at = shared.partition_point(|&(other, _)| other < name);
-        shared.get(at).filter(|&&(other, _)| other == name).map(|&(_, number)| number)
     }
 }
 
@@ -62,8 +56,8 @@ pub(super) fn noted(
         for &(_, seam) in own {
             let mut is_begun = false;
             for part in &near {
-                let Some(vertex) = part.vertex(seam.name) else { continue };
                 let Part { surface, incident } = part;
+                let Some(vertex) = surface.number_of(seam.name) else { continue };
                 if !is_begun {
                     star.reset(surface.vertices[vertex as usize]);
                     star.sites.extend(seam.sites.iter().map(|&site| sites[site as usize]));

@@ -10,7 +10,7 @@ use super::critical::add_closest;
 use super::lattice::{Cube, Grading, LEVELS};
 use super::parting::{avoids_origin, farthest, parting};
 use super::plan::Setting;
-use super::surface::{BlockSurface, VertexName};
+use super::surface::BlockSurface;
 use super::tree::{SiteId, Weighted};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_feature;
@@ -243,22 +243,16 @@ impl Stars {
         self.wanted.clear();
         self.wanted.resize(count, false);
         surface.triangles[first..].iter().flatten().for_each(|&corner| self.wanted[corner as usize] = true);
-        self.shared.clear();
-        self.shared.resize(count, false);
-        surface.shared.iter().for_each(|&(_, number)| self.shared[number as usize] = true);
+        surface.list_shared(&mut self.shared);
         self.incident.list(&surface.triangles, &self.wanted);
         self.listed.clear();
         let wanted = (0_u32..).zip(&self.wanted).filter(|&(_, &wanted)| wanted);
         self.listed.extend(wanted.map(|(vertex, _)| (place(&surface.vertices[vertex as usize]), vertex)));
         self.listed.sort_unstable();
         // What is known of others stays.
-        let Self { wanted, .. } = self;
-        let shared = &surface.shared;
-        let is_listed = |name: VertexName| {
-            let at = shared.partition_point(|&(other, _)| other < name);
-            shared.get(at).is_none_or(|&(other, vertex)| other != name || wanted[vertex as usize])
-        };
-        surface.seams.retain(|seam| !is_listed(seam.name));
+        let mut seams = std::mem::take(&mut surface.seams);
+        seams.retain(|seam| surface.number_of(seam.name).is_some_and(|vertex| !self.wanted[vertex as usize]));
+        surface.seams = seams;
     }
 }
 

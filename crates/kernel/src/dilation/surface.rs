@@ -67,6 +67,19 @@ impl BlockSurface {
         self.pieces.shrink_to_fit();
     }
 
+    /// The number of a vertex that other blocks may have, by its name; `shared` is sorted.
+    pub(super) fn number_of(&self, name: VertexName) -> Option<u32> {
+        let at = self.shared.partition_point(|&(other, _)| other < name);
+        self.shared.get(at).filter(|&&(other, _)| other == name).map(|&(_, number)| number)
+    }
+
+    /// Of every vertex, whether other blocks may have it.
+    pub(super) fn list_shared(&self, is_shared: &mut Vec<bool>) {
+        is_shared.clear();
+        is_shared.resize(self.vertices.len(), false);
+        self.shared.iter().for_each(|&(_, number)| is_shared[number as usize] = true);
+    }
+
     /// Drops what only a lattice that is refined further needs.
     pub(super) fn drop_lattice(&mut self) {
         (self.names, self.pieces, self.normals) = (Vec::new(), Vec::new(), Vec::new());
