@@ -344,7 +344,7 @@ impl<'a> Workshop<'a> {
                 self.near = near;
             }
             let star = &mut self.stars.star;
-            star.reset(surface.vertices[vertex as usize]);
+            star.reset(setting, surface.vertices[vertex as usize]);
             for &triangle in self.stars.incident.of(vertex) {
                 let corners = surface.triangles[triangle as usize].map(|corner| surface.vertices[corner as usize]);
                 star.add(setting, corners, surface.normals[triangle as usize]);
@@ -355,16 +355,8 @@ impl<'a> Workshop<'a> {
                 see(&mut self.tree, &self.near, setting.outer, star, &mut self.found);
             }
             let direction = if is_shared { star.outwards(setting, false) } else { star.normal() };
-            if star.leaves(setting, &direction) {
-                // Most sites lie below all of the star, and most nodes.
-                star.forget_sites();
-                let (reach, lowest) = (setting.outer + star.radius(), star.lowest(setting, &direction));
-                self.found.clear();
-                self.tree.collect_above(&centre, &self.near, reach, &direction, lowest, &mut self.found);
-                self.found.iter().for_each(|&id| star.see(self.tree.site(id)));
-                if star.follows(setting, &direction) {
-                    continue;
-                }
+            if follows(setting, &mut self.tree, &self.near, star, &direction, &mut self.found) {
+                continue;
             }
             if is_shared {
                 // Triangles of other blocks reach no farther than a tetrahedron.
@@ -382,11 +374,14 @@ impl<'a> Workshop<'a> {
                 continue;
             }
             star.forget_sites();
-            let reach = setting.outer + star.radius();
-            see(&mut self.tree, &self.near, reach, star, &mut self.found);
+            see(&mut self.tree, &self.near, setting.outer, star, &mut self.found);
             let direction = star.outwards(setting, true);
-            let is_followed = star.leaves(setting, &direction) && star.follows(setting, &direction);
-            if !(is_followed || star.grows(setting)) {
+            if follows(setting, &mut self.tree, &self.near, star, &direction, &mut self.found) {
+                continue;
+            }
+            star.forget_sites();
+            see(&mut self.tree, &self.near, setting.outer + star.radius(), star, &mut self.found);
+            if !star.grows(setting) {
                 note(setting, grading, &centre, &mut surface.critical, &mut surface.uncertain);
             }
         }
@@ -889,6 +884,20 @@ fn ball_around(setting: &Setting, first: [i64; 3]) -> (Point, f64) {
     let half = 0.5 * SUB as f64;
     let middle = setting.lattice.corner(first).map(|x| x + half * setting.lattice.pitch);
     (middle, (half + 0.5) * 3.0_f64.sqrt() * setting.lattice.pitch * 1.000_001)
+}
+
+/// Whether one direction does for a star: it leaves all triangles, and the distance grows along it.
+fn follows(setting: &Setting, tree: &mut Tree<'_>, near: &[NodeId], star: &mut Star, direction: &Point, found: &mut Vec<SiteId>) -> bool {
+    if !star.leaves(setting, direction) {
+        return false;
+    }
+    // Most sites lie below all of the star, and most nodes.
+    star.forget_sites();
+    let (reach, lowest) = (setting.outer + star.radius(), star.lowest(setting, direction));
+    found.clear();
+    tree.collect_above(&star.centre, near, reach, direction, lowest, found);
+    found.iter().for_each(|&id| star.see(tree.site(id)));
+    star.follows(setting, direction)
 }
 
 /// Shows a star the sites that are within `reach` of its centre.

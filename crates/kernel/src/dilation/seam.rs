@@ -59,7 +59,7 @@ pub(super) fn noted(
                 let Part { surface, incident } = part;
                 let Some(vertex) = surface.number_of(seam.name) else { continue };
                 if !is_begun {
-                    star.reset(surface.vertices[vertex as usize]);
+                    star.reset(setting, surface.vertices[vertex as usize]);
                     star.sites.extend(seam.sites.iter().map(|&site| sites[site as usize]));
                     is_begun = true;
                 }

@@ -4,7 +4,8 @@
 //! outwards, and w . (y - c) > 0 for all closest points c of y. It exists when the origin is not in the hull of these vectors. A facet's interior has one normal, an
 //! edge two, a vertex those of its star. One direction for a whole star is sought first, then one for the vertex, and for its edges and triangles, halved where that is necessary.
 //!
-//! Over a simplex with circumradius R the interpolant L_i of d_i^2 has d_i^2 <= L_i <= d_i^2 + R^2: a site is nowhere nearest there if another's squared distances are less by R^2 at all corners.
+//! Over a simplex with circumradius R the interpolant L_i of d_i^2 has d_i^2 <= L_i <= d_i^2 + R^2: a site is nowhere nearest there if another's squared distances are less by R^2 at all corners,
+//! or if its own exceed by R^2 what the surface's may be anywhere: all of it is within `outer` of some site.
 
 use super::critical::add_closest;
 use super::lattice::{Cube, Grading, LEVELS};
@@ -50,12 +51,16 @@ struct Scratch {
     closest: Vec<Point>,
     /// Where each site's begin.
     groups: Vec<usize>,
+    /// A bound of the surface's squared distance from the sites.
+    most: f64,
 }
 
 impl Star {
     /// A vertex without triangles.
-    pub(super) fn reset(&mut self, centre: Point) {
+    pub(super) fn reset(&mut self, setting: &Setting, centre: Point) {
         self.centre = centre;
+        // Far above what rounding moves a vertex, and far below what the tolerance is.
+        self.scratch.most = ((1.0 + LEAST) * setting.outer).powi(2);
         self.corners.clear();
         self.corners.push(centre);
         self.triangles.clear();
@@ -139,17 +144,21 @@ impl Star {
         scratch.measure(sites, corners);
         let count = corners.len();
         let along = |point: &Point| dot(point, direction);
-        (0..sites.len()).filter(|&index| scratch.may_be_nearest(index, count, *bulge)).collect::<Vec<_>>().into_iter().all(|index| {
+        let lowest_corner = corners.iter().map(along).fold(f64::INFINITY, f64::min);
+        // Most sites are too far or left behind: what that costs is little beside a search for another that is nearer.
+        (0..sites.len()).all(|index| {
+            if scratch.is_far(index, count, *bulge) {
+                return true;
+            }
             let own = &scratch.points[index * count..][..count];
             let lowest = if scratch.affine[index] {
                 corners.iter().zip(own).map(|(corner, closest)| along(&subtract(corner, closest))).fold(f64::INFINITY, f64::min)
             } else {
                 scratch.closest.clear();
                 add_closest(&sites[index].site, corners, &mut scratch.closest);
-                let lowest = corners.iter().map(along).fold(f64::INFINITY, f64::min);
-                lowest - scratch.closest.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
+                lowest_corner - scratch.closest.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
             };
-            lowest > least
+            lowest > least || !scratch.may_be_nearest(index, count, *bulge)
         })
     }
 
@@ -342,8 +351,17 @@ impl Scratch {
         }
     }
 
-    /// Whether a site that was measured may be the nearest to a point of simplices with these corners, R^2 of which is at most `bulge`: no other is nearer by that at all of them.
+    /// Whether a site that was measured is farther from all points of simplices with these corners, R^2 of which is at most `bulge`, than the surface is from the nearest.
+    fn is_far(&self, index: usize, count: usize, bulge: f64) -> bool {
+        self.squares[index * count..][..count].iter().all(|square| *square > self.most + bulge)
+    }
+
+    /// Whether a site that was measured may be the nearest to a point of the surface in simplices with these corners, R^2 of which is at most `bulge`: it is not too far, and no other is nearer
+    /// by that at all of them.
     fn may_be_nearest(&self, index: usize, count: usize, bulge: f64) -> bool {
+        if self.is_far(index, count, bulge) {
+            return false;
+        }
         let own = &self.squares[index * count..][..count];
         let is_nearer = |other: &[f64]| other.iter().zip(own).all(|(other, own)| *other < *own * (1.0 - 1e-12) - bulge);
         !self.squares.chunks_exact(count).any(is_nearer)
@@ -464,13 +482,14 @@ mod tests {
             let corners: Vec<Point> = (0..1 + random.next() % 3).map(|_| point(&mut random, 0.4)).collect();
             let sites: Vec<Weighted> = (0..6).map(|_| weighted(&mut random, 1.5)).collect();
             let mut near = sites.clone();
-            let mut scratch = Scratch::default();
+            let most = if random.next().is_multiple_of(2) { f64::INFINITY } else { 0.5 + number(&mut random).abs() };
+            let mut scratch = Scratch { most, ..Scratch::default() };
             scratch.narrow(&mut near, &corners, bulge(&corners));
             (out, all) = (out + sites.len() - near.len(), all + sites.len());
             for _ in 0..8 {
                 let y = mean(&mut random, &corners);
                 let least = |sites: &[Weighted]| sites.iter().map(|site| site.distance_squared(&y)).fold(f64::INFINITY, f64::min);
-                assert!(least(&near) <= least(&sites));
+                assert!(least(&sites) > most || least(&near) <= least(&sites));
             }
         }
         assert!(3 * out > all, "{out} of {all}");
@@ -495,7 +514,7 @@ mod tests {
                 })
                 .collect();
             let mut star = Star::default();
-            star.reset([0.0; 3]);
+            star.reset(&setting, [0.0; 3]);
             let triangles: Vec<([Point; 3], Point)> = (0..count)
                 .map(|k| {
                     let triangle = [[0.0; 3], ring[k], ring[(k + 1) % count]];
@@ -533,6 +552,10 @@ mod tests {
             grown += 1;
             let gradients = |y: &Point| -> Vec<Point> {
                 let least = sites.iter().map(|site| site.distance_squared(y)).fold(f64::INFINITY, f64::min);
+                if least > 1.1 * 1.1 {
+                    // No point of a surface.
+                    return Vec::new();
+                }
                 sites.iter().filter(|site| site.distance_squared(y) <= least + 1e-12).map(|site| subtract(y, &site.closest(y))).collect()
             };
             for (k, (triangle, normal)) in triangles.iter().enumerate() {

@@ -69,7 +69,7 @@ impl Face {
 
     /// The least height that a point of a box may have; `None` for a box that is behind the face, or beside the prism over it.
     fn entry(&self, around: &Box32) -> Option<f64> {
-        let [low, high] = [around.low, around.high].map(|end| DVec3::from_array(end.map(f64::from)));
+        let [low, high] = [around.low, around.high].map(|end| end.as_dvec3());
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         // Where the box begins and ends along a direction.
         let span = |direction: DVec3, from: DVec3| {

@@ -1,52 +1,43 @@
 //! A binary tree of boxes over triangles in the order of a space-filling curve.
 
 use crate::attractor::cell::Point;
+use glam::Vec3A;
 use rayon::prelude::*;
 
-/// A box in single precision, rounded outwards.
+/// A box in single precision, rounded outwards. Its corners are vectors that the processor compares at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Box32 {
-    pub(crate) low: [f32; 3],
-    pub(crate) high: [f32; 3],
+    pub(crate) low: Vec3A,
+    pub(crate) high: Vec3A,
 }
 
 impl Box32 {
-    pub(crate) const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+    pub(crate) const EMPTY: Self = Self { low: Vec3A::INFINITY, high: Vec3A::NEG_INFINITY };
 
     /// The box of some points.
     #[inline]
     pub(crate) fn of(points: &[Point]) -> Self {
-        let mut result = Self::EMPTY;
-        for point in points {
-            for (axis, &x) in point.iter().enumerate() {
-                let near = x as f32;
-                let exact = f64::from(near);
-                let low = if exact > x { near.next_down() } else { near };
-                let high = if exact < x { near.next_up() } else { near };
-                result.low[axis] = result.low[axis].min(low);
-                result.high[axis] = result.high[axis].max(high);
+        points.iter().fold(Self::EMPTY, |all, point| {
+            let near = point.map(|x| x as f32);
+            let own = Vec3A::from_array(near);
+            if near.map(f64::from) == *point {
+                // Most are: meshes have coordinates in single precision.
+                return Self { low: all.low.min(own), high: all.high.max(own) };
             }
-        }
-        result
+            let low = std::array::from_fn(|axis| if f64::from(near[axis]) > point[axis] { near[axis].next_down() } else { near[axis] });
+            let high = std::array::from_fn(|axis| if f64::from(near[axis]) < point[axis] { near[axis].next_up() } else { near[axis] });
+            Self { low: all.low.min(Vec3A::from_array(low)), high: all.high.max(Vec3A::from_array(high)) }
+        })
     }
 
     #[inline]
     pub(crate) fn union(&self, other: &Self) -> Self {
-        Self {
-            low: std::array::from_fn(|axis| self.low[axis].min(other.low[axis])),
-            high: std::array::from_fn(|axis| self.high[axis].max(other.high[axis])),
-        }
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     #[inline]
     pub(crate) fn meets(&self, other: &Self) -> bool {
-        // Without branches: three comparisons each at once.
-        (self.low[0] <= other.high[0])
-            & (self.low[1] <= other.high[1])
-            & (self.low[2] <= other.high[2])
-            & (other.low[0] <= self.high[0])
-            & (other.low[1] <= self.high[1])
-            & (other.low[2] <= self.high[2])
+        (self.low.cmple(other.high) & other.low.cmple(self.high)).all()
     }
 }
 

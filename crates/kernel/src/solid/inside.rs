@@ -37,7 +37,7 @@ impl<'a> Inside<'a> {
             return 0;
         }
         let point = Box32::of(&[x.to_array()]);
-        let above = Box32 { low: point.low, high: [point.high[0], point.high[1], f32::INFINITY] };
+        let above = Box32 { low: point.low, high: point.high.with_z(f32::INFINITY) };
         let mut winding = 0;
         self.tree.query(&above, 0, |leaf| {
             for (&triangle, bounds) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)) {

@@ -131,7 +131,6 @@ pub(crate) struct Mender {
     boxed: usize,
     /// Triangles lower than what rounding moves, as they were met last.
     pub(crate) slivers: Vec<u32>,
-    close: Vec<(u32, Box32)>,
     stamps: Vec<u32>,
     stamp: u32,
     /// Triangles of a star, old or new.
@@ -324,7 +323,7 @@ impl Mender {
 
     /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
     pub(crate) fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>, most: usize) -> usize {
-        let Self { star, boxes, close, own, .. } = self;
+        let Self { star, boxes, own, .. } = self;
         let count = star.ring.len();
         let apex = m.map_or(vertex, |m| star.ring[m]);
         let point = |corner: u32| mesh.points[corner as usize];
@@ -351,33 +350,28 @@ impl Mender {
         if found > most {
             return found;
         }
-        close.clear();
         boxes.query(&whole, 0, |leaf| {
-            let met = boxes.items(leaf).iter().zip(boxes.boxes(leaf)).filter(|(_, own)| own.meets(&whole));
-            close.extend(met.map(|(&triangle, own)| (triangle, *own)));
-            true
-        });
-        for &(triangle, own_box) in close.iter() {
-            if !own.iter().any(|facet| own_box.meets(&facet.bounds)) {
-                continue;
-            }
-            let Some(corners) = mesh.triangle(triangle) else { continue };
-            if corners.contains(&vertex) {
-                continue;
-            }
-            let points = corners.map(point);
-            for facet in own.iter() {
-                if own_box.meets(&facet.bounds)
-                    && !facet.parts(&corners, &points)
-                    && contact::meet([&corners, &facet.corners], [&points, &facet.points])
-                {
+            for (&triangle, bounds) in boxes.items(leaf).iter().zip(boxes.boxes(leaf)) {
+                let mut near = own.iter().filter(|facet| facet.bounds.meets(bounds)).peekable();
+                if near.peek().is_none() {
+                    continue;
+                }
+                let Some(corners) = mesh.triangle(triangle) else { continue };
+                if corners.contains(&vertex) {
+                    continue;
+                }
+                let points = corners.map(point);
+                let met =
+                    |facet: &&Facet| !facet.parts(&corners, &points) && contact::meet([&corners, &facet.corners], [&points, &facet.points]);
+                for _ in near.filter(met) {
                     found += 1;
                     if found > most {
-                        return found;
+                        return false;
                     }
                 }
             }
-        }
+            true
+        });
         found
     }
 }
