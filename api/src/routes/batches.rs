@@ -63,10 +63,12 @@ pub async fn submit(
     // As for a job: its id must arrive before the time for an answer is over.
     let left = Duration::from_secs(answer_seconds).mul_f64(0.9).saturating_sub(start.elapsed());
     let wait = preference.wait.map_or(Duration::ZERO, |wait| wait.min(left));
-    let until = Instant::now() + wait;
-    for job in batch.jobs.iter().flatten() {
-        job.wait(until.saturating_duration_since(Instant::now())).await;
-    }
+    let all = async {
+        for job in batch.jobs.iter().flatten() {
+            job.wait(Duration::MAX).await;
+        }
+    };
+    let _ = tokio::time::timeout(wait, all).await;
     let view = batch.view();
     let ended = view.state.is_final();
     let mut response = answer(view);
