@@ -2,6 +2,7 @@
 //!
 //! | module | asks |
 //! |---|---|
+//! | `batches` | are several jobs accepted together, or none, and are they and their certificate lost by nothing? |
 //! | `booleans` | do combined solids hold what their certificates say? |
 //! | `clients` | do the Python and the TypeScript client follow the contract, and do their work? |
 //! | `contacts` | are distances, places of contact and comparisons of shapes those of closed forms? |
@@ -38,6 +39,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod architecture;
+mod batches;
 mod booleans;
 mod clients;
 mod composition;

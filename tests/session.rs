@@ -48,6 +48,13 @@ fn the_session_by_curl_runs_as_it_stands_in_the_page() {
     // 20 x 20 x 4 less a hole of radius 3.
     let volume = certificate["mesh_volume_mm3"].as_f64().unwrap();
     assert!((volume - (1600.0 - 36.0 * std::f64::consts::PI)).abs() < 2.0 * 6.0 * std::f64::consts::PI * 4.0 * 0.05, "{volume}");
+    let batch = read("batch-certificate.json");
+    assert_eq!(
+        (&batch["state"], &batch["jobs"][0]["name"], &batch["jobs"][1]["name"]),
+        (&json!("succeeded"), &json!("bored plate"), &json!("rod"))
+    );
+    assert_eq!(batch["jobs"][0]["figures"]["mesh_volume_mm3"], certificate["mesh_volume_mm3"]);
+    assert_eq!(std::fs::read_to_string(scratch.join("rows.ndjson")).unwrap().lines().count(), 2);
     let refused = read("refused.json")["errors"].to_string();
     assert!(refused.contains("/params/tolerance_mm"), "{refused}");
     assert_eq!(service.get("/v1/models").json()["items"], json!([]));

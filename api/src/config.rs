@@ -300,7 +300,7 @@ impl Config {
             upload_seconds: reader.take("LACUNA_UPLOAD_SECONDS", None, 600, COUNT)?,
             answer_seconds: reader.take("LACUNA_ANSWER_SECONDS", None, 60, COUNT)?,
             queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,
-            jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 36, COUNT)?,
+            jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 128, COUNT)?,
             submissions_per_minute: reader.take("LACUNA_SUBMISSIONS_PER_MINUTE", None, 600, COUNT)?,
             calls_per_minute: reader.take("LACUNA_CALLS_PER_MINUTE", None, 6000, COUNT)?,
             drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
@@ -429,7 +429,7 @@ mod tests {
         let environment = |name: &str| (name == "LACUNA_WORKERS" || name == "LACUNA_QUEUED").then(|| "7".to_owned());
         let flags = Flags { workers: Some(3), ..Flags::default() };
         let (config, told) = Config::read(&flags, &environment).unwrap();
-        assert_eq!((config.workers, config.queued, config.jobs_per_key), (3, 7, 36));
+        assert_eq!((config.workers, config.queued, config.jobs_per_key), (3, 7, 128));
         let origin = |name| told.iter().find(|t| t.name == name).unwrap().origin;
         assert_eq!(origin("LACUNA_WORKERS"), Origin::Flag);
         assert_eq!(origin("LACUNA_QUEUED"), Origin::Environment);

@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::Path;
 
 use lacuna_exchange::diagnostic::{Diagnostic, code};
-use lacuna_exchange::document::{self, DocumentLimits, JobDocument, ModelSource, Sought};
+use lacuna_exchange::document::{self, BatchEntry, DocumentLimits, JobDocument, ModelSource, Sought};
 use lacuna_exchange::format::automaton::Diagram;
 use lacuna_exchange::format::{FORMATS, Format, MeshFile, ReadLimits, read as read_mesh};
 use lacuna_fabrication::{Job, JobKind, SolutionSpace, Solved};
@@ -200,6 +200,47 @@ pub fn read_order(bytes: &[u8], most: &Limits, find: ModelFinder<'_>) -> Result<
     complete(production::guarded(|| document::read_job(bytes, &DocumentLimits::default()))?.map_err(refused)?, most, find)
 }
 
+/// Reads a batch; [`complete`] makes an order of each of its jobs.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn read_batch(bytes: &[u8]) -> Result<Vec<BatchEntry>, Problem> {
+    production::guarded(|| document::read_batch(bytes, &DocumentLimits::default()))?.map_err(refused)
+}
+
+/// Reads a batch whose jobs may name mesh files of its folder, and no stored models.
+///
+/// # Errors
+/// All findings of reading, or else those of the first job that cannot be completed, as one problem.
+pub fn read_batch_in(bytes: &[u8], most: &Limits, folder: Option<&Path>) -> Result<Vec<(Option<String>, Job)>, Problem> {
+    let entries = match folder {
+        None => read_batch(bytes)?,
+        Some(folder) => {
+            let read = || document::read_batch_beside(bytes, &DocumentLimits::default(), &|name| mesh_in(folder, name));
+            production::guarded(read)?.map_err(refused)?
+        }
+    };
+    entries.into_iter().map(|entry| Ok((entry.name, complete(entry.job, most, &|_| None)?.job))).collect()
+}
+
+/// The document of a batch whose mesh files are in it.
+///
+/// # Errors
+/// As [`read_batch_in`].
+pub fn whole_batch(bytes: &[u8], folder: Option<&Path>) -> Result<String, Problem> {
+    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    let unfit = |error: serde_json::Error| Problem::internal(format!("a job is no JSON: {error}"));
+    let of_entry = |(name, job): (Option<String>, Job)| {
+        let job: serde_json::Value = serde_json::from_str(&Order::new(job, Vec::new()).document()).map_err(unfit)?;
+        Ok(match name {
+            Some(name) => serde_json::json!({ "name": name, "job": job }),
+            None => serde_json::json!({ "job": job }),
+        })
+    };
+    let jobs: Vec<serde_json::Value> = read_batch_in(bytes, &most, folder)?.into_iter().map(of_entry).collect::<Result<_, Problem>>()?;
+    serde_json::to_string(&serde_json::json!({ "lacuna": 1, "jobs": jobs })).map_err(unfit)
+}
+
 /// Reads a job document that may name mesh files of its folder, and no stored models.
 ///
 /// # Errors
@@ -286,9 +327,13 @@ impl Fetcher<'_> {
     }
 }
 
-fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Order, Problem> {
+/// Fetches the stored models and meshes that a job names, and completes its limits.
+///
+/// # Errors
+/// All findings, as one problem.
+pub fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<Order, Problem> {
     let ids: Vec<Option<String>> = read.inputs.iter().map(|input| input.reference().map(str::to_owned)).collect();
-    let supersedes = read.supersedes.clone();
+    let (supersedes, place) = (read.supersedes.clone(), read.pointer.clone());
     let mut fetcher = Fetcher { find, references: HashMap::new(), triangles: 0, most_triangles: most.triangles, refusal: None };
     let resolved = read.resolve(&within(&Limits::default(), most), most, |id| fetcher.fetch(id));
     if let Some(problem) = fetcher.refusal {
@@ -304,7 +349,7 @@ fn complete(read: JobDocument, most: &Limits, find: ModelFinder<'_>) -> Result<O
         job.outputs = default_outputs(&job).iter().map(|&name| name.to_owned()).collect();
     }
     for (index, name) in job.outputs.iter().enumerate() {
-        format(name).map_err(|problem| one_finding(&format!("/outputs/{index}"), &problem.code, &problem.detail))?;
+        format(name).map_err(|problem| one_finding(&format!("{place}/outputs/{index}"), &problem.code, &problem.detail))?;
     }
     Ok(Order { job, references, supersedes })
 }

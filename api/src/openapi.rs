@@ -8,6 +8,10 @@ use utoipa::ToSchema;
 #[derive(ToSchema)]
 pub struct Job {}
 
+/// Stands for a batch of job documents: its schema is the exchange crate's.
+#[derive(ToSchema)]
+pub struct Batch {}
+
 /// Stands for a model document: its schema is the exchange crate's.
 #[derive(ToSchema)]
 pub struct Model {}

@@ -1,6 +1,6 @@
 // Generated from api/openapi.json by api/clients/generate.py: do not edit.
 import { ServerEvent, Transport } from "./transport.js";
-import { AddressAnswer, AddressQuestion, Capabilities, Health, Job, JobKind, JobPage, JobState, JobView, LibraryPage, MaterialPage, Model, ModelPage, ModelView, Plan, ProblemPage, Profile, ProfilePage, ShortOrder, SolveReport, SolveRequest, ValidationReport, Version } from "./types.js";
+import { AddressAnswer, AddressQuestion, Batch, BatchCertificate, BatchView, Capabilities, Health, Job, JobKind, JobPage, JobState, JobView, LibraryPage, MaterialPage, Model, ModelPage, ModelView, Plan, ProblemPage, Profile, ProfilePage, ShortOrder, SolveReport, SolveRequest, ValidationReport, Version } from "./types.js";
 
 export * from "./types.js";
 
@@ -27,6 +27,32 @@ export class Api extends Transport {
    * legal document is drawn even if it cannot be evaluated, with what is wrong in red.
    */
   automaton(body: Model, options?: { signal?: AbortSignal }): Promise<Response>;
+  /**
+   * Submits up to 100 jobs at once. All are accepted, or none: faults of any of the documents refuse the batch,
+   * with their places. Then every job ends for itself, well or not. They count as so many submissions and so many
+   * unfinished jobs; those whose work was done before are answered at once and count as submissions alone. What
+   * only computing shows, a limit that is passed too, is the problem of that job. With `Prefer: wait=n` (30 at
+   * most) the answer waits up to n seconds for the end of all.
+   */
+  submitBatch(body: Batch, options?: { prefer?: string | null; idempotencyKey?: string | null; signal?: AbortSignal }): Promise<BatchView>;
+  /** Stops a batch if needed and forgets it with all of its jobs. */
+  forgetBatch(id: string, options?: { signal?: AbortSignal }): Promise<void>;
+  /** A batch, in every state with 200: how many of its jobs stand where, and a row for each. */
+  showBatch(id: string, options?: { signal?: AbortSignal }): Promise<BatchView>;
+  /** Stops all jobs of a batch that have not ended. 200 if all have ended, 202 while some are stopping. */
+  cancelBatch(id: string, options?: { signal?: AbortSignal }): Promise<BatchView>;
+  /**
+   * What is proven of all results of a batch: for every job how it ended, the digests of its files, and its key
+   * figures or its problem. 409 until all of its jobs have ended; 410 once they have expired. Until then its bytes
+   * stay the same.
+   */
+  batchCertificate(id: string, options?: { signal?: AbortSignal }): Promise<BatchCertificate>;
+  /**
+   * The rows of a batch's jobs as they end. Server-Sent Events: `row` for every job that has ended or ends, then
+   * `done` with the batch; or with `Accept: application/x-ndjson` the rows alone, one a line. A stream that is
+   * opened again begins again; how far a single job has come is told by its own events.
+   */
+  batchEvents(id: string, options?: { signal?: AbortSignal }): AsyncGenerator<ServerEvent>;
   /** Kinds of jobs, formats and limits of this service. */
   capabilities(options?: { signal?: AbortSignal }): Promise<Capabilities>;
   /**
@@ -42,7 +68,7 @@ export class Api extends Transport {
    * repeated submission give the first one's job. Equal work that was finished before is not done again.
    */
   submitJob(body: Job, options?: { prefer?: string | null; idempotencyKey?: string | null; signal?: AbortSignal }): Promise<JobView>;
-  /** Stops a job if needed and forgets it. */
+  /** Stops a job if needed and forgets it. 409 for a job of a batch, which is forgotten with its batch. */
   forgetJob(id: string, options?: { signal?: AbortSignal }): Promise<void>;
   /** A job, in every state with 200. */
   showJob(id: string, options?: { signal?: AbortSignal }): Promise<JobView>;

@@ -31,6 +31,30 @@ export class Api extends Transport {
     return this._bytes("POST", "/v1/automaton", { body, accept: "image/svg+xml, text/vnd.graphviz, application/problem+json", signal: options.signal });
   }
 
+  submitBatch(body, options = {}) {
+    return this._json("POST", "/v1/batches", { header: { "Prefer": options.prefer, "Idempotency-Key": options.idempotencyKey }, body, accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  forgetBatch(id, options = {}) {
+    return this._nothing("DELETE", `/v1/batches/${encodeURIComponent(id)}`, { accept: "application/problem+json", signal: options.signal });
+  }
+
+  showBatch(id, options = {}) {
+    return this._json("GET", `/v1/batches/${encodeURIComponent(id)}`, { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  cancelBatch(id, options = {}) {
+    return this._json("POST", `/v1/batches/${encodeURIComponent(id)}/cancel`, { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  batchCertificate(id, options = {}) {
+    return this._json("GET", `/v1/batches/${encodeURIComponent(id)}/certificate`, { accept: "application/json, application/problem+json", signal: options.signal });
+  }
+
+  batchEvents(id, options = {}) {
+    return this._events("GET", `/v1/batches/${encodeURIComponent(id)}/events`, { accept: "application/x-ndjson, text/event-stream, application/problem+json", signal: options.signal });
+  }
+
   capabilities(options = {}) {
     return this._json("GET", "/v1/capabilities", { accept: "application/json, application/problem+json", signal: options.signal });
   }

@@ -32,6 +32,60 @@ export interface Adjacency {
 /** An affine map of space. */
 export type AffineMap = unknown;
 
+/**
+ * Several jobs that are accepted together, or not at all, and done in any order; each ends for itself, well or
+ * not.
+ */
+export interface Batch {
+  /** The jobs. */ jobs: Array<BatchEntry>;
+  /** The version of the grammar: 1. */ lacuna: 1;
+}
+
+/** What is proven of all results of a batch: the parent of its jobs' certificates. */
+export interface BatchCertificate {
+  /** The batch's id, where a service did it. */ batch?: string | null;
+  /** How many of its jobs ended how. */ counts: Counts;
+  /** `sha256:` digest of the jobs' input digests in their order, each with a line end. */ input_digest: string;
+  /** The jobs, in the order of the batch's document. */ jobs: Array<BatchRow>;
+  /** The version that did it. */ kernel_version: string;
+  /** How it ended. */ state: BatchState;
+}
+
+/** A job document, and what the batch calls it. */
+export interface BatchEntry {
+  /** The job document, without supersedes. */ job: Job;
+  /** What to call it; no two jobs of a batch are called the same. */ name?: string;
+}
+
+/** A job of a batch: what it is called, where it stands, and what came of it. */
+export interface BatchRow {
+  figures?: Figures | null;
+  /** Its place in the batch's document, from 0. */ index: number;
+  /** `sha256:` digest of its canonical document. */ input_digest: string;
+  /** The job's id, where a service did it: all of it is at `/v1/jobs/{id}`. */ job?: string | null;
+  /** What it does. */ kind: JobKind;
+  /** What the batch calls it. */ name?: string | null;
+  /** Digests of the files that it made, by their names; that of `certificate.json` is among them. */ output_digests?: Record<string, string>;
+  problem?: Problem | null;
+  progress?: Step | null;
+  /** Where it stands. */ state: JobState;
+  /** What the owner should know, in words. */ warnings?: Array<string>;
+}
+
+/** Where a batch stands. */
+export type BatchState = "queued" | "running" | "succeeded" | "partly_succeeded" | "failed" | "cancelled" | "expired";
+
+/** A batch as its owner sees it. */
+export interface BatchView {
+  /** How many jobs stand where. */ counts: Counts;
+  /** When it was accepted. */ created: string;
+  /** When the last of its jobs ended. */ finished?: string | null;
+  /** Share of the jobs that have ended, in [0, 1]. */ fraction: number;
+  /** Its id. */ id: string;
+  /** The jobs, in the order of the batch's document. */ jobs: Array<BatchRow>;
+  /** Where it stands. */ state: BatchState;
+}
+
 /** A curve of one's own states: edges between two vertices. As many control points as the first state has. */
 export interface BcifsScheme {
   /** The family of the shape. */ family: "bcifs";
@@ -297,6 +351,16 @@ export interface CornerCuttingShape {
   /** The family of the shape. */ family: "corner_cutting";
 }
 
+/** How many jobs of a batch stand where. */
+export interface Counts {
+  /** Those that were stopped. */ cancelled: number;
+  /** Those of which nothing else is kept any more. */ expired: number;
+  /** Those that ended with a problem. */ failed: number;
+  /** Those that wait for a worker. */ queued: number;
+  /** Those that workers are at, also those that are stopping. */ running: number;
+  /** Those that are done. */ succeeded: number;
+}
+
 /** An edge that is sharp for some steps of the scheme or for ever. */
 export interface Crease {
   /** The two vertices of the edge. */ edge: Array<number>;
@@ -374,6 +438,21 @@ export interface ExtentStatement {
   from_mm: Array<number>;
   to_mm: Array<number>;
   width_mm: Array<number>;
+}
+
+/**
+ * The key figures of a job's certificate, which says what each of them means; all of it is the output
+ * `certificate.json`.
+ */
+export interface Figures {
+  /** The bound that is proven. */ achieved_bound_mm: number;
+  /** Connected pieces. */ components?: number | null;
+  /** Sum of the shells' genera. */ genus?: number | null;
+  /** Area of the written mesh. */ mesh_area_mm2?: number | null;
+  /** Volume that the written mesh encloses. */ mesh_volume_mm3?: number | null;
+  /** The bound that was asked. */ requested_tolerance_mm: number;
+  /** Least thickness that is proven. */ thickness_min_mm?: number | null;
+  /** Triangles of the result. */ triangles: number;
 }
 
 /** One finding with its place. */
@@ -570,6 +649,7 @@ export type JobState = "queued" | "running" | "cancelling" | "succeeded" | "fail
 /** A job as its owner sees it. */
 export interface JobView {
   /** How often it was started; 2 after the service stopped during the first time. */ attempt: number;
+  /** The id of the batch that it belongs to, if it does. */ batch?: string | null;
   certificate?: Certificate | null;
   /** When it was accepted. */ created: string;
   /** When what it made was given up, after the time for which ended jobs are kept; the digests of its outputs are still told. */ expired?: string | null;
@@ -622,6 +702,7 @@ export interface LibraryPage {
 
 /** The limits of a request and of a job. */
 export interface LimitCapability {
+  /** Jobs that a batch may have. */ batch_jobs: number;
   /** Bytes of a JSON body. */ body_bytes: number;
   /** Other calls per minute and key. */ calls_per_minute: number;
   /** Most leaf cells of a job. */ cells: number;

@@ -89,7 +89,7 @@ pub(super) enum Command {
         /// The job document.
         job: PathBuf,
     },
-    /// Do a job and put its files into a folder; what was made is told as JSON on stdout.
+    /// Do a job, or the jobs of a batch, and put the files into a folder; what was made is told as JSON on stdout. Exit code 1 if a job of a batch does not succeed.
     Run(RunArgs),
     /// Tell what a mesh file contains; JSON on stdout.
     Inspect {
@@ -488,7 +488,7 @@ pub(super) struct AddressArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// The job document.
+    /// The job document, or one of a batch: `{"lacuna": 1, "jobs": [{"name": ..., "job": ...}]}`.
     pub(super) job: PathBuf,
     /// Folder for the files; it is made if needed.
     #[arg(short = 'o', long = "output", value_name = "DIR")]

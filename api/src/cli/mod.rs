@@ -1,6 +1,7 @@
 //! The `lacuna` command. stdout carries data only; everything said goes to stderr.
 
 mod args;
+mod batch;
 mod convert;
 mod inspect;
 mod library;

@@ -12,12 +12,20 @@ use crate::problem::Problem;
 /// When the system gives no signals or no thread.
 pub(super) fn on_signals(token: &CancelToken) -> Result<(), Problem> {
     let token = token.clone();
+    on_signals_do(move || token.fire(StopReason::Cancelled))
+}
+
+/// Does something on the first SIGINT or SIGTERM, as [`on_signals`] fires a token.
+///
+/// # Errors
+/// As [`on_signals`].
+pub(super) fn on_signals_do(act: impl FnOnce() + Send + 'static) -> Result<(), Problem> {
     let failed = |error| Problem::io("signals cannot be watched", &error);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(failed)?;
     let watch = move || {
         runtime.block_on(async {
             asked().await;
-            token.fire(StopReason::Cancelled);
+            act();
             asked().await;
         });
         std::process::exit(130);

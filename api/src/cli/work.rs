@@ -13,11 +13,13 @@ use super::args::{
     ConvertArgs, EvaluateArgs, IntersectArgs, LimitArgs, MeasureArgs, OperationName, OutputArgs, ProgressMode, RunArgs, SideName,
     SliceArgs, SolidifyArgs,
 };
+use super::batch;
 use super::convert::title;
-use super::output::{Target, Written, deliver, deliver_streamed, target};
+use super::output::{Target, Written, deliver, deliver_streamed, finish, start, target};
 use super::progress::Reporter;
 use super::remote::{self, Server};
 use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
+use crate::digest::Digest;
 use crate::documents::Order;
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
@@ -197,6 +199,9 @@ pub(super) fn convert(args: &ConvertArgs, server: &Server, manner: Manner<'_>) -
 /// `lacuna run`.
 pub(super) fn run(args: &RunArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let bytes = read_input(&args.job, DOCUMENT_BYTES)?;
+    if batch::is_one(&bytes) {
+        return batch::run(bytes, args, manner);
+    }
     if let Some(server) = manner.server {
         let document = remote::self_contained(bytes, |bytes| whole_job(bytes, folder_of(&args.job)));
         let (certificate, written) = remote::run(server, document, &args.folder, &args.limits, manner)?;
@@ -206,16 +211,35 @@ pub(super) fn run(args: &RunArgs, manner: Manner<'_>) -> Result<(), Problem> {
     let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
     let mut job = documents::read_job_in(&bytes, &most, folder_of(&args.job))?;
     job.limits = limits(job.limits, &args.limits);
-    std::fs::create_dir_all(&args.folder).map_err(|error| Problem::io(args.folder.display(), &error))?;
+    use_threads(args.limits.threads)?;
+    let token = CancelToken::new();
+    stop::on_signals(&token)?;
+    limited(&job, &token, manner, |budget| refuse_by_plan(&job, budget)).map_err(Problem::under_model)?;
+    let (certificate, written) = make_in(&job, &args.folder, &token, manner)?;
+    print_json(&serde_json::json!({ "outputs": written, "certificate": certificate }))
+}
+
+/// Does a job, without a plan beforehand, and puts its files and its certificate into a folder, which is made if needed.
+pub(super) fn make_in(job: &Job, folder: &Path, token: &CancelToken, manner: Manner<'_>) -> Result<(Certificate, Vec<Written>), Problem> {
+    std::fs::create_dir_all(folder).map_err(|error| Problem::io(folder.display(), &error))?;
     let title = job.inputs.first().map(|input| input.name.clone());
     let stem = files::safe_stem(title.as_deref().unwrap_or("result"));
     let targets: Result<Vec<Target>, Problem> =
-        job.outputs.iter().map(|name| target(&args.folder.join(format!("{stem}.{name}")), Some(name))).collect();
-    let (targets, certificate) = (targets?, args.folder.join("certificate.json"));
-    let done =
-        perform(&job, &args.limits, manner, |outcome, budget| deliver(outcome, title.as_deref(), &targets, Some(&certificate), budget));
-    let (outcome, written) = done.map_err(|problem| problem.under_model())?;
-    print_json(&serde_json::json!({ "outputs": written, "certificate": outcome.certificate }))
+        job.outputs.iter().map(|name| target(&folder.join(format!("{stem}.{name}")), Some(name))).collect();
+    let (targets, certificate) = (targets?, folder.join(batch::CERTIFICATE));
+    let done = limited(job, token, manner, |budget| {
+        computed(job, budget, |outcome, budget| deliver(outcome, title.as_deref(), &targets, Some(&certificate), budget))
+    });
+    let (outcome, written) = done.map_err(Problem::under_model)?;
+    Ok((outcome.certificate, written))
+}
+
+/// Writes a file in full, or not at all.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<Written, Problem> {
+    let mut file = start(path)?;
+    std::io::Write::write_all(&mut file, bytes).map_err(|error| Problem::io(path.display(), &error))?;
+    finish(file, path)?;
+    Ok(Written { file: path.to_owned(), bytes: bytes.len() as u64, digest: Digest::of(bytes) })
 }
 
 /// The document of a job whose mesh files are in it.
@@ -308,7 +332,7 @@ fn input_of(path: &Path, manner: Manner<'_>) -> Result<Given, Problem> {
     Ok(Given { input: Input { model, name, radius_mm: None }, reference: None })
 }
 
-fn limits(asked: Limits, args: &LimitArgs) -> Limits {
+pub(super) fn limits(asked: Limits, args: &LimitArgs) -> Limits {
     Limits {
         seconds: args.limit_seconds.unwrap_or(asked.seconds),
         memory_bytes: args.limit_memory.unwrap_or(asked.memory_bytes),
@@ -346,12 +370,18 @@ fn watched<T>(
     work: impl FnOnce(&Budget) -> Result<T, Problem>,
 ) -> Result<T, Problem> {
     use_threads(limit_args.threads)?;
+    let token = CancelToken::new();
+    stop::on_signals(&token)?;
+    limited(job, &token, manner, |budget| refuse_by_plan(job, budget).and_then(|()| work(budget)))
+}
+
+/// Works within the limits of a job, until its token is fired.
+fn limited<T>(job: &Job, token: &CancelToken, manner: Manner<'_>, work: impl FnOnce(&Budget) -> Result<T, Problem>) -> Result<T, Problem> {
     let reporter = Reporter::new(manner.progress, manner.quiet);
-    let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: reporter.sink() };
-    stop::on_signals(&budget.cancel)?;
+    let budget = Budget { limits: job.limits, cancel: token.clone(), progress: reporter.sink() };
     let _watchdog =
         Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
-    refuse_by_plan(job, &budget).and_then(|()| work(&budget)).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
+    work(&budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))
 }
 
 /// Refuses, as a service does, what exceeds a limit for certain, before the work begins.

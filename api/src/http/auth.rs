@@ -46,22 +46,16 @@ pub async fn require_key(State(state): State<Shared>, mut request: Request, next
         _ if state.config.keys.is_empty() => None,
         _ => Some(&state.calls),
     };
-    let left = limiter.map(|limiter| limiter.admit(&owner));
-    let mut response = match left {
-        Some(Err(Left { seconds, .. })) => {
-            let allowed = limiter.map_or(0.0, |limiter| limiter.per_minute);
-            let name = limiter.map_or("", |limiter| limiter.name);
-            let facts = LimitFacts { limit: "per_minute", asked: allowed + 1.0, allowed, remedy: None };
-            let problem = Problem::new(ProblemKind::RateLimited, format!("{allowed} {name} per minute are allowed for a key"));
-            problem.limit(&facts).retry_after(seconds).into_response()
-        }
+    let mut response = match limiter.map(|limiter| limiter.draw(&owner, 1)) {
+        Some(Err(problem)) => problem.into_response(),
         _ => {
-            request.extensions_mut().insert(owner);
+            request.extensions_mut().insert(owner.clone());
             next.run(request).await
         }
     };
-    if let (Some(limiter), Some(Ok(left) | Err(left))) = (limiter, left) {
-        limiter.tell(left, response.headers_mut());
+    if let Some(limiter) = limiter {
+        // Only now: a request may have counted as several.
+        limiter.tell(limiter.left(&owner), response.headers_mut());
     }
     Ok(response)
 }
@@ -116,26 +110,61 @@ impl RateLimiter {
         }
     }
 
-    fn admit(&self, owner: &Owner) -> Result<Left, Left> {
+    /// Counts so many calls of an owner, or none of them.
+    ///
+    /// # Errors
+    /// When there are not so many left; with the seconds after which there will be, if there ever are.
+    pub fn draw(&self, owner: &Owner, calls: usize) -> Result<(), Problem> {
+        #[expect(clippy::cast_precision_loss, reason = "no request has so many")]
+        let calls = calls as f64;
+        let tokens = self.with_tokens(owner, |tokens| {
+            let there = *tokens;
+            if there >= calls {
+                *tokens -= calls;
+            }
+            there
+        });
+        if tokens >= calls {
+            return Ok(());
+        }
+        let Self { name, per_minute: allowed, .. } = *self;
+        let facts = LimitFacts { limit: "per_minute", asked: calls.max(allowed + 1.0), allowed, remedy: None };
+        let problem = |more: String| {
+            Problem::new(ProblemKind::RateLimited, format!("{allowed} {name} per minute are allowed for a key{more}")).limit(&facts)
+        };
+        Err(match calls {
+            1.0 => problem(String::new()).retry_after(seconds(calls - tokens, allowed)),
+            // Its first job was counted before.
+            _ if calls + 1.0 > allowed => problem(format!(", and the batch counts as {}; send smaller ones", calls + 1.0)),
+            _ => problem(format!(", and {} are left for the batch", whole(tokens) + 1)).retry_after(seconds(calls - tokens + 1.0, allowed)),
+        })
+    }
+
+    fn left(&self, owner: &Owner) -> Left {
+        // The share of a token that is missing comes back at the rate.
+        self.with_tokens(owner, |tokens| Left { calls: whole(*tokens), seconds: seconds(1.0 - tokens.fract(), self.per_minute) })
+    }
+
+    /// Looks at an owner's tokens as they are now.
+    fn with_tokens<T>(&self, owner: &Owner, look: impl FnOnce(&mut f64) -> T) -> T {
         let now = Instant::now();
         let mut buckets = crate::locked(&self.buckets);
         let (tokens, last) = buckets.entry(owner.0.clone()).or_insert((self.per_minute, now));
         let filled = *tokens + now.duration_since(*last).as_secs_f64() * self.per_minute / 60.0;
         (*tokens, *last) = (filled.min(self.per_minute), now);
-        let passes = *tokens >= 1.0;
-        if passes {
-            *tokens -= 1.0;
-        }
-        let left = left(*tokens, self.per_minute);
-        if passes { Ok(left) } else { Err(left) }
+        look(tokens)
     }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "tokens are at most the rate, seconds are clamped")]
-fn left(tokens: f64, per_minute: f64) -> Left {
-    // The share of a token that is missing comes back at the rate; a rate of 0 never gives one, and a day says so.
-    let seconds = ((1.0 - tokens.fract()) * 60.0 / per_minute).ceil().clamp(1.0, 86_400.0);
-    Left { calls: tokens as u64, seconds: seconds as u64 }
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "tokens are at most the rate")]
+fn whole(tokens: f64) -> u64 {
+    tokens as u64
+}
+
+/// Seconds in which so many tokens come back; a rate of 0 never gives one, and a day says so.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "they are clamped")]
+fn seconds(tokens: f64, per_minute: f64) -> u64 {
+    (tokens * 60.0 / per_minute).ceil().clamp(1.0, 86_400.0) as u64
 }
 
 #[cfg(test)]
@@ -165,10 +194,13 @@ mod tests {
     fn a_bucket_runs_dry_for_its_owner_alone() {
         let limiter = RateLimiter::new("submissions", 2);
         let (ada, bob) = (Owner("ada".into()), Owner("bob".into()));
-        assert!(limiter.admit(&ada).is_ok() && limiter.admit(&ada).is_ok());
-        let left = limiter.admit(&ada).unwrap_err();
+        assert!(limiter.draw(&ada, 1).is_ok() && limiter.draw(&ada, 1).is_ok());
+        assert_eq!(limiter.draw(&ada, 1).unwrap_err().retry_after, Some(30));
+        let left = limiter.left(&ada);
         assert!(left.calls == 0 && (29..=30).contains(&left.seconds), "{left:?}");
-        assert_eq!(limiter.admit(&bob).unwrap().calls, 1);
+        // Several count together, or none of them; more than there ever are never pass.
+        assert_eq!(limiter.draw(&bob, 3).unwrap_err().retry_after, None);
+        assert!(limiter.draw(&bob, 2).is_ok() && limiter.left(&bob).calls == 0);
         let mut headers = HeaderMap::new();
         limiter.tell(Left { calls: 1, seconds: 30 }, &mut headers);
         assert_eq!(headers[RATE_LIMIT_POLICY], "\"submissions\";q=2;w=60");

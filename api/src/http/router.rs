@@ -8,7 +8,7 @@ use utoipa_axum::routes;
 use super::state::Shared;
 use super::{auth, compression, hosts, layers};
 use crate::problem::{Problem, ProblemKind};
-use crate::routes::{capabilities, docs, events, health, jobs, library, models, problems, results, shortcuts, studies, trades};
+use crate::routes::{batches, capabilities, docs, events, health, jobs, library, models, problems, results, shortcuts, studies, trades};
 
 /// Every address with its description; the public ones apart, because the others need a key.
 fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
@@ -35,6 +35,11 @@ fn tables() -> (OpenApiRouter<Shared>, OpenApiRouter<Shared>) {
         .routes(routes!(jobs::show, jobs::forget))
         .routes(routes!(jobs::cancel))
         .routes(routes!(events::events))
+        .routes(routes!(batches::submit))
+        .routes(routes!(batches::show, batches::forget))
+        .routes(routes!(batches::certificate))
+        .routes(routes!(batches::cancel))
+        .routes(routes!(batches::events))
         .routes(routes!(results::output))
         .routes(routes!(results::result))
         .routes(routes!(trades::materials))

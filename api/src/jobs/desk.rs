@@ -11,6 +11,7 @@ use lacuna_fabrication::JobKind;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
+use super::batch::{Batch, BatchRecord, Member};
 use super::embedded::Embedded;
 use super::live::LiveJob;
 use super::record::{Ending, Idempotency, JobRecord, JobState, JobView, Output};
@@ -37,6 +38,17 @@ pub struct Submission {
     pub idempotency: Option<Idempotency>,
     /// The span of the request, if anybody wants traces.
     pub trace: Option<Context>,
+}
+
+/// A batch that was read and found legal.
+#[derive(Clone, Debug)]
+pub struct BatchSubmission {
+    /// Whose it is.
+    pub owner: String,
+    /// Its jobs, with what it calls them; none has an idempotency key of its own.
+    pub jobs: Vec<(Option<String>, Submission)>,
+    /// Idempotency key and body, if a key was given.
+    pub idempotency: Option<Idempotency>,
 }
 
 /// How many jobs there may be.
@@ -146,20 +158,92 @@ impl Desk {
         if self.is_stopping() {
             return Err(refusal::stopping());
         }
-        let document = Digest::of(&submission.document);
-        self.store.keep_document(document, &submission.document).map_err(|error| Problem::io("the job could not be recorded", &error))?;
-        let record = new_record(submission, document);
+        let record = self.recorded(submission)?;
         let (job, replayed) = match &self.ledger {
             Ledger::Embedded(ledger) => ledger.submit(record),
             Ledger::Shared(ledger) => ledger.submit(record),
         }?;
         if !replayed {
-            self.metrics.accepted();
-            if job.with(|record| record.view.reused) {
-                self.metrics.reused();
-            }
+            self.count(&job);
         }
         Ok((job, replayed))
+    }
+
+    /// A new job's record, whose document is kept.
+    fn recorded(&self, submission: Submission) -> Result<JobRecord, Problem> {
+        let document = Digest::of(&submission.document);
+        self.store.keep_document(document, &submission.document).map_err(|error| Problem::io("the job could not be recorded", &error))?;
+        Ok(new_record(submission, document))
+    }
+
+    /// Counts a job that was accepted.
+    fn count(&self, job: &LiveJob) {
+        self.metrics.accepted();
+        if job.with(|record| record.view.reused) {
+            self.metrics.reused();
+        }
+    }
+
+    /// Accepts a batch, all of its jobs or none, or hands out the one that the same idempotency key made; tells which of the two.
+    ///
+    /// # Errors
+    /// As [`Desk::submit`].
+    pub fn submit_batch(&self, submission: BatchSubmission) -> Result<(Batch, bool), Problem> {
+        if self.is_stopping() {
+            return Err(refusal::stopping());
+        }
+        let BatchSubmission { owner, jobs, idempotency } = submission;
+        let id = format!("bat_{}", Uuid::now_v7().simple());
+        let (mut records, mut members) = (Vec::with_capacity(jobs.len()), Vec::with_capacity(jobs.len()));
+        for (name, job) in jobs {
+            let mut record = self.recorded(job)?;
+            record.view.batch = Some(id.clone());
+            let JobView { id: job, kind, input_digest, .. } = record.view.clone();
+            members.push(Member { name, job, kind, input_digest });
+            records.push(record);
+        }
+        let record = BatchRecord { id, owner, created: crate::clock::now(), jobs: members, idempotency };
+        let (batch, replayed) = match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.submit_batch(record, records),
+            Ledger::Shared(ledger) => ledger.submit_batch(record, records),
+        }?;
+        if !replayed {
+            batch.jobs.iter().flatten().for_each(|job| self.count(job));
+        }
+        Ok((batch, replayed))
+    }
+
+    /// An owner's batch.
+    ///
+    /// # Errors
+    /// As [`Desk::find`].
+    pub async fn find_batch(&self, owner: &str, id: &str) -> Result<Option<Batch>, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => Ok(ledger.find_batch(owner, id)),
+            Ledger::Shared(ledger) => ledger.find_batch(owner, id).await,
+        }
+    }
+
+    /// Stops the jobs of a batch that have not ended. Those that wait have stopped when this returns.
+    ///
+    /// # Errors
+    /// When the ledger fails; then some may have been stopped, and the same call stops the others.
+    pub fn cancel_batch(&self, batch: &Batch) -> Result<(), Problem> {
+        // From the end, so that no worker takes up what is about to be stopped.
+        let left = batch.jobs.iter().rev().flatten().filter(|job| !job.state().is_final());
+        left.into_iter().try_for_each(|job| self.cancel(job).map(drop))
+    }
+
+    /// Stops the jobs of a batch and forgets all of it.
+    ///
+    /// # Errors
+    /// When the ledger fails.
+    pub fn forget_batch(&self, batch: &Batch) -> Result<(), Problem> {
+        self.cancel_batch(batch)?;
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.forget_batch(batch).map_err(|error| Problem::io("the batch could not be forgotten", &error)),
+            Ledger::Shared(ledger) => ledger.forget_batch(batch),
+        }
     }
 
     /// An owner's job.
@@ -220,8 +304,11 @@ impl Desk {
     /// Stops a job if needed and forgets it.
     ///
     /// # Errors
-    /// When the ledger fails.
+    /// When it belongs to a batch, or the ledger fails.
     pub fn forget(&self, job: &LiveJob) -> Result<(), Problem> {
+        if let Some(batch) = job.with(|record| record.view.batch.clone()) {
+            return Err(refusal::of_a_batch(&batch));
+        }
         match &self.ledger {
             Ledger::Embedded(ledger) => ledger.forget(job).map_err(|error| Problem::io("the job could not be forgotten", &error)),
             Ledger::Shared(ledger) => ledger.forget(job),
@@ -319,6 +406,7 @@ fn new_record(submission: Submission, document: Digest) -> JobRecord {
     let view = JobView {
         id: format!("job_{}", Uuid::now_v7().simple()),
         kind: submission.kind,
+        batch: None,
         state: JobState::Queued,
         attempt: 0,
         handed_back: 0,
@@ -408,6 +496,40 @@ mod tests {
         let desk = desk(&root);
         let view = look(&desk, "ada", &id).unwrap().view();
         assert_eq!((view.state, view.problem.unwrap().kind), (JobState::Failed, ProblemKind::Interrupted));
+        std::fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn a_batch_is_there_as_a_whole_or_not_at_all() {
+        let root = folder();
+        let batch = |bodies: &[&str]| BatchSubmission {
+            owner: "ada".into(),
+            jobs: bodies.iter().map(|body| (None, submission(body, None))).collect(),
+            idempotency: None,
+        };
+        let (id, jobs) = {
+            let desk = desk(&root);
+            assert_eq!(desk.submit_batch(batch(&["1", "2", "3"])).unwrap_err().kind, ProblemKind::TooManyJobs);
+            let (batch, _) = desk.submit_batch(batch(&["1", "2"])).unwrap();
+            let jobs: Vec<String> = batch.record.jobs.iter().map(|member| member.job.clone()).collect();
+            assert_eq!(desk.forget(batch.jobs[0].as_ref().unwrap()).unwrap_err().kind, ProblemKind::StateConflict);
+            (batch.record.id.clone(), jobs)
+        };
+        let found = |desk: &Desk, owner: &str| {
+            let Ledger::Embedded(ledger) = &desk.ledger else { panic!("a data folder is embedded") };
+            ledger.find_batch(owner, &id).map(|batch| batch.jobs.iter().flatten().count())
+        };
+        {
+            let desk = desk(&root);
+            assert_eq!((found(&desk, "ada"), found(&desk, "bob")), (Some(2), None));
+        }
+        // As if the process had ended just before the batch was on the device.
+        std::fs::remove_file(root.join("batches").join(format!("{id}.json"))).unwrap();
+        let desk = desk(&root);
+        assert_eq!(found(&desk, "ada"), None);
+        assert!(jobs.iter().all(|job| look(&desk, "ada", job).is_none()));
+        assert_eq!(std::fs::read_dir(root.join("jobs")).unwrap().count(), 0);
+        desk.submit_batch(batch(&["1", "2"])).unwrap();
         std::fs::remove_dir_all(root).unwrap();
     }
 

@@ -7,6 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use lacuna_kernel::budget::StopReason;
 
+use super::batch::BatchRecord;
 use super::desk::{DeskLimits, Gauges, JobFilter, Made, Retention};
 use super::journal::Journal;
 use super::live::LiveJob;
@@ -16,12 +17,16 @@ use crate::digest::Digest;
 use crate::problem::Problem;
 use crate::store::Store;
 
+mod batches;
+
 /// The ledger.
 #[derive(Debug)]
 pub(super) struct Embedded {
     book: Mutex<Book>,
     /// Something waits, or nothing more is handed out.
     arrived: Condvar,
+    /// Held while a batch is accepted.
+    batching: Mutex<()>,
     limits: DeskLimits,
     journal: Journal,
     store: Arc<Store>,
@@ -31,6 +36,7 @@ pub(super) struct Embedded {
 #[derive(Debug, Default)]
 struct Book {
     jobs: BTreeMap<String, Arc<LiveJob>>,
+    batches: BTreeMap<String, Arc<BatchRecord>>,
     /// What idempotency keys were used for; nothing yet while the first submission is accepted.
     keys: HashMap<(String, Digest), Option<String>>,
     /// Jobs that wait, first come first served.
@@ -87,8 +93,15 @@ impl Embedded {
     /// more, and those that had been started twice have failed.
     pub(super) fn open(root: &Path, store: Arc<Store>, limits: DeskLimits) -> io::Result<Self> {
         let journal = Journal::open(root)?;
-        let mut book = Book::default();
+        let batches = journal.batches()?.into_iter().map(|batch| (batch.id.clone(), Arc::new(batch)));
+        let mut book = Book { batches: batches.collect(), ..Book::default() };
         for mut record in journal.jobs()? {
+            if record.view.batch.as_ref().is_some_and(|batch| !book.batches.contains_key(batch)) {
+                // The process ended while the batch was being accepted, or forgotten.
+                journal.forget(&record.view.id)?;
+                journal.forget_start(&record.view.id)?;
+                continue;
+            }
             if matches!(record.view.state, JobState::Running | JobState::Cancelling) {
                 record.view.take_up();
                 journal.keep(&record)?;
@@ -104,7 +117,7 @@ impl Embedded {
             }
             book.insert(&Arc::new(LiveJob::new(record)));
         }
-        Ok(Self { book: Mutex::new(book), arrived: Condvar::new(), limits, journal, store })
+        Ok(Self { book: Mutex::new(book), arrived: Condvar::new(), batching: Mutex::default(), limits, journal, store })
     }
 
     fn book(&self) -> std::sync::MutexGuard<'_, Book> {
@@ -113,13 +126,13 @@ impl Embedded {
 
     pub(super) fn submit(&self, record: JobRecord) -> Result<(Arc<LiveJob>, bool), Problem> {
         let Some(used) = record.idempotency.clone() else {
-            return self.accept(record).map(|job| (job, false));
+            return self.accept_one(record).map(|job| (job, false));
         };
         let place = (record.owner.clone(), used.key);
         if let Some(known) = self.reserve(&place, &used)? {
             return Ok((known, true));
         }
-        let accepted = self.accept(record);
+        let accepted = self.accept_one(record);
         let mut book = self.book();
         match &accepted {
             Ok(job) => book.keys.insert(place, Some(job.with(|record| record.view.id.clone()))),
@@ -148,42 +161,60 @@ impl Embedded {
         }
     }
 
-    fn accept(&self, mut record: JobRecord) -> Result<Arc<LiveJob>, Problem> {
-        let owner = record.owner.clone();
-        if let Some(answer) = self.answer(&record) {
-            record.view.finish(answer, true);
+    fn accept_one(&self, record: JobRecord) -> Result<Arc<LiveJob>, Problem> {
+        let jobs = self.accept(vec![record], None)?;
+        jobs.into_iter().next().ok_or_else(|| Problem::internal("a job was accepted and is not there"))
+    }
+
+    /// Accepts jobs, all or none: one, or those of a batch.
+    fn accept(&self, mut records: Vec<JobRecord>, batch: Option<&Arc<BatchRecord>>) -> Result<Vec<Arc<LiveJob>>, Problem> {
+        for record in &mut records {
+            if let Some(answer) = self.answer(record) {
+                record.view.finish(answer, true);
+            }
         }
-        let waits = !record.view.state.is_final();
-        if waits {
+        let owner = records.first().map(|record| record.owner.clone()).unwrap_or_default();
+        let waits = |record: &JobRecord| !record.view.state.is_final();
+        let more = records.iter().filter(|record| waits(record)).count();
+        if more > 0 {
             let mut book = self.book();
             let theirs = book.unfinished.get(&owner).copied().unwrap_or(0);
-            if theirs >= self.limits.per_owner {
-                return Err(refusal::too_many("this key", self.limits.per_owner));
-            }
-            if book.waiting.len() + book.arriving >= self.limits.queued {
-                return Err(refusal::too_many("all callers", self.limits.queued));
-            }
-            *book.unfinished.entry(owner.clone()).or_default() += 1;
-            book.arriving += 1;
+            refusal::unless_room("this key", theirs, more, self.limits.per_owner)?;
+            refusal::unless_room("all callers", book.waiting.len() + book.arriving, more, self.limits.queued)?;
+            *book.unfinished.entry(owner.clone()).or_default() += more;
+            book.arriving += more;
         }
-        // On the device before it is answered or started: an accepted job is never lost.
-        let kept = self.journal.keep(&record);
-        let (id, work) = (record.view.id.clone(), record.work);
-        let job = Arc::new(LiveJob::new(record));
+        // On the device before they are answered or started: an accepted job is never lost. The batch comes last: without it its jobs were not accepted.
+        let kept = records.iter().try_for_each(|record| self.journal.keep(record));
+        let kept = kept.and_then(|()| batch.map_or(Ok(()), |batch| self.journal.keep_batch(batch)));
         let mut book = self.book();
-        book.arriving -= usize::from(waits);
+        book.arriving -= more;
         if let Err(error) = kept {
-            if waits {
-                book.leave(&owner);
+            (0..more).for_each(|_| book.leave(&owner));
+            drop(book);
+            for record in &records {
+                if let Err(error) = self.journal.forget(&record.view.id) {
+                    tracing::warn!(job = %record.view.id, %error, "the record of a job that was refused is left");
+                }
             }
             return Err(Problem::io("the job could not be recorded", &error));
         }
-        book.insert(&job);
-        if waits {
-            book.waiting.push_back((id, work));
-            self.arrived.notify_one();
+        let mut jobs = Vec::with_capacity(records.len());
+        for record in records {
+            let waiting = waits(&record).then(|| (record.view.id.clone(), record.work));
+            let job = Arc::new(LiveJob::new(record));
+            book.insert(&job);
+            book.waiting.extend(waiting);
+            jobs.push(job);
         }
-        Ok(job)
+        if let Some(batch) = batch {
+            book.batches.insert(batch.id.clone(), Arc::clone(batch));
+        }
+        drop(book);
+        if more > 0 {
+            self.arrived.notify_all();
+        }
+        Ok(jobs)
     }
 
     /// What the same work left earlier, if all of it is still there.
@@ -394,6 +425,7 @@ impl Embedded {
                 self.forget(job)?;
             }
         }
+        self.sweep_batches()?;
         let needed: HashSet<Digest> = self.by_expiry().0.iter().map(|job| job.with(|record| record.work)).collect();
         self.journal.sweep(|work| needed.contains(&work))?;
         self.store.sweep(|| {

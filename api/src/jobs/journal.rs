@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::batch::BatchRecord;
 use super::record::{Answer, JobRecord, JobState};
 use crate::digest::Digest;
 use crate::files;
 use crate::store::folder::Folder;
 
-const ROOMS: [&str; 3] = ["jobs", "starts", "answers"];
+const ROOMS: [&str; 4] = ["jobs", "starts", "answers", "batches"];
 
 /// The rooms of a data folder in which records are kept.
 #[derive(Debug)]
@@ -45,6 +46,29 @@ impl Journal {
     /// Forgets a job's record.
     pub(super) fn forget(&self, id: &str) -> io::Result<()> {
         absent_is_fine(fs::remove_file(self.job(id)))
+    }
+
+    /// Keeps a batch, whose jobs are kept already: with this it is accepted.
+    pub(super) fn keep_batch(&self, batch: &BatchRecord) -> io::Result<()> {
+        files::write_whole(&self.batch(&batch.id), &serde_json::to_vec(batch)?)
+    }
+
+    /// Forgets a batch, before its jobs: those that are left are forgotten at the next start.
+    pub(super) fn forget_batch(&self, id: &str) -> io::Result<()> {
+        absent_is_fine(fs::remove_file(self.batch(id)))
+    }
+
+    /// All batches.
+    ///
+    /// One that cannot be read is an error: its jobs would count as those of a batch that was never accepted, and go.
+    pub(super) fn batches(&self) -> io::Result<Vec<BatchRecord>> {
+        let mut batches = Vec::new();
+        for entry in fs::read_dir(self.root.join("batches"))? {
+            let path = entry?.path();
+            let read = read_json(&path).map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
+            batches.extend(read);
+        }
+        Ok(batches)
     }
 
     /// All records that can be read, the oldest first; one that cannot is told to the log and left alone.
@@ -96,6 +120,10 @@ impl Journal {
 
     fn job(&self, id: &str) -> PathBuf {
         self.root.join("jobs").join(format!("{id}.json"))
+    }
+
+    fn batch(&self, id: &str) -> PathBuf {
+        self.root.join("batches").join(format!("{id}.json"))
     }
 
     fn start(&self, id: &str) -> PathBuf {

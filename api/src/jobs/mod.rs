@@ -6,6 +6,7 @@
 
 pub mod apart;
 pub mod asked;
+pub mod batch;
 pub mod desk;
 mod embedded;
 pub mod events;

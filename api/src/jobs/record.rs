@@ -104,6 +104,9 @@ pub struct JobView {
     pub id: String,
     /// What it does.
     pub kind: JobKind,
+    /// The id of the batch that it belongs to, if it does.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub batch: Option<String>,
     /// Where it stands.
     pub state: JobState,
     /// How often it was started; 2 after the service stopped during the first time.

@@ -67,6 +67,8 @@ pub struct LimitCapability {
     queued_jobs: usize,
     /// Unfinished jobs that one key may have.
     jobs_per_key: usize,
+    /// Jobs that a batch may have.
+    batch_jobs: usize,
     /// Submissions per minute and key.
     submissions_per_minute: u32,
     /// Other calls per minute and key.
@@ -104,6 +106,7 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
             depth: config.job_limits.depth,
             queued_jobs: config.queued,
             jobs_per_key: config.jobs_per_key,
+            batch_jobs: lacuna_exchange::document::MOST_JOBS,
             submissions_per_minute: config.submissions_per_minute,
             calls_per_minute: config.calls_per_minute,
             retention_hours: config.retention_hours,

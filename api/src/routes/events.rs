@@ -20,10 +20,10 @@ use crate::jobs::live::LiveJob;
 use crate::problem::Problem;
 
 /// Between two comments that keep the connection open: below the idle times of proxies.
-const PING: Duration = Duration::from_secs(15);
+pub(super) const PING: Duration = Duration::from_secs(15);
 
 /// When a client should come back after the stream broke.
-const RETRY: Duration = Duration::from_secs(2);
+pub(super) const RETRY: Duration = Duration::from_secs(2);
 
 /// A job's events: `state`, `progress`, `warning`, `output`, `done`; the last ends the stream.
 ///

@@ -26,7 +26,7 @@ use crate::questions::Question;
 use crate::traces::Context;
 
 /// Seconds after which to look at a job again.
-const LOOK_AGAIN: u64 = 1;
+pub(super) const LOOK_AGAIN: u64 = 1;
 
 /// Which page of which jobs.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -213,7 +213,7 @@ pub async fn cancel(State(state): State<Shared>, Extension(owner): Extension<Own
     state.at_once(move |state| state.desk.cancel(&job)).await.map(answer)
 }
 
-/// Stops a job if needed and forgets it.
+/// Stops a job if needed and forgets it. 409 for a job of a batch, which is forgotten with its batch.
 #[utoipa::path(
     delete, path = "/v1/jobs/{id}", operation_id = "forget_job", tag = "jobs", params(("id" = String, Path, description = "The job's id")),
     responses((status = 204), (status = "4XX", body = Problem, content_type = "application/problem+json"))

@@ -1,5 +1,6 @@
 //! The resources, one file each.
 
+pub mod batches;
 pub mod capabilities;
 pub mod docs;
 pub mod events;

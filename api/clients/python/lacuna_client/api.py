@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, Literal
 from urllib.parse import quote
 
 from .transport import Answer, Event, Transport
-from .types import AddressAnswer, AddressQuestion, Capabilities, Health, Job, JobKind, JobPage, JobState, JobView, LibraryPage, MaterialPage, Model, ModelPage, ModelView, Plan, ProblemPage, Profile, ProfilePage, ShortOrder, SolveReport, SolveRequest, ValidationReport, Version
+from .types import AddressAnswer, AddressQuestion, Batch, BatchCertificate, BatchView, Capabilities, Health, Job, JobKind, JobPage, JobState, JobView, LibraryPage, MaterialPage, Model, ModelPage, ModelView, Plan, ProblemPage, Profile, ProfilePage, ShortOrder, SolveReport, SolveRequest, ValidationReport, Version
 
 
 class Api(Transport):
@@ -47,6 +47,45 @@ class Api(Transport):
         """
         return self._bytes('POST', '/v1/automaton', body=body, accept='image/svg+xml, text/vnd.graphviz, application/problem+json')
 
+    def submit_batch(self, body: Batch, *, prefer: str | None | None = None, idempotency_key: str | None | None = None) -> BatchView:
+        """Submits up to 100 jobs at once.
+
+        All are accepted, or none: faults of any of the documents refuse the batch, with their places. Then
+        every job ends for itself, well or not. They count as so many submissions and so many unfinished jobs;
+        those whose work was done before are answered at once and count as submissions alone. What only
+        computing shows, a limit that is passed too, is the problem of that job. With `Prefer: wait=n` (30 at
+        most) the answer waits up to n seconds for the end of all.
+        """
+        return self._json('POST', '/v1/batches', header={'Prefer': prefer, 'Idempotency-Key': idempotency_key}, body=body, accept='application/json, application/problem+json')
+
+    def forget_batch(self, id: str) -> None:
+        """Stops a batch if needed and forgets it with all of its jobs."""
+        self._nothing('DELETE', f"/v1/batches/{quote(id, safe='')}", accept='application/problem+json')
+
+    def show_batch(self, id: str) -> BatchView:
+        """A batch, in every state with 200: how many of its jobs stand where, and a row for each."""
+        return self._json('GET', f"/v1/batches/{quote(id, safe='')}", accept='application/json, application/problem+json')
+
+    def cancel_batch(self, id: str) -> BatchView:
+        """Stops all jobs of a batch that have not ended. 200 if all have ended, 202 while some are stopping."""
+        return self._json('POST', f"/v1/batches/{quote(id, safe='')}/cancel", accept='application/json, application/problem+json')
+
+    def batch_certificate(self, id: str) -> BatchCertificate:
+        """What is proven of all results of a batch: for every job how it ended, the digests of its files, and its key figures or its problem.
+
+        409 until all of its jobs have ended; 410 once they have expired. Until then its bytes stay the same.
+        """
+        return self._json('GET', f"/v1/batches/{quote(id, safe='')}/certificate", accept='application/json, application/problem+json')
+
+    def batch_events(self, id: str) -> Iterator[Event]:
+        """The rows of a batch's jobs as they end.
+
+        Server-Sent Events: `row` for every job that has ended or ends, then `done` with the batch; or with
+        `Accept: application/x-ndjson` the rows alone, one a line. A stream that is opened again begins again;
+        how far a single job has come is told by its own events.
+        """
+        return self._events('GET', f"/v1/batches/{quote(id, safe='')}/events", accept='application/x-ndjson, text/event-stream, application/problem+json')
+
     def capabilities(self) -> Capabilities:
         """Kinds of jobs, formats and limits of this service."""
         return self._json('GET', '/v1/capabilities', accept='application/json, application/problem+json')
@@ -73,7 +112,7 @@ class Api(Transport):
         return self._json('POST', '/v1/jobs', header={'Prefer': prefer, 'Idempotency-Key': idempotency_key}, body=body, accept='application/json, application/problem+json')
 
     def forget_job(self, id: str) -> None:
-        """Stops a job if needed and forgets it."""
+        """Stops a job if needed and forgets it. 409 for a job of a batch, which is forgotten with its batch."""
         self._nothing('DELETE', f"/v1/jobs/{quote(id, safe='')}", accept='application/problem+json')
 
     def show_job(self, id: str) -> JobView:

@@ -29,6 +29,45 @@ Adjacency = TypedDict('Adjacency', {
 
 AffineMap: TypeAlias = Any
 
+Batch = TypedDict('Batch', {'jobs': 'list[BatchEntry]', 'lacuna': 'Literal[1]'})
+
+BatchCertificate = TypedDict('BatchCertificate', {
+    'batch': 'NotRequired[str | None]',
+    'counts': 'Counts',
+    'input_digest': 'str',
+    'jobs': 'list[BatchRow]',
+    'kernel_version': 'str',
+    'state': 'BatchState',
+})
+
+BatchEntry = TypedDict('BatchEntry', {'job': 'Job', 'name': 'NotRequired[str]'})
+
+BatchRow = TypedDict('BatchRow', {
+    'figures': 'NotRequired[Figures | None]',
+    'index': 'int',
+    'input_digest': 'str',
+    'job': 'NotRequired[str | None]',
+    'kind': 'JobKind',
+    'name': 'NotRequired[str | None]',
+    'output_digests': 'NotRequired[dict[str, str]]',
+    'problem': 'NotRequired[Problem | None]',
+    'progress': 'NotRequired[Step | None]',
+    'state': 'JobState',
+    'warnings': 'NotRequired[list[str]]',
+})
+
+BatchState: TypeAlias = Literal['queued', 'running', 'succeeded', 'partly_succeeded', 'failed', 'cancelled', 'expired']
+
+BatchView = TypedDict('BatchView', {
+    'counts': 'Counts',
+    'created': 'str',
+    'finished': 'NotRequired[str | None]',
+    'fraction': 'float',
+    'id': 'str',
+    'jobs': 'list[BatchRow]',
+    'state': 'BatchState',
+})
+
 BcifsScheme = TypedDict('BcifsScheme', {
     'family': "Literal['bcifs']",
     'start': 'NotRequired[str]',
@@ -222,6 +261,15 @@ CornerCuttingShape = TypedDict('CornerCuttingShape', {
     'family': "Literal['corner_cutting']",
 })
 
+Counts = TypedDict('Counts', {
+    'cancelled': 'int',
+    'expired': 'int',
+    'failed': 'int',
+    'queued': 'int',
+    'running': 'int',
+    'succeeded': 'int',
+})
+
 Crease = TypedDict('Crease', {'edge': 'list[int]', 'sharpness': "float | Literal['infinite']"})
 
 CriticalRadiusStatement = TypedDict('CriticalRadiusStatement', {
@@ -262,6 +310,17 @@ ExtentStatement = TypedDict('ExtentStatement', {
     'from_mm': 'list[float]',
     'to_mm': 'list[float]',
     'width_mm': 'list[float]',
+})
+
+Figures = TypedDict('Figures', {
+    'achieved_bound_mm': 'float',
+    'components': 'NotRequired[int | None]',
+    'genus': 'NotRequired[int | None]',
+    'mesh_area_mm2': 'NotRequired[float | None]',
+    'mesh_volume_mm3': 'NotRequired[float | None]',
+    'requested_tolerance_mm': 'float',
+    'thickness_min_mm': 'NotRequired[float | None]',
+    'triangles': 'int',
 })
 
 Finding = TypedDict('Finding', {
@@ -408,6 +467,7 @@ JobState: TypeAlias = Literal['queued', 'running', 'cancelling', 'succeeded', 'f
 
 JobView = TypedDict('JobView', {
     'attempt': 'int',
+    'batch': 'NotRequired[str | None]',
     'certificate': 'NotRequired[Certificate | None]',
     'created': 'str',
     'expired': 'NotRequired[str | None]',
@@ -445,6 +505,7 @@ LevelStatement = TypedDict('LevelStatement', {
 LibraryPage = TypedDict('LibraryPage', {'items': 'list[ClassicView]'})
 
 LimitCapability = TypedDict('LimitCapability', {
+    'batch_jobs': 'int',
     'body_bytes': 'int',
     'calls_per_minute': 'int',
     'cells': 'int',

@@ -120,10 +120,10 @@ pub(super) struct Canceller {
 }
 
 impl Canceller {
-    /// Watches the token for a job.
-    pub(super) fn start(server: &Server, id: &str, token: &CancelToken) -> Result<Self, Problem> {
+    /// Watches the token for what is at a place, a job or a batch.
+    pub(super) fn start(server: &Server, place: &str, token: &CancelToken) -> Result<Self, Problem> {
         let ended = Arc::new(AtomicBool::new(false));
-        let (server, path, token, flag) = (server.clone(), format!("/v1/jobs/{id}/cancel"), token.clone(), Arc::clone(&ended));
+        let (server, path, token, flag) = (server.clone(), format!("{place}/cancel"), token.clone(), Arc::clone(&ended));
         let watch = move || {
             while !flag.load(Ordering::SeqCst) {
                 if token.reason().is_some() {

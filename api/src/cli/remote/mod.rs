@@ -14,13 +14,15 @@ use ureq::http::Method;
 use uuid::Uuid;
 
 use super::args::LimitArgs;
+use super::batch;
 use super::output::{Target, Written, finish, start};
 use super::progress::Reporter;
 use super::stop;
-use super::work::Manner;
+use super::work::{self, Manner};
 use crate::documents::{self, Order, ValidationReport};
 use crate::files::{self, PendingFile};
-use crate::jobs::record::{JobView, Output};
+use crate::jobs::batch::{BatchCertificate, BatchView};
+use crate::jobs::record::{JobState, JobView, Output};
 use crate::problem::{Problem, ProblemKind};
 use follow::Canceller;
 pub(super) use server::Server;
@@ -48,9 +50,15 @@ fn limited(document: &mut serde_json::Value, args: &LimitArgs) -> Result<(), Pro
         ("memory_bytes", args.limit_memory.map(serde_json::Value::from)),
         ("triangles", args.limit_triangles.map(serde_json::Value::from)),
     ];
-    for (name, value) in limits {
-        if let (Some(value), true) = (value, document.is_object()) {
-            document["limits"][name] = value;
+    let jobs: Vec<&mut serde_json::Value> = match document.get("jobs") {
+        Some(_) => document["jobs"].as_array_mut().into_iter().flatten().filter_map(|entry| entry.get_mut("job")).collect(),
+        None => vec![document],
+    };
+    for job in jobs.into_iter().filter(|job| job.is_object()) {
+        for (name, value) in &limits {
+            if let Some(value) = value {
+                job["limits"][*name] = value.clone();
+            }
         }
     }
     Ok(())
@@ -73,7 +81,7 @@ fn followed(server: &Server, document: &[u8], token: &CancelToken, sink: Option<
     if view.state.is_final() {
         return follow::succeeded(view);
     }
-    let _canceller = Canceller::start(server, &view.id, token)?;
+    let _canceller = Canceller::start(server, &format!("/v1/jobs/{}", view.id), token)?;
     let ended = follow::follow(server, &view.id, &mut |event| follow::report(event, sink))?;
     follow::succeeded(ended)
 }
@@ -113,10 +121,56 @@ pub(super) fn run(
     manner: Manner<'_>,
 ) -> Result<(Certificate, Vec<Written>), Problem> {
     let view = done(server, &with_limits(document, limits)?, manner)?;
+    let written = files_in(server, &view, folder)?;
+    Ok((certified(view)?, written))
+}
+
+/// Does the jobs of a batch and puts the files of each that succeeds into a folder of its own; Ctrl-C stops all of them there first.
+pub(super) fn run_batch(
+    server: &Server,
+    document: Vec<u8>,
+    folder: &Path,
+    limits: &LimitArgs,
+    manner: Manner<'_>,
+) -> Result<(BatchCertificate, Vec<Written>), Problem> {
+    let document = with_limits(document, limits)?;
+    let token = CancelToken::new();
+    stop::on_signals(&token)?;
+    let reporter = Reporter::new(manner.progress, manner.quiet);
+    let sink = reporter.sink();
+    // A submission whose answer is lost may be sent again: it is the same batch.
+    let key = Uuid::now_v7().to_string();
+    let submit = || server.json::<BatchView>(Method::POST, "/v1/batches", &[("idempotency-key", &key)], &document);
+    let view = submit().or_else(|problem| if problem.kind == ProblemKind::ServiceUnreachable { submit() } else { Err(problem) })?;
+    let place = format!("/v1/batches/{}", view.id);
+    let _canceller = Canceller::start(server, &place, &token)?;
+    let mut written = Vec::new();
+    for row in &view.jobs {
+        let id = row.job.as_deref().unwrap_or_default();
+        let ended = if row.state.is_final() {
+            follow::show(server, id)?
+        } else {
+            follow::follow(server, id, &mut |event| follow::report(event, sink.as_ref()))?
+        };
+        if ended.state == JobState::Succeeded {
+            let folder = batch::folder_of_job(folder, row.index as usize, row.name.as_deref());
+            written.extend(files_in(server, &ended, &folder)?);
+        }
+    }
+    if token.reason().is_some() {
+        return Err(Problem::new(ProblemKind::Cancelled, format!("stopped by the caller; {place} tells which jobs were done")));
+    }
+    let certificate: BatchCertificate = server.json(Method::GET, &format!("{place}/certificate"), &[], b"")?;
+    std::fs::create_dir_all(folder).map_err(|error| Problem::io(folder.display(), &error))?;
+    written.push(work::write(&folder.join(CERTIFICATE), &certificate.bytes()?)?);
+    Ok((certificate, written))
+}
+
+/// Puts all files of a job into a folder, which is made if needed.
+fn files_in(server: &Server, view: &JobView, folder: &Path) -> Result<Vec<Written>, Problem> {
     std::fs::create_dir_all(folder).map_err(|error| Problem::io(folder.display(), &error))?;
     let named: Vec<(Output, PathBuf)> = view.outputs.iter().map(|output| (output.clone(), folder.join(file_name(output)))).collect();
-    let written = deliver(server, &named)?;
-    Ok((certified(view)?, written))
+    deliver(server, &named)
 }
 
 /// A document as it is, unless the command line states limits.

@@ -11,10 +11,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
+use futures_util::future::try_join_all;
 use tokio::runtime::Handle;
 use tokio::sync::Notify;
 use tokio_postgres::error::SqlState;
 use tokio_postgres::types::{ToSql, Type};
+use tokio_postgres::{Row, Transaction};
 
 use super::desk::{DeskLimits, Gauges, JobFilter, Made, Retention};
 use super::live::LiveJob;
@@ -26,6 +28,7 @@ use crate::problem::Problem;
 use crate::store::Store;
 use pool::{Failure, Pool};
 
+mod batches;
 mod pool;
 mod rows;
 mod upkeep;
@@ -36,8 +39,8 @@ const PATIENCE: Duration = Duration::from_secs(6);
 /// Between two looks at the queue when nothing is told.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
 
-/// The version of the tables in `schema.sql`.
-const SCHEMA: i32 = 1;
+/// What makes the tables, step by step: the version of a database is the number of steps that it has behind it.
+const STEPS: [&str; 2] = [include_str!("schema.sql"), include_str!("batches.sql")];
 
 /// The ledger.
 #[derive(Debug)]
@@ -91,16 +94,17 @@ impl Shared {
         transaction.execute("SELECT pg_advisory_xact_lock(hashtextextended('lacuna schema', 0))", &[]).await?;
         transaction.batch_execute("CREATE TABLE IF NOT EXISTS lacuna_schema (version integer NOT NULL)").await?;
         let found: Option<i32> = transaction.query_opt("SELECT version FROM lacuna_schema", &[]).await?.map(|row| row.get(0));
-        match found {
-            Some(SCHEMA) => {}
-            Some(version) => {
-                let detail = format!("The database has tables of version {version}; this program reads version {SCHEMA}");
-                return Err(Problem::new(crate::problem::ProblemKind::Usage, detail).code("database-version").into());
-            }
-            None => {
-                transaction.batch_execute(include_str!("schema.sql")).await?;
-                transaction.execute("INSERT INTO lacuna_schema (version) VALUES ($1)", &[&SCHEMA]).await?;
-            }
+        if found.is_none() {
+            transaction.execute("INSERT INTO lacuna_schema (version) VALUES (0)", &[]).await?;
+        }
+        let version = found.unwrap_or(0);
+        let Some(left) = usize::try_from(version).ok().and_then(|version| STEPS.get(version..)) else {
+            let detail = format!("The database has tables of version {version}; this program reads versions up to {}", STEPS.len());
+            return Err(Problem::new(crate::problem::ProblemKind::Usage, detail).code("database-version").into());
+        };
+        for step in left {
+            transaction.batch_execute(step).await?;
+            transaction.execute("UPDATE lacuna_schema SET version = version + 1", &[]).await?;
         }
         transaction.commit().await?;
         client.done();
@@ -116,31 +120,36 @@ impl Shared {
     }
 
     pub(super) fn submit(&self, record: JobRecord) -> Result<(Arc<LiveJob>, bool), Problem> {
-        let known = self.runtime.block_on(self.within(self.known_answer(&record)))?;
-        // The store is asked outside of the transaction, which others wait for.
-        let whole = |answer: &Answer| answer.outputs.iter().try_fold(true, |all, o| Ok(all && self.store.holds_result(o.digest)?));
-        let known = match known.as_ref().map(whole).transpose() {
-            Ok(Some(true)) => known,
-            Ok(_) => None,
-            Err(error) => return Err(Problem::io("earlier results could not be looked for", &error)),
-        };
+        let known = self.known_answers(std::slice::from_ref(&record))?;
         let (record, revision, replayed) = self.runtime.block_on(self.within(self.accept(record, known)))?;
         Ok((self.mirror(record, revision), replayed))
     }
 
-    async fn known_answer(&self, record: &JobRecord) -> Result<Option<Answer>, Failure> {
-        let client = self.pool.get().await?;
-        let row = client.query_typed_opt("SELECT answer FROM lacuna_answers WHERE work = $1", &[(&record.work.hex(), Type::TEXT)]).await?;
-        client.done();
-        Ok(row.map(|row| serde_json::from_str(row.get(0))).transpose()?)
+    /// What the same work as that of these jobs left earlier, where all of it is still there.
+    fn known_answers(&self, records: &[JobRecord]) -> Result<HashMap<Digest, Answer>, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let question = "SELECT work, answer FROM lacuna_answers WHERE work = ANY($1)";
+            let found = client.query_typed(question, &[(&works(records), Type::TEXT_ARRAY)]).await?;
+            client.done();
+            let read = |row: &Row| Ok((digest(row.try_get(0)?), serde_json::from_str(row.try_get(1)?)?));
+            found.iter().map(read).collect::<Result<Vec<(Option<Digest>, Answer)>, Failure>>()
+        };
+        let found = self.runtime.block_on(self.within(asked))?;
+        // The store is asked outside of the transaction, which others wait for.
+        let whole = |answer: &Answer| answer.outputs.iter().try_fold(true, |all, o| Ok(all && self.store.holds_result(o.digest)?));
+        let mut known = HashMap::new();
+        for (work, answer) in found {
+            let whole = whole(&answer).map_err(|error: io::Error| Problem::io("earlier results could not be looked for", &error))?;
+            known.extend(work.filter(|_| whole).map(|work| (work, answer)));
+        }
+        Ok(known)
     }
 
-    async fn accept(&self, mut record: JobRecord, known: Option<Answer>) -> Result<(JobRecord, u64, bool), Failure> {
+    async fn accept(&self, record: JobRecord, known: HashMap<Digest, Answer>) -> Result<(JobRecord, u64, bool), Failure> {
         let mut client = self.pool.get().await?;
         let transaction = client.transaction().await?;
-        // One submission of an owner at a time: keys are used once, and shares are counted exactly.
-        let lock = "SELECT pg_advisory_xact_lock(hashtextextended('lacuna owner ' || $1, 0))::text";
-        transaction.query_typed(lock, &[(&record.owner, Type::TEXT)]).await?;
+        rows::lock_owner(&transaction, &record.owner).await?;
         if let Some(used) = &record.idempotency {
             let question = format!("SELECT {} FROM lacuna_jobs WHERE owner = $1 AND idempotency_key = $2", rows::COLUMNS);
             if let Some(row) = transaction.query_typed_opt(&question, &[(&record.owner, Type::TEXT), (&used.key.hex(), Type::TEXT)]).await?
@@ -154,29 +163,41 @@ impl Shared {
                 return Ok((first, revision, true));
             }
         }
-        // Nobody sweeps the answer's files before this job, which names them, is committed.
-        let question = "SELECT answer FROM lacuna_answers WHERE work = $1 FOR KEY SHARE";
-        let kept = transaction.query_typed_opt(question, &[(&record.work.hex(), Type::TEXT)]).await?.is_some();
-        match known.filter(|_| kept) {
-            Some(answer) => record.view.finish(answer, true),
-            None => {
-                let question = "SELECT count(*) FILTER (WHERE owner = $1), count(*) FILTER (WHERE state = 'queued')
-                    FROM lacuna_jobs WHERE state IN ('queued', 'running', 'cancelling')";
-                let row = transaction.query_typed_one(question, &[(&record.owner, Type::TEXT)]).await?;
-                let (theirs, waiting): (i64, i64) = (row.get(0), row.get(1));
-                let reached = |count: i64, limit: usize| usize::try_from(count).is_ok_and(|count| count >= limit);
-                if reached(theirs, self.limits.per_owner) {
-                    return Err(refusal::too_many("this key", self.limits.per_owner).into());
-                }
-                if reached(waiting, self.limits.queued) {
-                    return Err(refusal::too_many("all callers", self.limits.queued).into());
-                }
-            }
-        }
-        rows::insert(&transaction, &record).await?;
+        let record = self.admit(&transaction, vec![record], known).await?.remove(0);
         transaction.commit().await?;
         client.done();
         Ok((record, 1, false))
+    }
+
+    /// Puts the jobs of an owner, who is locked, into their places, all or none, if there is room for those that have no answer yet.
+    async fn admit(
+        &self,
+        transaction: &Transaction<'_>,
+        mut records: Vec<JobRecord>,
+        known: HashMap<Digest, Answer>,
+    ) -> Result<Vec<JobRecord>, Failure> {
+        // Nobody sweeps the answers' files before these jobs, which name them, are committed.
+        let question = "SELECT work FROM lacuna_answers WHERE work = ANY($1) ORDER BY work FOR KEY SHARE";
+        let kept = transaction.query_typed(question, &[(&works(&records), Type::TEXT_ARRAY)]).await?;
+        let kept: HashSet<Digest> = kept.iter().filter_map(|row| digest(row.get(0))).collect();
+        for record in &mut records {
+            if let Some(answer) = known.get(&record.work).filter(|_| kept.contains(&record.work)) {
+                record.view.finish(answer.clone(), true);
+            }
+        }
+        let more = records.iter().filter(|record| !record.view.state.is_final()).count();
+        if more > 0 {
+            let owner = &records[0].owner;
+            let question = "SELECT count(*) FILTER (WHERE owner = $1), count(*) FILTER (WHERE state = 'queued')
+                FROM lacuna_jobs WHERE state IN ('queued', 'running', 'cancelling')";
+            let row = transaction.query_typed_one(question, &[(owner, Type::TEXT)]).await?;
+            let count = |place: usize| usize::try_from(row.get::<_, i64>(place)).unwrap_or(usize::MAX);
+            refusal::unless_room("this key", count(0), more, self.limits.per_owner)?;
+            refusal::unless_room("all callers", count(1), more, self.limits.queued)?;
+        }
+        // All are on their way before the first answer comes.
+        try_join_all(records.iter().map(|record| rows::insert(transaction, record))).await?;
+        Ok(records)
     }
 
     /// The job as this process shows it: one object, however many look at it.
@@ -405,6 +426,8 @@ impl Shared {
             let statement = "DELETE FROM lacuna_answers WHERE made < now() - $1 * interval '1 second' AND NOT EXISTS
                 (SELECT FROM lacuna_jobs WHERE lacuna_jobs.work = lacuna_answers.work AND state <> 'expired')";
             client.execute_typed(statement, &[(&retention.jobs.as_secs_f64(), Type::FLOAT8)]).await?;
+            let statement = "DELETE FROM lacuna_batches WHERE NOT EXISTS (SELECT FROM lacuna_jobs WHERE batch = lacuna_batches.id)";
+            client.execute_typed(statement, &[]).await?;
             client.done();
             Ok(())
         };
@@ -447,7 +470,6 @@ impl Shared {
 
     async fn needed(&self) -> Result<HashSet<Digest>, Failure> {
         let client = self.pool.get().await?;
-        let digest = |hex: &str| format!("sha256:{hex}").parse::<Digest>().ok();
         let mut needed = HashSet::new();
         for row in client.query("SELECT document, results FROM lacuna_jobs WHERE state <> 'expired'", &[]).await? {
             needed.extend(digest(row.get(0)));
@@ -473,4 +495,14 @@ impl Shared {
             job.cancel.fire(lacuna_kernel::budget::StopReason::Cancelled);
         }
     }
+}
+
+/// The digest that a column holds in hex digits.
+fn digest(hex: &str) -> Option<Digest> {
+    format!("sha256:{hex}").parse().ok()
+}
+
+/// The work of some jobs as a column holds it.
+fn works(records: &[JobRecord]) -> Vec<String> {
+    records.iter().map(|record| record.work.hex()).collect()
 }

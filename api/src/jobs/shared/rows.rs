@@ -15,7 +15,7 @@ use crate::jobs::record::{Answer, JobRecord, JobState, JobView, Output, Step};
 pub(super) const CHANNEL: &str = "lacuna";
 
 /// What a row must have for [`read`].
-pub(super) const COLUMNS: &str = "record, progress, revision";
+pub(super) const COLUMNS: &str = "record, progress, revision, batch";
 
 /// A record and its revision.
 pub(super) fn read(row: &Row) -> Result<(JobRecord, u64), Failure> {
@@ -24,8 +24,16 @@ pub(super) fn read(row: &Row) -> Result<(JobRecord, u64), Failure> {
     if !record.view.state.is_final() {
         record.view.progress = progress.map(serde_json::from_str::<Step>).transpose()?;
     }
+    record.view.batch = row.try_get("batch")?;
     let revision: i64 = row.try_get("revision")?;
     Ok((record, u64::try_from(revision).unwrap_or(0)))
+}
+
+/// One submission of an owner at a time, until the transaction ends: keys are used once, and shares are counted exactly.
+pub(super) async fn lock_owner(transaction: &Transaction<'_>, owner: &str) -> Result<(), Failure> {
+    let lock = "SELECT pg_advisory_xact_lock(hashtextextended('lacuna owner ' || $1, 0))::text";
+    transaction.query_typed(lock, &[(&owner, Type::TEXT)]).await?;
+    Ok(())
 }
 
 /// The record of a job, which stays as it is until the transaction ends.
@@ -36,11 +44,12 @@ pub(super) async fn locked(transaction: &Transaction<'_>, id: &str) -> Result<Op
 
 /// Puts a new job into its place and tells of it.
 pub(super) async fn insert(transaction: &Transaction<'_>, record: &JobRecord) -> Result<(), Failure> {
-    let statement = "INSERT INTO lacuna_jobs (id, owner, kind, state, work, document, attempt, record, idempotency_key, results, finished)
-        VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, CASE WHEN $11 THEN now() END) RETURNING pg_notify($12, $13)::text";
+    let statement =
+        "INSERT INTO lacuna_jobs (id, owner, kind, state, work, document, attempt, record, idempotency_key, results, finished, batch)
+        VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, CASE WHEN $11 THEN now() END, $12) RETURNING pg_notify($13, $14)::text";
     let view = &record.view;
     let key = record.idempotency.as_ref().map(|used| used.key.hex());
-    let values: [(&(dyn ToSql + Sync), Type); 13] = [
+    let values: [(&(dyn ToSql + Sync), Type); 14] = [
         (&view.id, Type::TEXT),
         (&record.owner, Type::TEXT),
         (&crate::documents::kind_word(view.kind), Type::TEXT),
@@ -52,6 +61,7 @@ pub(super) async fn insert(transaction: &Transaction<'_>, record: &JobRecord) ->
         (&key, Type::TEXT),
         (&results(&view.outputs), Type::TEXT_ARRAY),
         (&view.state.is_final(), Type::BOOL),
+        (&view.batch, Type::TEXT),
         (&CHANNEL, Type::TEXT),
         (&told(view), Type::TEXT),
     ];

@@ -32,6 +32,8 @@ pub struct JobDocument {
     pub limits: RequestedLimits,
     /// The id of the job that this one replaces.
     pub supersedes: Option<String>,
+    /// JSON pointer to the job: empty where it is the whole document.
+    pub pointer: String,
 }
 
 /// A model that a job uses.
@@ -161,7 +163,8 @@ impl JobDocument {
             Ok(limits) if diagnostics.is_empty() => Ok(Job { kind: self.kind, inputs, params: self.params, outputs: self.outputs, limits }),
             Ok(_) => Err(diagnostics),
             Err(excesses) => {
-                diagnostics.extend(excesses);
+                let placed = |excess: Diagnostic| Diagnostic { pointer: format!("{}{}", self.pointer, excess.pointer), ..excess };
+                diagnostics.extend(excesses.into_iter().map(placed));
                 Err(diagnostics)
             }
         }
@@ -180,8 +183,15 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
     let outputs = members.get("outputs").map_or(Some(Vec::new()), |place| outputs(walker, place, kind));
     let limits = members.get("limits").map_or(Some(RequestedLimits::default()), |place| limits(walker, place));
     let supersedes = stated(members.get("supersedes").map(|place| walker.name(place, "the id of a job")));
-    let document =
-        JobDocument { kind: kind?, inputs: inputs?, params: params?, outputs: outputs?, limits: limits?, supersedes: supersedes? };
+    let document = JobDocument {
+        kind: kind?,
+        inputs: inputs?,
+        params: params?,
+        outputs: outputs?,
+        limits: limits?,
+        supersedes: supersedes?,
+        pointer: place.path.pointer(),
+    };
     settle(walker, &members, &document)?;
     Some(document)
 }

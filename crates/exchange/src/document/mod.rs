@@ -7,6 +7,7 @@
 //! mathematics can tell: the kernel's business.
 
 mod address;
+mod batch;
 mod bcifs;
 mod constraint;
 mod curve;
@@ -35,6 +36,8 @@ mod write;
 mod tests;
 
 pub use address::{AddressQuestion, CELLS_LISTED, MOST_CELLS_LISTED, Sought};
+pub use batch::BatchEntry;
+pub use grammar::MOST_JOBS;
 pub use job::{InputDocument, JobDocument, ModelSource, RequestedLimits};
 pub use schema::{job_schema, model_schema, schemas};
 pub use solve::SolveDocument;
@@ -110,6 +113,22 @@ pub fn read_job(bytes: &[u8], limits: &DocumentLimits) -> Result<JobDocument, Ve
 /// As [`read_job`].
 pub fn read_job_beside(bytes: &[u8], limits: &DocumentLimits, files: MeshFinder<'_>) -> Result<JobDocument, Vec<Diagnostic>> {
     read(bytes, limits, Some(files), job::job)
+}
+
+/// Reads a batch of jobs; [`JobDocument::resolve`] makes a job of each, with places in the batch's document.
+///
+/// # Errors
+/// As [`read_job`], for all of its jobs together.
+pub fn read_batch(bytes: &[u8], limits: &DocumentLimits) -> Result<Vec<BatchEntry>, Vec<Diagnostic>> {
+    read(bytes, limits, None, batch::batch)
+}
+
+/// Reads a batch that comes from a folder, as [`read_model_beside`] does a model.
+///
+/// # Errors
+/// As [`read_batch`].
+pub fn read_batch_beside(bytes: &[u8], limits: &DocumentLimits, files: MeshFinder<'_>) -> Result<Vec<BatchEntry>, Vec<Diagnostic>> {
+    read(bytes, limits, Some(files), batch::batch)
 }
 
 /// Reads a request to solve a model.

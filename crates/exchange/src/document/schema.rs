@@ -7,10 +7,10 @@
 use serde_json::{Map, Value, json};
 
 use super::grammar::{
-    ADDRESS_QUESTION, ADJACENCY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL, FAMILIES, GLUE,
-    INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART, PART_MEMBERS, PRIMITIVE,
-    RADIUS_BY_LEVEL, RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP, WITH,
-    control_point_schema, matrix_schema, reference, trim_point_schema,
+    ADDRESS_QUESTION, ADJACENCY, BATCH, BATCH_ENTRY, BORDER, BOUNDARY, COEFFICIENTS, CONTROL_MESH, CORNER, CREASE, CURVES, EMBEDDED_MODEL,
+    FAMILIES, GLUE, INCIDENCE, JOB, JOB_INPUT, JOB_LIMITS, JOB_PARAMS, JOIN, LINEAR_MAP, MESH_DATA, MODEL, Member, Object, PART,
+    PART_MEMBERS, PRIMITIVE, RADIUS_BY_LEVEL, RELATION, ROOT_CELL, SCHEMES, SIDE, SOLVE, STATE, TRANSITION, TRIM, TRIM_CURVES, TURNED_MAP,
+    WITH, control_point_schema, matrix_schema, reference, trim_point_schema,
 };
 
 /// The schemas of the documents by name, for the components of an OpenAPI 3.1 description: references
@@ -46,7 +46,7 @@ fn standalone(entry: &str) -> Value {
 }
 
 fn named_schemas() -> Vec<(String, Value)> {
-    const PLAIN: [(&str, &Object); 20] = [
+    const PLAIN: [(&str, &Object); 22] = [
         ("Model", &MODEL),
         ("EmbeddedModel", &EMBEDDED_MODEL),
         ("MeshData", &MESH_DATA),
@@ -67,6 +67,8 @@ fn named_schemas() -> Vec<(String, Value)> {
         ("Trim", &TRIM),
         ("JobParams", &JOB_PARAMS),
         ("JobLimits", &JOB_LIMITS),
+        ("Batch", &BATCH),
+        ("BatchEntry", &BATCH_ENTRY),
     ];
     let mut schemas: Vec<(String, Value)> = PLAIN.iter().map(|(name, grammar)| ((*name).into(), object(grammar, &[]))).collect();
     schemas.extend(FAMILIES.iter().map(|(_, name, grammar)| ((*name).into(), object(grammar, &[]))));

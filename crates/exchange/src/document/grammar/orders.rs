@@ -244,6 +244,31 @@ pub(in super::super) const JOB_LIMITS: Object = Object {
     ],
 };
 
+/// Jobs that a batch has at most.
+pub const MOST_JOBS: usize = 100;
+
+pub(in super::super) const BATCH: Object = Object {
+    title: "a batch",
+    about: "Several jobs that are accepted together, or not at all, and done in any order; each ends for itself, well or not.",
+    members: &[
+        required("lacuna", "The version of the grammar: 1.", version),
+        required(
+            "jobs",
+            "The jobs.",
+            || json!({ "type": "array", "items": reference("BatchEntry"), "minItems": 1, "maxItems": MOST_JOBS }),
+        ),
+    ],
+};
+
+pub(in super::super) const BATCH_ENTRY: Object = Object {
+    title: "a job of a batch",
+    about: "A job document, and what the batch calls it.",
+    members: &[
+        optional("name", "What to call it; no two jobs of a batch are called the same.", text),
+        required("job", "The job document, without supersedes.", || reference("Job")),
+    ],
+};
+
 pub(in super::super) const ADDRESS_QUESTION: Object = Object {
     title: "a question about addresses",
     about: "Where an address leads (at), or which addresses lead near a point (near). Exactly one of model and model_ref is given, and exactly one of at and near.",

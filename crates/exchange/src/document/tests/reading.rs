@@ -8,7 +8,9 @@ use lacuna_kernel::budget::Limits;
 use lacuna_kernel::model::{Entry, Interior, Model, Relation, Shape, Side};
 
 use crate::diagnostic::{Diagnostic, code};
-use crate::document::{DocumentLimits, ModelSource, job_schema, model_schema, read_job, read_model, schemas, write_job, write_model};
+use crate::document::{
+    DocumentLimits, MOST_JOBS, ModelSource, job_schema, model_schema, read_batch, read_job, read_model, schemas, write_job, write_model,
+};
 
 fn model(text: &str) -> Model {
     read_model(text.as_bytes(), &DocumentLimits::default()).unwrap_or_else(|faults| panic!("{faults:#?}"))
@@ -281,4 +283,20 @@ fn schemas_refer_to_each_other_and_are_closed() {
     }
     assert!(model_schema()["$defs"]["IfsShape"]["properties"]["maps"]["description"].is_string());
     assert!(job_schema().to_string().contains("\"#/$defs/JobParams\""));
+}
+
+#[test]
+fn a_batch_is_read_with_places_in_its_own_document() {
+    let job = r#"{"lacuna": 1, "kind": "measure", "model_ref": "mdl_1", "params": {"tolerance_mm": 1}, "limits": {"seconds": 9}}"#;
+    let text = format!(r#"{{"lacuna": 1, "jobs": [{{"job": {job}}}, {{"name": "b", "job": {job}}}]}}"#);
+    let entries = read_batch(text.as_bytes(), &DocumentLimits::default()).unwrap();
+    assert_eq!(entries.iter().map(|entry| entry.name.as_deref()).collect::<Vec<_>>(), [None, Some("b")]);
+    let most = Limits { seconds: 1.0, ..Limits::default() };
+    let last = entries.into_iter().next_back().unwrap().job;
+    let faults = last.resolve(&most, &most, |_| None).unwrap_err();
+    let places: Vec<&str> = faults.iter().map(|fault| fault.pointer.as_str()).collect();
+    assert_eq!(places, ["/jobs/1/job/model_ref", "/jobs/1/job/limits/seconds"]);
+    let many = format!(r#"{{"lacuna": 1, "jobs": [{}]}}"#, vec!["0"; MOST_JOBS + 1].join(","));
+    let faults = read_batch(many.as_bytes(), &DocumentLimits::default()).unwrap_err();
+    assert_eq!(faults.iter().map(|fault| (fault.pointer.as_str(), fault.code)).collect::<Vec<_>>(), [("/jobs", code::WRONG_LENGTH)]);
 }
