@@ -224,7 +224,10 @@ impl<'a> Simplifier<'a> {
             self.nearby.cover(&self.tree, [count, k, next, count + 1])
                 && self.nearby.is_clear(&mut self.tree, &mut self.places, corners, &triangle, least)
         });
-        if !certified || self.tree.exhausted || self.mender.meetings(mesh, vertex, None, Some(to), 0) > 0 {
+        if !certified || self.tree.exhausted {
+            return false;
+        }
+        if !self.mender.stays_graph(mesh, vertex, None, Some(to)) && self.mender.meetings(mesh, vertex, None, Some(to), 0) > 0 {
             return false;
         }
         mesh.points[vertex as usize] = to;
@@ -355,8 +358,7 @@ impl<'a> Simplifier<'a> {
     /// Whether the new triangles meet no others. Where old ones did, it is enough that there are fewer such pairs, or no more when
     /// nothing moves to speak of.
     fn is_free(&mut self, setting: &Setting, mesh: &HalfEdges, vertex: u32, m: usize) -> bool {
-        let found = self.mender.meetings(mesh, vertex, Some(m), None, 0);
-        if found == 0 {
+        if self.mender.stays_graph(mesh, vertex, Some(m), None) || self.mender.meetings(mesh, vertex, Some(m), None, 0) == 0 {
             return true;
         }
         let target = self.mender.star.ring[m];

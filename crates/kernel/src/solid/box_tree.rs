@@ -161,7 +161,19 @@ impl BoxTree {
 
     /// Calls `visit` with the leaves from `first` on whose boxes meet `wanted`, until it answers false.
     #[inline]
-    pub(crate) fn query(&self, wanted: &Box32, first: usize, mut visit: impl FnMut(usize) -> bool) {
+    pub(crate) fn query(&self, wanted: &Box32, first: usize, visit: impl FnMut(usize) -> bool) {
+        self.query_unless(wanted, first, |_| false, visit);
+    }
+
+    /// As [`BoxTree::query`], without what lies below nodes of which `is_known` says that it need not be looked at.
+    #[inline]
+    pub(super) fn query_unless(
+        &self,
+        wanted: &Box32,
+        first: usize,
+        is_known: impl Fn(usize) -> bool,
+        mut visit: impl FnMut(usize) -> bool,
+    ) {
         // Depth-first: at most one node waits at every level.
         let mut stack = [0_u32; 33];
         let mut height = 1;
@@ -169,7 +181,7 @@ impl BoxTree {
         while height > 0 {
             height -= 1;
             let node = stack[height] as usize;
-            if !self.nodes[node].meets(wanted) {
+            if !self.nodes[node].meets(wanted) || is_known(node) {
                 continue;
             }
             if node >= self.leaves {

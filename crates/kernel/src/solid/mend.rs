@@ -7,6 +7,7 @@
 use super::box_tree::{Box32, BoxTree};
 use super::contact;
 use super::half_edges::{HalfEdges, NONE, Star, next};
+use super::normals::{Normals, normal_box};
 use super::topology::has_no_area;
 use super::{Crossings, TriMesh};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
@@ -83,17 +84,20 @@ impl Facet {
     /// Both have a corner that is not common.
     #[inline]
     pub(super) fn parts(&self, corners: &[u32; 3], points: &[Point; 3]) -> bool {
+        self.has_on_one_side(corners.iter().copied().zip(points.iter().copied())) || (0..3).any(|k| self.is_beyond(k, corners, points))
+    }
+
+    /// Whether points are surely all above the triangle's plane, or all below, but for its own corners.
+    fn has_on_one_side(&self, points: impl Iterator<Item = (u32, Point)>) -> bool {
         let (mut above, mut below) = (true, true);
-        for (corner, point) in corners.iter().zip(points) {
-            if !self.corners.contains(corner) {
-                let offset = subtract(point, &self.points[0]);
-                let side = dot(&self.normal, &offset);
-                let error = self.error * (offset[0].abs() + offset[1].abs() + offset[2].abs());
-                above &= side > error;
-                below &= side < -error;
-            }
+        for (_, point) in points.filter(|(corner, _)| !self.corners.contains(corner)) {
+            let offset = subtract(&point, &self.points[0]);
+            let side = dot(&self.normal, &offset);
+            let error = self.error * (offset[0].abs() + offset[1].abs() + offset[2].abs());
+            above &= side > error;
+            below &= side < -error;
         }
-        above || below || (0..3).any(|k| self.is_beyond(k, corners, points))
+        above || below
     }
 
     /// Whether another triangle lies beyond edge k, but for common corners on that edge. The vector m = edge x normal is exact to 16 roundings of
@@ -127,6 +131,7 @@ pub(crate) struct Mender {
     pub(crate) star: Star,
     other: Star,
     boxes: BoxTree,
+    normals: Normals,
     /// Triangles when the boxes were made.
     boxed: usize,
     /// Triangles lower than what rounding moves, as they were met last.
@@ -283,8 +288,9 @@ impl Mender {
     /// Lists the boxes of all triangles for [`Mender::meetings`].
     pub(crate) fn index(&mut self, mesh: &HalfEdges) {
         self.boxed = mesh.alive;
-        let box_of = |triangle| mesh.triangle(triangle).map(|corners| Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
-        self.boxes.build(mesh.triangles() as usize, box_of, false);
+        let at = |triangle| mesh.triangle(triangle).map(|corners| corners.map(|corner| mesh.points[corner as usize]));
+        self.boxes.build(mesh.triangles() as usize, |triangle| at(triangle).map(|points| Box32::of(&points)), false);
+        self.normals.build(&self.boxes, |triangle| at(triangle).map(|points| normal_box(&points)));
     }
 
     /// Lists the boxes anew when half of the triangles are gone.
@@ -298,7 +304,9 @@ impl Mender {
     pub(crate) fn place(&mut self, mesh: &HalfEdges) {
         for &half in &self.star.halves {
             if let Some(corners) = mesh.triangle(half / 3) {
-                self.boxes.set(half / 3, &Box32::of(&corners.map(|corner| mesh.points[corner as usize])));
+                let points = corners.map(|corner| mesh.points[corner as usize]);
+                self.boxes.set(half / 3, &Box32::of(&points));
+                self.normals.add(&self.boxes, half / 3, &normal_box(&points));
             }
         }
     }
@@ -319,6 +327,28 @@ impl Mender {
             self.stamps[neighbour as usize] = self.stamp;
         }
         self.other.ring.iter().filter(|&&neighbour| self.stamps[neighbour as usize] == self.stamp).count() == 2
+    }
+
+    /// Whether the star's vertex may move to ring m, or elsewhere, without that anything comes to meet: surely, see `normals`. Where this cannot tell, [`Mender::meetings`] can.
+    pub(crate) fn stays_graph(&self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>) -> bool {
+        let ring = &self.star.ring;
+        let count = ring.len();
+        let point = |corner: u32| mesh.points[corner as usize];
+        let apex = to.unwrap_or_else(|| point(m.map_or(vertex, |m| ring[m])));
+        let mut own = Box32::EMPTY;
+        for k in 0..count {
+            let next = (k + 1) % count;
+            if m.is_none_or(|m| k != m && next != m) {
+                own = own.union(&normal_box(&[apex, point(ring[k]), point(ring[next])]));
+            }
+        }
+        let to = to.map(|to| (NONE, to));
+        let hull = ring.iter().chain([&vertex]).map(|&corner| (corner, point(corner))).chain(to);
+        let other = |triangle| mesh.triangle(triangle).filter(|corners| !corners.contains(&vertex)).map(|corners| corners.map(point));
+        let is_beside = |triangle, points: &[Point; 3]| {
+            mesh.triangle(triangle).is_some_and(|corners| Facet::new(corners, *points).has_on_one_side(hull.clone()))
+        };
+        self.normals.face_one_way(&self.boxes, hull.clone().map(|(_, point)| point), &own, other, is_beside)
     }
 
     /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
@@ -455,6 +485,45 @@ mod tests {
             }
         }
         assert!(folded > 150, "{folded} of the meshes had folds");
+    }
+
+    /// Of moves that are said to keep an embedded surface a graph none makes triangles meet, and most that make none meet are seen to: on thin and on rough tori.
+    #[test]
+    fn what_stays_a_graph_meets_nothing() {
+        let (mut kept, mut met, mut free) = (0, 0, 0);
+        for seed in 0..60_u32 {
+            let (around, along) = (12 + seed % 17, 5 + seed % 9);
+            let (mut points, triangles) = torus(around, along);
+            let mut random = u64::from(seed);
+            let mut share = || {
+                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (random >> 40) as f64 / f64::from(1 << 24) - 0.5
+            };
+            let rough = f64::from(seed % 5);
+            points.iter_mut().for_each(|point| *point = point.map(|x| f64::from((x + rough * share()) as f32)));
+            let mesh = HalfEdges::new(points, &triangles);
+            if crossings(&mesh, &Budget::default()).unwrap().count > 0 {
+                continue;
+            }
+            let mut mender = Mender::default();
+            mender.start(&mesh);
+            mender.index(&mesh);
+            for vertex in 0..mesh.points.len() as u32 {
+                assert!(mesh.star(vertex, MOST_AROUND, &mut mender.star));
+                let to = mesh.points[vertex as usize].map(|x| f64::from((x + 24.0 * share()) as f32));
+                let moves = (0..mender.star.ring.len()).map(|m| (Some(m), None)).chain([(None, Some(to))]);
+                for (m, to) in moves {
+                    if m.is_some_and(|m| !mender.keeps_manifold(&mesh, m)) {
+                        continue;
+                    }
+                    let stays = mender.stays_graph(&mesh, vertex, m, to);
+                    let meets = mender.meetings(&mesh, vertex, m, to, usize::MAX) > 0;
+                    assert!(!(stays && meets), "seed {seed}, vertex {vertex} to {m:?} or {to:?}");
+                    (kept, met, free) = (kept + usize::from(stays), met + usize::from(meets), free + usize::from(!meets));
+                }
+            }
+        }
+        assert!(met > 1_000 && 2 * kept > free, "{kept} of {free} are seen, {met} meet");
     }
 
     /// From the dilation of a Hilbert curve: two corners at one place cannot become one while a third, one step away, is joined to both.

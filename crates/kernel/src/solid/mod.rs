@@ -7,6 +7,7 @@ pub(crate) mod fans;
 pub(crate) mod half_edges;
 pub(crate) mod inside;
 pub(crate) mod mend;
+mod normals;
 mod repair;
 mod shells;
 pub(crate) mod topology;
