@@ -4,7 +4,10 @@
 //! one that meet H have normals n with n . v > 0 for one direction v, then it is embedded as well: suppose that its winding number is 2 or more at a point; the point is in H. Along -v from there
 //! every triangle is crossed from its front to its back, which adds 1, so that the number is still 2 or more where the line leaves H: but there it is that of the first surface. A number
 //! below 0 is led to the same contradiction along v. So the number is 0 or 1 everywhere, while it takes three values around a place where two triangles cross; and where one touches
-//! the other, both faced alike, it takes three values on the way through both. (Lines are chosen to miss edges, which all but a set without volume do.)
+//! the other, both faced alike, it takes three values on the way through both. Almost all lines miss edges, so that triangles which have no more of H than a corner or an edge need not face v, whose
+//! place they share with new ones by name.
+//!
+//! Where the first surface meets itself already, as slivers do after rounding, nothing is said: what meets in the end is counted, see `mend`.
 
 use super::box_tree::{Box32, BoxTree};
 use crate::attractor::cell::{Point, cross, dot, subtract};
