@@ -111,9 +111,9 @@ impl Normals {
             |node| faces(&self.nodes[node], direction),
             |leaf| {
                 let near = tree.items(leaf).iter().zip(tree.boxes(leaf)).filter(|(_, own)| own.meets(&bounds));
-                facing = near.filter_map(|(&item, _)| Some((item, triangle_at(item)?))).all(|(item, triangle)| {
-                    is_facing(&triangle) || is_apart(&triangle) || is_beside(item, &triangle)
-                });
+                facing = near
+                    .filter_map(|(&item, _)| Some((item, triangle_at(item)?)))
+                    .all(|(item, triangle)| is_facing(&triangle) || is_apart(&triangle) || is_beside(item, &triangle));
                 facing
             },
         );
