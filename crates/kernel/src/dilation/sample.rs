@@ -19,6 +19,9 @@ use std::sync::{Arc, Mutex};
 
 /// Nodes of a level that are followed: enough for an error of some ten per cent.
 const FOLLOWED: usize = 48;
+/// Fewer, where they hold more cells than this between them, as cells that overlap do at fine tolerances: what a level costs in time and memory is bounded by that.
+const MOST_HELD: usize = 300_000;
+const FEWEST: usize = 4;
 /// Of the blocks at the end so many are made at a time, and so often at least, until they have so many triangles and leaf cells.
 const AT_A_TIME: usize = 4;
 const AT_LEAST: usize = 3;
@@ -58,7 +61,7 @@ type Inherited = Arc<(Candidates, Vec<u32>)>;
 impl Pass<'_> {
     /// What is expected in the cube of `blocks` blocks a side that begins at block 0; `simplify` tells whether the simplification is of interest.
     ///
-    /// Deterministic, for any number of threads. Cost: that of eight times [`FOLLOWED`] nodes for each level, and of the blocks that are made.
+    /// Deterministic, for any number of threads. Cost: that of eight times [`FOLLOWED`] nodes for each level, fewer where they hold many cells, and of the blocks that are made.
     ///
     /// # Errors
     /// As [`Pass::run`].
@@ -79,7 +82,8 @@ impl Pass<'_> {
             for node in reduced {
                 met.extend(node?);
             }
-            let followed = followed(met, &mut stands_for, &mut chance);
+            let most = (MOST_HELD * met.len() / held(&met).max(1)).clamp(FEWEST, FOLLOWED);
+            let followed = followed(met, most, &mut stands_for, &mut chance);
             if followed.first().is_none_or(|(node, _)| node.blocks == 1) {
                 return self.expected_of(followed, stands_for, &mut chance, simplify);
             }
@@ -104,7 +108,9 @@ impl Pass<'_> {
         let mut cleaning = self.setting.clone();
         cleaning.clean_only = true;
         let (mut sum, mut done, mut looked_at) = (Made::default(), 0, 0);
-        for (round, some) in blocks.chunks(AT_A_TIME).enumerate() {
+        let held = held(&blocks) / blocks.len().max(1);
+        let at_a_time = (MOST_HELD / 4 / held.max(1)).clamp(1, AT_A_TIME);
+        for (round, some) in blocks.chunks(at_a_time).enumerate() {
             // What simplification holds differs little from block to block; to find it takes as long as all the rest.
             let simplify = simplify && round == 0;
             let made: Vec<Result<Made, DilationError>> =
@@ -121,7 +127,8 @@ impl Pass<'_> {
                 };
             }
             done += some.len();
-            if round + 1 >= AT_LEAST && sum.triangles.max(sum.made) + sum.leaves > ENOUGH {
+            let is_enough = round + 1 >= AT_LEAST && sum.triangles.max(sum.made) + sum.leaves > ENOUGH;
+            if is_enough || sum.leaves > MOST_HELD as u64 {
                 break;
             }
         }
@@ -174,15 +181,20 @@ impl Pass<'_> {
     }
 }
 
-/// Of nodes in their order in space as many as are followed: one of each of so many runs of equal length. `stands_for` becomes what each stands for.
-fn followed<T: Clone>(nodes: Vec<T>, stands_for: &mut f64, chance: &mut Chance) -> Vec<T> {
-    if nodes.len() <= FOLLOWED {
+/// Cells that nodes have between them.
+fn held(nodes: &[(Node, Inherited)]) -> usize {
+    nodes.iter().map(|(_, inherited)| inherited.0.cells.len()).sum()
+}
+
+/// Of nodes in their order in space the `most` that are followed: one of each of so many runs of equal length. `stands_for` becomes what each stands for.
+fn followed<T: Clone>(nodes: Vec<T>, most: usize, stands_for: &mut f64, chance: &mut Chance) -> Vec<T> {
+    if nodes.len() <= most {
         return nodes;
     }
-    let run = nodes.len() as f64 / FOLLOWED as f64;
+    let run = nodes.len() as f64 / most as f64;
     *stands_for *= run;
     // Where runs do not end between two nodes, two of them may choose the same one.
-    let chosen = (0..FOLLOWED).map(|number| ((number as f64 + chance.next()) * run) as usize);
+    let chosen = (0..most).map(|number| ((number as f64 + chance.next()) * run) as usize);
     chosen.map(|index| nodes[index.min(nodes.len() - 1)].clone()).collect()
 }
 
@@ -211,14 +223,14 @@ mod tests {
         let mut total = 0.0;
         for _ in 0..samples {
             let mut stands_for = 1.0;
-            let chosen = followed(values.clone(), &mut stands_for, &mut chance);
+            let chosen = followed(values.clone(), FOLLOWED, &mut stands_for, &mut chance);
             assert_eq!(chosen.len(), FOLLOWED);
             total += chosen.iter().sum::<f64>() * stands_for;
         }
         // The standard error of this mean is below 0.3 per cent.
         assert!((total / f64::from(samples) / sum - 1.0).abs() < 0.015, "{}", total / f64::from(samples) / sum);
         let mut stands_for = 1.0;
-        assert_eq!(followed(vec![1, 2, 3], &mut stands_for, &mut chance), [1, 2, 3]);
+        assert_eq!(followed(vec![1, 2, 3], FOLLOWED, &mut stands_for, &mut chance), [1, 2, 3]);
         assert_eq!(stands_for, 1.0);
     }
 }
