@@ -37,7 +37,7 @@ fn long(number: u32) -> Value {
         "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
 }
 
-/// A solid that ends with its limit of triangles; another one than all others, whose answers it would get.
+/// A solid that ends with its limit of triangles: a thick one, of a single block, so that it is refused in the same words by any number of threads.
 fn beyond() -> Value {
     let mut order = solid(999);
     order["limits"] = json!({ "triangles": 10 });

@@ -76,6 +76,14 @@ fn any_front_end_answers_for_any_worker() {
 }
 
 #[test]
+fn limits_hold_though_another_process_has_done_the_work() {
+    let Some(stage) = Stage::set() else { return };
+    let (first, second) = (stage.start("front", "first"), stage.start("front", "second"));
+    let _worker = stage.start("worker", "one");
+    crate::service::limits_hold_though_the_work_is_done(&first, &second);
+}
+
+#[test]
 fn equal_orders_at_once_at_two_front_ends_are_one_work() {
     let Some(stage) = Stage::set() else { return };
     let fronts = [stage.start("front", "first"), stage.start("front", "second")];

@@ -24,6 +24,7 @@
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
 //! | `plans` | is what is predicted near what is made? |
+//! | `previews` | are previews what they say, and never taken for results? |
 //! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
 //! | `rolling` | are they restarted, traced and asked to stop without a loss? |
@@ -56,6 +57,7 @@ mod independent;
 mod levels;
 mod measures;
 mod plans;
+mod previews;
 mod processes;
 mod properties;
 mod regression;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use lacuna_tests::support::binary::{run, succeed};
 use lacuna_tests::support::cases::{self, model};
 use lacuna_tests::support::scratch::Scratch;
-use lacuna_tests::support::service::{Answer, Service};
+use lacuna_tests::support::service::{Answer, Service, submit};
 use serde_json::{Value, json};
 
 /// A small solid.
@@ -98,6 +98,36 @@ fn equal_orders_share_their_results() {
     assert_ne!(first["id"], second["id"]);
     assert_eq!((&first["outputs"], &first["input_digest"]), (&second["outputs"], &second["input_digest"]));
     assert_eq!(second["reused"], true, "{second}");
+}
+
+/// Asks one process for a solid, and others for the same with limits.
+pub(crate) fn limits_hold_though_the_work_is_done(first: &Service, others: &Service) {
+    let made = first.done(&order());
+    let plan = first.post("/v1/plan", &order()).json();
+    let limited = |limits: Value| {
+        let mut order = order();
+        order["limits"] = limits;
+        others.ended(&submit(others, &order))
+    };
+    // Fewer than the lattice has, but not so few that the job is refused by its plan.
+    let few = (0.7 * plan["counted_triangles"].as_f64().unwrap()).floor();
+    let refused = limited(json!({ "triangles": few as u64 }));
+    assert_eq!((&refused["state"], &refused["problem"]["limit"]), (&json!("failed"), &json!("triangles")), "{refused}");
+    assert_eq!((&refused["problem"]["allowed"], &refused["reused"], &refused["attempt"]), (&json!(few), &json!(false), &json!(1)));
+    // What is done takes no time.
+    let soon = limited(json!({ "seconds": 1e-6 }));
+    assert_eq!((&soon["state"], &soon["reused"], &soon["outputs"]), (&json!("succeeded"), &json!(true), &made["outputs"]), "{soon}");
+    // Whatever the limits: the same is meant, and where there is a result it is the same.
+    let enough = limited(json!({ "triangles": 1_000_000 }));
+    assert_eq!((&enough["outputs"], &enough["input_digest"]), (&made["outputs"], &made["input_digest"]), "{enough}");
+    assert_eq!(refused["input_digest"], made["input_digest"]);
+}
+
+#[test]
+fn limits_hold_though_the_work_is_done_in_one_process() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    limits_hold_though_the_work_is_done(&service, &service);
 }
 
 #[test]

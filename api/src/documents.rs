@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use utoipa::ToSchema;
 
 use crate::digest::{Digest, DigestSink};
+use crate::files;
 use crate::inspection;
 use crate::problem::{Finding, Problem, ProblemKind};
 use crate::production;
@@ -401,12 +402,20 @@ impl SolveReport {
 /// What a job makes when it asks for no format: what printers read, and what carries wires.
 fn default_outputs(job: &Job) -> &'static [&'static str] {
     match job.kind {
+        _ if job.params.preview => &["glb"],
         JobKind::Intersect if job.params.operation.is_none() => &[],
         JobKind::Solidify | JobKind::Intersect => &["3mf"],
         JobKind::Evaluate | JobKind::Convert => &["obj"],
         JobKind::Slice => &["svg"],
         JobKind::Measure => &[],
     }
+}
+
+/// What the files of a job are called before their endings: as its first input; a preview is not to be taken for what it stands for.
+#[must_use]
+pub fn file_stem(job: &Job) -> String {
+    let stem = files::safe_stem(job.inputs.first().map_or("result", |input| &input.name));
+    if job.params.preview { format!("{stem}-preview") } else { stem }
 }
 
 /// The defaults, but nowhere above the most that is allowed.
@@ -421,8 +430,7 @@ pub fn within(default: &Limits, most: &Limits) -> Limits {
     }
 }
 
-/// Digest of the canonical job document with the default limits: equal for equal work, because limits
-/// decide whether there is a result but not which.
+/// Digest of the canonical job document with the default limits: equal where the same is meant, whatever it may use.
 #[must_use]
 pub fn job_digest(job: &Job) -> Digest {
     let mut sink = DigestSink::default();
@@ -589,6 +597,30 @@ mod tests {
         assert_eq!(job_digest(&cm), job_digest(&mm));
         assert_ne!(document::write_job(&cm), document::write_job(&mm));
         assert_ne!(job_digest(&cm), job_digest(&job("measure", "mm", "11", "", "").unwrap()));
+    }
+
+    #[test]
+    fn a_preview_is_other_work_and_a_glb_alone() {
+        let (result, seen) = (job("evaluate", "mm", "1", "", ""), job("evaluate", "mm", "1", r#","preview":true"#, ""));
+        let (result, seen) = (result.unwrap(), seen.unwrap());
+        assert_ne!(job_digest(&result), job_digest(&seen));
+        assert_eq!(
+            (seen.outputs.as_slice(), file_stem(&seen), file_stem(&result)),
+            (&["glb".to_owned()][..], "shape-preview".into(), "shape".into())
+        );
+        let plain = job("evaluate", "mm", "1", r#","preview":false"#, "").unwrap();
+        assert_eq!(job_digest(&result), job_digest(&plain));
+        for (kind, more, rest) in [
+            ("evaluate", "", r#","outputs":["glb","stl"]"#),
+            ("measure", "", ""),
+            ("convert", "", ""),
+            ("solidify", r#","radius_mm":1,"stability":true"#, ""),
+            ("solidify", r#","radius_mm":1,"closing_mm":1"#, ""),
+            ("solidify", r#","wall_mm":1"#, ""),
+        ] {
+            let refused = job(kind, "mm", "1", &format!(r#","preview":true{more}"#), rest).unwrap_err();
+            assert_eq!((refused.errors.len(), refused.code.as_ref()), (1, code::CONFLICTING_MEMBERS), "{kind} {more} {rest}");
+        }
     }
 
     #[test]

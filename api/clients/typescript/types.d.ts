@@ -255,6 +255,7 @@ export interface Certificate {
   oriented_box?: OrientedBoxStatement | null;
   /** The solid is inside D(r + outer). */ outer_bound_mm?: number | null;
   /** Digests of the files, by format; filled in after writing. */ output_digests: Record<string, string>;
+  preview?: PreviewStatement | null;
   /** What was done to each input that is a mesh before anything else, when the job asks for a repair. */ repair?: Array<RepairStatement>;
   /** The Hausdorff bound that was asked. */ requested_tolerance_mm: number;
   sections?: SectionsStatement | null;
@@ -630,6 +631,7 @@ export interface JobParams {
   /** What intersect leaves of the solids of its inputs: what lies in any of them (union), in all of them (intersection), in the first and in none of the others (difference), or their convex hull (hull); of one input, what lies behind a plane (trim), or its parts between planes (split). For intersect alone; without it intersect tells where two shapes come within the tolerance of each other, and makes no file. */ operation?: "union" | "intersection" | "difference" | "hull" | "trim" | "split";
   /** Whether the smallest box around the shape is found, whatever way it is turned: for measure alone; false when absent. */ oriented_box?: boolean;
   /** For trim: the normal of a plane, of any length, and its distance from the origin along that, in mm. What the normal points to is taken away. */ plane?: Array<number>;
+  /** Whether a preview is enough, which takes a second or two and is written as glb alone: for solidify the dilation as coarse as its ball allows, or where that is too much the shape without its ball, for evaluate the shape at the finest tolerance of which it has few enough cells. The certificate's preview says which, and with which tolerance; everything else in the certificate is of what is shown. For evaluate, and for solidify without level, closing_mm, wall_mm and stability; false when absent. */ preview?: boolean;
   /** The radius of the dilating ball, in mm, above zero: required by solidify unless wall_mm or level is there, optional for measure, intersect and slice, absent for evaluate and convert. */ radius_mm?: number;
   /** Whether inputs of the family mesh are made solids first, the certificate telling what was done to each: vertices at the same place are joined, triangles without area and copies are taken away, corners are doubled where parts meet in edges or corners only, and triangles are turned so that material is behind them. No point is moved. Holes of up to 64 edges, of at most a quarter of the area of the surface, are closed by triangles between their corners that meet nothing else; other open meshes are refused with the place. Absent for evaluate; false when absent. */ repair?: boolean;
   /** On which side of that surface the wall is: inward (the solid becomes hollow) or outward (what the surface bounds becomes the hollow); inward when absent. */ side?: "inward" | "outward";
@@ -980,6 +982,13 @@ export interface PlaneStatement {
   /** Where the plane is along the normal. */ offset_mm: number;
   /** Length of all loops. */ perimeter_mm: number;
   /** Connected pieces; 0 where the plane misses the solid. */ polygons: number;
+}
+
+/** That a result is a preview. */
+export interface PreviewStatement {
+  /** The tolerance of the job: that of its result without `preview`. */ final_tolerance_mm: number;
+  /** The tolerance of the preview, never less; the bounds of the certificate are held against this one. */ tolerance_mm: number;
+  /** Whether the shape itself is shown, and not its dilation by the ball of the job, because that would take too long: then all of the certificate is of the shape itself. */ without_ball: boolean;
 }
 
 /** A compact set: exactly one of points, a polyline, a mesh taken as a surface, or a solid. */

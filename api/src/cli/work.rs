@@ -23,7 +23,7 @@ use crate::digest::Digest;
 use crate::documents::Order;
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
-use crate::{documents, files, production};
+use crate::{documents, production};
 
 /// How a command behaves towards its user, and who does its work.
 #[derive(Clone, Copy, Debug)]
@@ -223,7 +223,7 @@ pub(super) fn run(args: &RunArgs, manner: Manner<'_>) -> Result<(), Problem> {
 pub(super) fn make_in(job: &Job, folder: &Path, token: &CancelToken, manner: Manner<'_>) -> Result<(Certificate, Vec<Written>), Problem> {
     std::fs::create_dir_all(folder).map_err(|error| Problem::io(folder.display(), &error))?;
     let title = job.inputs.first().map(|input| input.name.clone());
-    let stem = files::safe_stem(title.as_deref().unwrap_or("result"));
+    let stem = documents::file_stem(job);
     let targets: Result<Vec<Target>, Problem> =
         job.outputs.iter().map(|name| target(&folder.join(format!("{stem}.{name}")), Some(name))).collect();
     let (targets, certificate) = (targets?, folder.join(batch::CERTIFICATE));

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use lacuna_fabrication::JobKind;
+use lacuna_kernel::budget::Limits;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
@@ -18,6 +19,7 @@ use super::record::{Ending, Idempotency, JobRecord, JobState, JobView, Output};
 use super::refusal;
 use super::shared::Shared;
 use crate::digest::Digest;
+use crate::documents::{self, Order};
 use crate::metrics::Metrics;
 use crate::problem::Problem;
 use crate::store::Store;
@@ -32,12 +34,30 @@ pub struct Submission {
     pub kind: JobKind,
     /// The job document that a worker will read.
     pub document: Vec<u8>,
-    /// Digest of the canonical document: equal for equal work.
+    /// Digest of the canonical document, but for its limits.
     pub input_digest: Digest,
+    /// What it may use.
+    pub limits: Limits,
     /// Idempotency key and body, if a key was given.
     pub idempotency: Option<Idempotency>,
     /// The span of the request, if anybody wants traces.
     pub trace: Option<Context>,
+}
+
+impl Submission {
+    /// The submission of an owner's order.
+    #[must_use]
+    pub fn of(owner: &str, order: &Order, idempotency: Option<Idempotency>, trace: Option<Context>) -> Self {
+        Self {
+            owner: owner.to_owned(),
+            kind: order.job.kind,
+            document: order.document().into_bytes(),
+            input_digest: documents::job_digest(&order.job),
+            limits: order.job.limits,
+            idempotency,
+            trace,
+        }
+    }
 }
 
 /// A batch that was read and found legal.
@@ -397,9 +417,11 @@ impl Desk {
     }
 }
 
-/// Under which name finished work is found again: by the work and by the version that did it.
-fn work_of(input: Digest) -> Digest {
-    Digest::of(format!("{input} {}", env!("CARGO_PKG_VERSION")).as_bytes())
+/// Under which name finished work is found again: by the work, by the version that did it, and by the limits that decide how it ends. A job with a lower limit of triangles is refused
+/// what one with a higher one got, and where searches end early for want of cells or memory they say less. The time is left out: what is done already takes none.
+fn work_of(input: Digest, limits: &Limits) -> Digest {
+    let Limits { seconds: _, memory_bytes, cells, triangles, depth } = limits;
+    Digest::of(format!("{input} {} {memory_bytes} {cells} {triangles} {depth}", env!("CARGO_PKG_VERSION")).as_bytes())
 }
 
 fn new_record(submission: Submission, document: Digest) -> JobRecord {
@@ -422,7 +444,7 @@ fn new_record(submission: Submission, document: Digest) -> JobRecord {
         warnings: Vec::new(),
         problem: None,
     };
-    let work = work_of(submission.input_digest);
+    let work = work_of(submission.input_digest, &submission.limits);
     JobRecord { view, owner: submission.owner, document, work, idempotency: submission.idempotency, trace: submission.trace }
 }
 
@@ -443,6 +465,7 @@ mod tests {
             kind: JobKind::Measure,
             document: body.as_bytes().to_vec(),
             input_digest: Digest::of(body.as_bytes()),
+            limits: Limits::default(),
             trace: None,
             idempotency: key.map(|key| Idempotency { key: Digest::of(key.as_bytes()), body: Digest::of(body.as_bytes()) }),
         }
@@ -554,6 +577,22 @@ mod tests {
         desk.conclude(&first, &Ending::Failed(Box::new(Problem::internal("as asked"))));
         assert!(Arc::ptr_eq(&desk.take().unwrap(), &second));
         std::fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn other_limits_than_of_time_are_other_work() {
+        let of = |limits| work_of(Digest::of(b"{}"), &limits);
+        let usual = Limits::default();
+        assert_eq!(of(usual), of(Limits { seconds: 1.0, ..usual }));
+        for other in [
+            Limits { triangles: 1, ..usual },
+            Limits { cells: 1, ..usual },
+            Limits { memory_bytes: 1, ..usual },
+            Limits { depth: 1, ..usual },
+        ] {
+            assert_ne!(of(usual), of(other));
+        }
+        assert_ne!(of(usual), work_of(Digest::of(b"[]"), &usual));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use lacuna_kernel::budget::{Budget, Limits};
 use super::record::Output;
 use crate::digest::Digest;
 use crate::documents::{self, Stored};
-use crate::files::{self, PendingFile};
+use crate::files::PendingFile;
 use crate::problem::Problem;
 use crate::production::{self, Compute, Label};
 
@@ -57,9 +57,8 @@ pub(super) fn make(task: &Task, compute: Compute, workshop: &impl Workshop) -> R
 
 /// Writes and verifies every output, the certificate last because it names the others' digests.
 fn write_files(order: &Job, mut outcome: Outcome, budget: &Budget, workshop: &impl Workshop) -> Result<Files, Problem> {
-    let model = order.inputs.first();
-    let title = model.map(|input| input.name.as_str());
-    let stem = files::safe_stem(title.unwrap_or("result"));
+    let title = order.inputs.first().map(|input| input.name.as_str());
+    let stem = documents::file_stem(order);
     let formats: Vec<Format> = order.outputs.iter().map(|name| documents::format(name)).collect::<Result<_, _>>()?;
     let thumbnail = match (&outcome.geometry, formats.contains(&Format::ThreeMf)) {
         (Geometry::Solid(_) | Geometry::Parts(_), true) => Some(production::picture(&outcome)?),

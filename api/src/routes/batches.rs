@@ -92,17 +92,7 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
     for entry in entries {
         // One at a time: a mesh that many jobs name is never in memory for all of them.
         match documents::complete(entry.job, &state.config.job_limits, &find) {
-            Ok(order) => {
-                let submission = Submission {
-                    owner: owner.0.clone(),
-                    kind: order.job.kind,
-                    document: order.document().into_bytes(),
-                    input_digest: documents::job_digest(&order.job),
-                    idempotency: None,
-                    trace: *trace,
-                };
-                jobs.push((entry.name, submission));
-            }
+            Ok(order) => jobs.push((entry.name, Submission::of(&owner.0, &order, None, *trace))),
             Err(problem) => match &mut refusal {
                 Some(first) => first.errors.extend(problem.errors),
                 None => refusal = Some(problem),

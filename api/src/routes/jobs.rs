@@ -122,7 +122,6 @@ pub(super) async fn take(
 fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Arc<LiveJob>, bool), Problem> {
     let Orderer { owner, trace } = orderer;
     let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
-    let job = &order.job;
     let replaced = order.supersedes.as_deref().map(|id| {
         // Beside the event loop, where waiting is allowed.
         let found = tokio::runtime::Handle::current().block_on(state.desk.find(&owner.0, id))?;
@@ -140,15 +139,7 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
         Err(problem) if ["limit.seconds", "limit.memory"].contains(&problem.code.as_ref()) => {}
         Err(problem) => return Err(problem),
     }
-    let submission = Submission {
-        owner: owner.0.clone(),
-        kind: job.kind,
-        document: order.document().into_bytes(),
-        input_digest: documents::job_digest(job),
-        idempotency,
-        trace: *trace,
-    };
-    let accepted = state.desk.submit(submission)?;
+    let accepted = state.desk.submit(Submission::of(&owner.0, &order, idempotency, *trace))?;
     // Only now: a refusal must not cost the caller what there is. The same work twice is not replaced by itself.
     let id_of = |job: &LiveJob| job.with(|record| record.view.id.clone());
     if let Some(replaced) = replaced.filter(|replaced| id_of(replaced) != id_of(&accepted.0) && !replaced.state().is_final()) {

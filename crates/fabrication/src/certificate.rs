@@ -14,6 +14,7 @@ use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 
 use crate::level::LevelStatement;
 use crate::operand::Operand;
+use crate::preview::PreviewStatement;
 use crate::repair::RepairStatement;
 use crate::run::{JobError, not_carried};
 use crate::shape_measures::{EnclosedStatement, ExtentStatement, OrientedBoxStatement, ThicknessStatement};
@@ -116,6 +117,9 @@ pub struct Certificate {
     /// `true` or `"not_checked"`: proven that the solid has as many components, handles and voids as the exact dilation.
     #[cfg_attr(feature = "wire", serde(default), schema(schema_with = wire::flag_schema))]
     pub topology_exact: Checked<bool>,
+    /// That this is a preview, and at which tolerance, where it is one.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub preview: Option<PreviewStatement>,
     /// What was done to each input that is a mesh before anything else, when the job asks for a repair.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Vec::is_empty", default))]
     pub repair: Vec<RepairStatement>,

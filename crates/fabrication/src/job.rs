@@ -126,6 +126,8 @@ pub enum With {
 pub struct Params {
     /// Hausdorff bound on the result, in mm; 0 for a level without one, which is exact but for single precision.
     pub tolerance_mm: f64,
+    /// Whether something of the result is enough that is there soon: of an `evaluate`, or of a `solidify` with a ball and nothing besides.
+    pub preview: bool,
     /// The level of a `solidify` that joins copies of a system's primitive instead of dilating its attractor.
     pub level: Option<u32>,
     /// Whether inputs that are meshes are repaired first, so that each is a solid; `evaluate` alone has no use for it.
@@ -169,6 +171,7 @@ impl Params {
     pub fn new(tolerance_mm: f64) -> Self {
         Self {
             tolerance_mm,
+            preview: false,
             level: None,
             repair: false,
             radius_mm: None,

@@ -7,7 +7,7 @@ use crate::{Job, JobKind, Operation, boolean, convert, level, slice, split};
 use lacuna_kernel::attractor::{Attractor, RefineError, count_cells};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::dilation::{Prediction, predict};
-use lacuna_kernel::error::Kind;
+use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use std::collections::BTreeMap;
 
@@ -101,7 +101,9 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
 
 /// An error of a limit with a value that would pass, where the plan knows one. Cost: some plans.
 pub(crate) fn with_remedy(job: &Job, mut error: JobError, budget: &Budget) -> JobError {
-    if let Some(facts) = error.limit.as_mut().filter(|facts| facts.remedy.is_none() && PLANNED.contains(&facts.limit)) {
+    // Of previews nothing is planned.
+    let known = |facts: &&mut LimitFacts| facts.remedy.is_none() && PLANNED.contains(&facts.limit) && !job.params.preview;
+    if let Some(facts) = error.limit.as_mut().filter(known) {
         facts.remedy = remedy(job, None, facts.limit, budget);
     }
     error
@@ -169,6 +171,8 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
     match job.kind {
+        // It keeps to limits of its own, and a plan would take as long.
+        JobKind::Evaluate | JobKind::Solidify if job.params.preview => return Ok(Plan::default()),
         JobKind::Intersect if job.params.operation == Some(Operation::Split) => {
             let how = split_of(job)?;
             return boolean::plan(job, tolerance, budget, |tolerance, budget| split::split(job, &how, tolerance, budget));

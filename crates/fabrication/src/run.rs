@@ -17,7 +17,9 @@ use crate::plan::with_remedy;
 use crate::repair::repaired;
 use crate::shape_measures::{MappedThickness, enclosed, extent, no_solid, smallest_box, walls_and_gaps};
 use crate::solve::freedom;
-use crate::{Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, slice, solidify, split};
+use crate::{
+    Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, preview, slice, solidify, split,
+};
 
 /// The geometry of a result.
 #[derive(Clone, Debug, PartialEq)]
@@ -220,6 +222,9 @@ fn made(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         return level::solidify(job, level, budget);
     }
     let tolerance = Tolerance::new(job.params.tolerance_mm)?;
+    if job.params.preview {
+        return preview::preview(job, tolerance, budget);
+    }
     match job.kind {
         JobKind::Evaluate => evaluate(&lower(job, budget)?.attractor, tolerance, job.params.normals, budget),
         JobKind::Solidify => solidify::solidify(job, tolerance, budget),
@@ -321,7 +326,7 @@ fn share_of(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Res
     Ok((bounds, Tolerance::new(share)?))
 }
 
-fn evaluate(attractor: &Attractor, tolerance: Tolerance, normals: bool, budget: &Budget) -> Result<Outcome, JobError> {
+pub(crate) fn evaluate(attractor: &Attractor, tolerance: Tolerance, normals: bool, budget: &Budget) -> Result<Outcome, JobError> {
     let (bounds, share) = share_of(attractor, tolerance, budget)?;
     let mut remarks = Vec::new();
     let planes = normals.then(|| attractor.tangent_planes());

@@ -202,6 +202,7 @@ Certificate = TypedDict('Certificate', {
     'oriented_box': 'NotRequired[OrientedBoxStatement | None]',
     'outer_bound_mm': 'NotRequired[float | None]',
     'output_digests': 'dict[str, str]',
+    'preview': 'NotRequired[PreviewStatement | None]',
     'repair': 'NotRequired[list[RepairStatement]]',
     'requested_tolerance_mm': 'float',
     'sections': 'NotRequired[SectionsStatement | None]',
@@ -450,6 +451,7 @@ JobParams = TypedDict('JobParams', {
     'operation': "NotRequired[Literal['union', 'intersection', 'difference', 'hull', 'trim', 'split']]",
     'oriented_box': 'NotRequired[bool]',
     'plane': 'NotRequired[list[float]]',
+    'preview': 'NotRequired[bool]',
     'radius_mm': 'NotRequired[float]',
     'repair': 'NotRequired[bool]',
     'side': "NotRequired[Literal['inward', 'outward']]",
@@ -714,6 +716,12 @@ PlaneStatement = TypedDict('PlaneStatement', {
     'offset_mm': 'float',
     'perimeter_mm': 'float',
     'polygons': 'int',
+})
+
+PreviewStatement = TypedDict('PreviewStatement', {
+    'final_tolerance_mm': 'float',
+    'tolerance_mm': 'float',
+    'without_ball': 'bool',
 })
 
 Primitive = TypedDict('Primitive', {

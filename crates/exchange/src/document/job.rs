@@ -200,6 +200,9 @@ pub(super) fn job(walker: &mut Walker<'_>, place: Place<'_>) -> Option<JobDocume
 const MEASURED: &str =
     "measure delivers numbers, and with \"thickness\" the output \"ply\", its map on the surface; remove all other \"outputs\"";
 
+/// What a preview delivers.
+const PREVIEWED: &str = "a preview is for the eye, and comes as \"glb\" alone; remove all other \"outputs\", or \"preview\"";
+
 /// What depends on several members: an operation takes two inputs or more; two shapes, or one and a primitive, are held against each other as they are,
 /// and make no file.
 fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument) -> Option<()> {
@@ -218,6 +221,12 @@ fn settle(walker: &mut Walker<'_>, members: &Members<'_>, document: &JobDocument
     };
     if let Some(wanted) = wanted {
         walker.fault(&place, code::WRONG_LENGTH, || format!("there are {count} inputs; expected {wanted}"));
+        return None;
+    }
+    if let (true, Some(place)) = (document.params.preview, members.get("outputs"))
+        && document.outputs.iter().any(|name| name != Format::Glb.facts().ending)
+    {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || PREVIEWED.into());
         return None;
     }
     let compares = match document.kind {
@@ -407,11 +416,13 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
     let simplify = flag_of(walker, &members, kind, "simplify", (JobKind::Solidify, "solidify"), true)?;
     let stability = flag_of(walker, &members, kind, "stability", (JobKind::Solidify, "solidify"), false)?;
     let repair = repair(walker, &members, kind)?;
+    let preview = preview(walker, &members, kind)?;
     let tolerance_mm = tolerance?;
     let closing_mm = closing(walker, &members, kind, stability)?;
     let wall = wall(walker, &members, kind)?;
     Some(Params {
         tolerance_mm,
+        preview,
         level,
         repair,
         radius_mm,
@@ -430,6 +441,24 @@ fn params(walker: &mut Walker<'_>, place: Place<'_>, kind: Option<JobKind>) -> O
         simplify,
         stability,
     })
+}
+
+/// Whether a preview is enough, of the shape itself or with its ball and nothing besides.
+fn preview(walker: &mut Walker<'_>, members: &Members<'_>, kind: Option<JobKind>) -> Option<bool> {
+    let Some(place) = members.get("preview") else { return Some(false) };
+    if kind.is_some_and(|kind| !matches!(kind, JobKind::Evaluate | JobKind::Solidify)) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            "only evaluate and solidify have a preview; remove it, or ask for one of these kinds".into()
+        });
+        return None;
+    }
+    if let Some(name) = ["level", "closing_mm", "wall_mm", "stability"].into_iter().find(|name| members.has(name)) {
+        walker.fault(&place, code::CONFLICTING_MEMBERS, || {
+            format!("a preview is of the shape with its ball and nothing besides; remove it, or \"{name}\"")
+        });
+        return None;
+    }
+    walker.flag(place)
 }
 
 /// Whether meshes are repaired, which an evaluation, taking a mesh as it is, does not.

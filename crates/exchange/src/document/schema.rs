@@ -166,10 +166,14 @@ fn job() -> Value {
                 "not": { "required": ["normals"] },
                 "dependentSchemas": { "level": { "not": { "anyOf": [
                     { "required": ["radius_mm"] }, { "required": ["closing_mm"] }, { "required": ["wall_mm"] }, { "required": ["simplify"] },
-                    { "required": ["stability"] }
+                    { "required": ["stability"] }, { "required": ["preview"] }
                 ] } } },
             } } })
         ),
+        {
+            "if": { "properties": { "params": { "properties": { "preview": { "const": true } }, "required": ["preview"] } } },
+            "then": { "properties": { "outputs": { "items": { "const": "glb" } } } },
+        },
         kind(
             "evaluate",
             json!({ "properties": { "params": { "not": { "anyOf": [
@@ -180,7 +184,9 @@ fn job() -> Value {
             "measure",
             json!({ "properties": {
                 "outputs": { "maxItems": 0 },
-                "params": { "not": { "anyOf": [{ "required": ["normals"] }, { "required": ["simplify"] }, { "required": ["stability"] }] } },
+                "params": { "not": { "anyOf": [
+                    { "required": ["normals"] }, { "required": ["simplify"] }, { "required": ["stability"] }, { "required": ["preview"] }
+                ] } },
             } }),
         ),
     ]);

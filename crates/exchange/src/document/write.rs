@@ -321,6 +321,7 @@ object! {
         .put_some("radius_mm", input.radius_mm.map(Number).as_ref())?;
     lacuna_fabrication::job::Params: |params, members| members
         .put_if(params.level.is_none() || params.tolerance_mm > 0.0, "tolerance_mm", &Number(params.tolerance_mm))?
+        .put_if(params.preview, "preview", &true)?
         .put_some("level", params.level.as_ref())?
         .put_if(params.repair, "repair", &true)?
         .put_some("radius_mm", params.radius_mm.map(Number).as_ref())?

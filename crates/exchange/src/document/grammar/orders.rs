@@ -129,6 +129,11 @@ pub(in super::super) const JOB_PARAMS: Object = Object {
             positive,
         ),
         optional(
+            "preview",
+            "Whether a preview is enough, which takes a second or two and is written as glb alone: for solidify the dilation as coarse as its ball allows, or where that is too much the shape without its ball, for evaluate the shape at the finest tolerance of which it has few enough cells. The certificate's preview says which, and with which tolerance; everything else in the certificate is of what is shown. For evaluate, and for solidify without level, closing_mm, wall_mm and stability; false when absent.",
+            flag,
+        ),
+        optional(
             "level",
             "For solidify of a model of the family ifs, instead of radius_mm: the union of all copies of the primitive along addresses of this length, as an exact solid; the primitive is the model's solid, or else the box of its attractor.",
             || json!({ "type": "integer", "minimum": 0, "maximum": MOST_LEVEL }),
