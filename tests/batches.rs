@@ -181,6 +181,29 @@ fn a_batch_is_refused_as_a_whole_with_the_places_of_all_faults() {
 }
 
 #[test]
+fn a_short_batch_that_names_a_long_model_a_hundred_times_is_refused() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &MANY);
+    let corners: Vec<[u32; 3]> = (0..100_000).map(|place| [place, 7, 9]).collect();
+    let faces: Vec<[u32; 2]> = (1..100_000).map(|place| [place - 1, place]).collect();
+    let model = json!({ "lacuna": 1, "shape": { "family": "mesh", "vertices": corners, "faces": faces } });
+    let stored = service.post("/v1/models", &model).json();
+    let length = stored["bytes"].as_u64().unwrap();
+    assert!((1 << 20..8 << 20).contains(&length), "{stored}");
+    let job =
+        |number: u32| json!({ "lacuna": 1, "kind": "measure", "model_ref": stored["id"], "params": { "tolerance_mm": f64::from(number) } });
+    let refused = service.post("/v1/batches", &batch((1..=100).map(job)));
+    let problem = refused.json();
+    assert_eq!(
+        (refused.status, &problem["code"], &problem["allowed"]),
+        (422, &json!("limit.batch-bytes"), &json!(67_108_864.0)),
+        "{problem}"
+    );
+    assert_eq!(service.get("/v1/jobs").json()["items"], json!([]));
+    submit(&service, &batch((1..=5).map(job)));
+}
+
+#[test]
 fn a_batch_is_stopped_and_forgotten_as_one() {
     let scratch = Scratch::new();
     let service = Service::start_with(scratch.path(), &[("LACUNA_WORKERS", "1")]);

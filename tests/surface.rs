@@ -231,6 +231,7 @@ fn a_file_is_told_in_parts_and_by_its_tag() {
     assert_eq!((ranged("if-range", &tag), ranged("if-range", "\"another\""), ranged("if-range", &format!("W/{tag}"))), (206, 200, 200));
     assert_eq!((ranged("if-none-match", &tag), ranged("if-none-match", "\"another\"")), (304, 206));
     assert_eq!((ranged("if-match", &tag), ranged("if-match", "*"), ranged("if-match", "\"another\"")), (206, 206, 412));
+    assert_eq!(ranged("range", "bytes=20-29"), 200, "of two ranges neither is the one that is meant");
     let refused = service.get_with(&path, &[("if-match", "\"another\"")]).json();
     assert!(refused["code"] == "precondition-failed" && refused["detail"].as_str().unwrap().contains(&tag), "{refused}");
 
@@ -302,6 +303,31 @@ fn bodies_that_are_announced_as_compressed_are_refused_as_such() {
     assert_eq!(service.get("/v1/models").json()["items"], json!([]));
     let plain = service.post_with("/v1/jobs", &[("content-encoding", "identity")], order.as_bytes());
     assert!(matches!(plain.status, 200 | 202), "{}", plain.json());
+}
+
+#[test]
+fn bodies_that_are_compressed_on_their_way_are_refused_and_not_read() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let head =
+        "POST /v1/validate HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json\r\ntransfer-encoding: ";
+    let body = "\r\n\r\n2\r\n{}\r\n0\r\n\r\n";
+    let refused = service.raw(format!("{head}gzip, chunked{body}").as_bytes(), Duration::from_secs(30));
+    assert!(refused.starts_with("HTTP/1.1 415") && refused.contains("unsupported-encoding"), "{refused}");
+    let mut stream = TcpStream::connect(service.address).unwrap();
+    write!(stream, "{head}chunked{body}").unwrap();
+    let mut read = String::new();
+    stream.read_to_string(&mut read).unwrap();
+    assert!(read.starts_with("HTTP/1.1 200"), "{read}");
+}
+
+#[test]
+fn what_says_nothing_of_caches_is_kept_by_none() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    for path in ["/v1/jobs", "/v1/capabilities", "/v1/materials", "/livez", "/nowhere"] {
+        assert_eq!(service.get(path).header("cache-control"), "no-store", "{path}");
+    }
 }
 
 #[test]

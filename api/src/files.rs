@@ -155,6 +155,27 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
     pending.commit(target)
 }
 
+/// Writes several whole files of one folder, which is waited for once.
+///
+/// # Errors
+/// When the device fails; then some may be in their places.
+pub fn write_together<B: AsRef<[u8]>>(folder: &Path, files: &[(String, B)]) -> io::Result<()> {
+    let mut pending = Vec::with_capacity(files.len());
+    for (_, bytes) in files {
+        let mut file = PendingFile::create_in(folder)?;
+        file.write_all(bytes.as_ref())?;
+        pending.push(file);
+    }
+    // All are on their way to the device before the first is waited for.
+    for file in &pending {
+        file.file.sync_all()?;
+    }
+    for (file, (name, _)) in pending.iter().zip(files) {
+        fs::rename(&file.path, folder.join(name))?;
+    }
+    if files.is_empty() { Ok(()) } else { sync_folder(folder) }
+}
+
 /// Writes a whole file at once, which outlives the process, but perhaps not a power failure: for what is found out again.
 ///
 /// # Errors

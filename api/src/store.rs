@@ -36,7 +36,8 @@ use folder::Folder;
 /// Age below which nothing is swept: what a running job has made is kept before its record names it.
 const SWEPT_AFTER: Duration = Duration::from_secs(3600);
 
-const ROOMS: [&str; 4] = ["documents", "models", "uploads", "results"];
+const DOCUMENTS: &str = "documents";
+const ROOMS: [&str; 4] = [DOCUMENTS, "models", "uploads", "results"];
 
 /// What is told of a stored model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -169,7 +170,7 @@ impl Store {
     /// When the shelf or the question fails.
     pub fn sweep<E: From<io::Error>>(&self, needed: impl FnOnce() -> Result<std::collections::HashSet<Digest>, E>) -> Result<usize, E> {
         let mut candidates = Vec::new();
-        for room in ["documents", "results"] {
+        for room in [DOCUMENTS, "results"] {
             for (name, since) in on_shelf!(self, shelf => shelf.list(room))? {
                 let digest: Option<Digest> = format!("sha256:{name}").parse().ok();
                 let old = SystemTime::now().duration_since(since).is_ok_and(|age| age >= SWEPT_AFTER);
@@ -187,16 +188,22 @@ impl Store {
         Ok(removed)
     }
 
-    /// Keeps a job document under its digest.
+    /// Keeps job documents, each under its digest.
     ///
     /// # Errors
     /// When the shelf fails.
-    pub fn keep_document(&self, digest: Digest, bytes: &[u8]) -> io::Result<()> {
-        let name = document_name(digest);
+    pub fn keep_documents(&self, documents: &[(Digest, &[u8])]) -> io::Result<()> {
         match &self.shelf {
-            Shelf::Folder(folder) if folder.renew(&name)? => Ok(()),
-            Shelf::Folder(folder) => folder.put(&name, bytes),
-            Shelf::Bucket(bucket) => bucket.put(&name, bytes),
+            Shelf::Folder(folder) => {
+                let mut new: Vec<(String, &[u8])> = Vec::with_capacity(documents.len());
+                for (digest, bytes) in documents {
+                    if !folder.renew(&document_name(*digest))? {
+                        new.push((digest.hex(), bytes));
+                    }
+                }
+                folder.put_together(DOCUMENTS, &new)
+            }
+            Shelf::Bucket(bucket) => documents.iter().try_for_each(|(digest, bytes)| bucket.put(&document_name(*digest), bytes)),
         }
     }
 
@@ -279,7 +286,7 @@ fn result_name(digest: Digest) -> String {
 }
 
 fn document_name(digest: Digest) -> String {
-    format!("documents/{}", digest.hex())
+    format!("{DOCUMENTS}/{}", digest.hex())
 }
 
 /// One room per owner: what is not in it does not exist for that owner.

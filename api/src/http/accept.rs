@@ -14,7 +14,7 @@ pub struct Accept(Vec<MediaRange>);
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct MediaRange {
     name: String,
-    /// In thousandths, the finest that RFC 9110 knows.
+    /// In thousandths.
     quality: u16,
 }
 
@@ -56,21 +56,35 @@ impl Accept {
     }
 }
 
-impl MediaRange {
-    fn read(item: &str) -> Result<Self, Problem> {
+/// An item of a header of preferences, as `Accept` and `Accept-Encoding` are (RFC 9110, 12.4.2).
+pub(super) struct Weighted {
+    /// What is preferred, in lower case.
+    pub(super) name: String,
+    /// How much, in thousandths, the finest that RFC 9110 knows; none when what is given is no number from 0 to 1.
+    pub(super) quality: Option<u16>,
+}
+
+impl Weighted {
+    /// Reads one item; all other parameters than `q` are passed over.
+    pub(super) fn read(item: &str) -> Self {
         let mut parts = item.split(';').map(str::trim);
         let name = parts.next().unwrap_or_default().to_ascii_lowercase();
-        let parameters = parts.filter_map(|part| part.split_once('='));
-        let weight = parameters.map(|(name, value)| (name.trim(), value.trim())).find(|(name, _)| name.eq_ignore_ascii_case("q"));
-        let quality = match weight {
-            None => 1.0,
-            Some((_, value)) => value.parse::<f32>().ok().filter(|quality| (0.0..=1.0).contains(quality)).ok_or_else(|| {
-                let shown: String = item.chars().take(80).collect();
-                bad(format!("Accept has {shown:?}; its q is a number from 0 to 1"))
-            })?,
-        };
+        let mut parameters = parts.filter_map(|part| part.split_once('='));
+        let weight = parameters.find(|(name, _)| name.trim().eq_ignore_ascii_case("q"));
+        let quality = weight.map_or(Some(1.0), |(_, value)| value.trim().parse::<f32>().ok());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 1000")]
-        let quality = (quality * 1000.0).round() as u16;
+        let quality = quality.filter(|quality| (0.0..=1.0).contains(quality)).map(|quality| (quality * 1000.0).round() as u16);
+        Self { name, quality }
+    }
+}
+
+impl MediaRange {
+    fn read(item: &str) -> Result<Self, Problem> {
+        let Weighted { name, quality } = Weighted::read(item);
+        let quality = quality.ok_or_else(|| {
+            let shown: String = item.chars().take(80).collect();
+            bad(format!("Accept has {shown:?}; its q is a number from 0 to 1"))
+        })?;
         // A format has one name among those that it is known by; `*` alone is what old Java clients send for `*/*`.
         let known = Format::from_name(&name).filter(|_| name.contains('/')).map(|format| format.facts().media_type.to_owned());
         let name = known.unwrap_or(if name == "*" { "*/*".to_owned() } else { name });

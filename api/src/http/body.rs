@@ -115,17 +115,17 @@ fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
     Err(Problem::new(ProblemKind::UnsupportedMedia, detail))
 }
 
-/// Bodies are read as they come: what is announced as compressed would be taken for something else.
+/// Bodies are read as they come: what is announced as compressed, for the whole way or for a part of it, would be taken for something else.
 fn check_coding(headers: &HeaderMap) -> Result<(), Problem> {
-    let mut codings = headers.get_all(header::CONTENT_ENCODING).iter().map(|value| String::from_utf8_lossy(value.as_bytes()));
-    match codings.find(|coding| !coding.trim().eq_ignore_ascii_case("identity")) {
-        Some(coding) => {
-            let given: String = coding.chars().take(80).collect();
-            let detail = format!("the body is announced with Content-Encoding {given:?}; send it as it is, without that header");
-            Err(Problem::new(ProblemKind::UnsupportedMedia, detail).code("unsupported-encoding"))
+    for (name, plain) in [(header::CONTENT_ENCODING, "identity"), (header::TRANSFER_ENCODING, "chunked")] {
+        let mut codings = headers.get_all(&name).iter().map(|value| String::from_utf8_lossy(value.as_bytes()));
+        if let Some(coding) = codings.find(|coding| !coding.trim().eq_ignore_ascii_case(plain)) {
+            let (given, title) = (coding.chars().take(80).collect::<String>(), if plain == "chunked" { "Transfer" } else { "Content" });
+            let detail = format!("the body is announced with {title}-Encoding {given:?}; send it as it is, without that coding");
+            return Err(Problem::new(ProblemKind::UnsupportedMedia, detail).code("unsupported-encoding"));
         }
-        None => Ok(()),
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -135,15 +135,16 @@ mod tests {
 
     #[test]
     fn only_what_is_not_compressed_is_read() {
-        let check = |value: &str| {
-            let mut headers = HeaderMap::new();
-            headers.insert(header::CONTENT_ENCODING, value.parse().unwrap());
+        let check = |name, value: &str| {
+            let headers = HeaderMap::from_iter([(name, value.parse().unwrap())]);
             check_coding(&headers).map_err(|problem| problem.code)
         };
-        assert!(check_coding(&HeaderMap::new()).is_ok() && check("identity").is_ok());
+        assert!(check_coding(&HeaderMap::new()).is_ok());
+        assert!(check(header::CONTENT_ENCODING, "identity").is_ok() && check(header::TRANSFER_ENCODING, "Chunked").is_ok());
         for coding in ["gzip", "br", "identity, gzip", "snappy-9000", ""] {
-            assert_eq!(check(coding), Err("unsupported-encoding".to_owned()), "{coding}");
+            assert_eq!(check(header::CONTENT_ENCODING, coding), Err("unsupported-encoding".to_owned()), "{coding}");
         }
+        assert_eq!(check(header::TRANSFER_ENCODING, "gzip, chunked"), Err("unsupported-encoding".to_owned()));
     }
 
     #[test]

@@ -16,6 +16,8 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use http_body_util::BodyExt;
 
+use super::accept::Weighted;
+
 /// Shortest body that is compressed: a shorter one fits into one packet as it is.
 const SHORTEST: u64 = 1 << 10;
 
@@ -90,20 +92,18 @@ fn takes_gzip(headers: &HeaderMap) -> bool {
     let values = headers.get_all(header::ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
     let (mut gzip, mut identity, mut any) = (None, None, None);
     for item in values.flat_map(|value| value.split(',')) {
-        let mut parts = item.split(';').map(str::trim);
-        let coding = parts.next().unwrap_or_default().to_ascii_lowercase();
-        let weight = parts.filter_map(|part| part.split_once('=')).find(|(name, _)| name.trim().eq_ignore_ascii_case("q"));
+        let Weighted { name, quality } = Weighted::read(item);
         // What is no number is no wish.
-        let quality = weight.map_or(1.0, |(_, value)| value.trim().parse::<f32>().unwrap_or(0.0));
-        match &*coding {
+        let quality = quality.unwrap_or(0);
+        match &*name {
             "gzip" | "x-gzip" => gzip = Some(quality),
             "identity" => identity = Some(quality),
             "*" => any = Some(quality),
             _ => {}
         }
     }
-    let gzip = gzip.or(any).unwrap_or(0.0);
-    gzip > 0.0 && gzip >= identity.unwrap_or(0.0)
+    let gzip = gzip.or(any).unwrap_or(0);
+    gzip > 0 && gzip >= identity.unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -36,6 +36,8 @@ pub async fn observe(State(state): State<Shared>, mut request: Request, next: Ne
     if let Ok(value) = HeaderValue::from_str(&id) {
         response.headers_mut().insert(REQUEST_ID, value);
     }
+    // What says nothing else is true now: a cache that guesses would tell of jobs as they were.
+    response.headers_mut().entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     let (status, time) = (response.status().as_u16(), start.elapsed());
     state.metrics.request(known_method(&method), &route, status, time);
     tracing::info!(request_id = %id, %method, %route, status, milliseconds = time.as_millis(), "request");

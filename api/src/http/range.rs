@@ -60,9 +60,11 @@ pub async fn answer(request: &HeaderMap, store: &Store, file: File, output: &Out
         *response.status_mut() = StatusCode::NOT_MODIFIED;
         return Ok(response);
     }
-    let text = |name| request.get(name).and_then(|value| value.to_str().ok());
     // A range of another version must not be glued to this one.
-    let range = text(header::RANGE).filter(|_| text(header::IF_RANGE).is_none_or(|tag| tag == etag));
+    let same_version = request.get_all(header::IF_RANGE).iter().all(|tag| tag == etag.as_str());
+    let mut ranges = request.get_all(header::RANGE).iter();
+    // Of several none is the one that is meant.
+    let range = ranges.next().filter(|_| same_version && ranges.next().is_none()).and_then(|value| value.to_str().ok());
     let (first, length) = match part(range, output.bytes) {
         Part::Whole => (0, output.bytes),
         Part::Outside => return outside(output.bytes),

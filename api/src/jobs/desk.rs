@@ -178,7 +178,7 @@ impl Desk {
         if self.is_stopping() {
             return Err(refusal::stopping());
         }
-        let record = self.recorded(submission)?;
+        let record = self.recorded(vec![submission])?.remove(0);
         let (job, replayed) = match &self.ledger {
             Ledger::Embedded(ledger) => ledger.submit(record),
             Ledger::Shared(ledger) => ledger.submit(record),
@@ -189,11 +189,13 @@ impl Desk {
         Ok((job, replayed))
     }
 
-    /// A new job's record, whose document is kept.
-    fn recorded(&self, submission: Submission) -> Result<JobRecord, Problem> {
-        let document = Digest::of(&submission.document);
-        self.store.keep_document(document, &submission.document).map_err(|error| Problem::io("the job could not be recorded", &error))?;
-        Ok(new_record(submission, document))
+    /// The records of new jobs, whose documents are kept.
+    fn recorded(&self, submissions: Vec<Submission>) -> Result<Vec<JobRecord>, Problem> {
+        let digests = submissions.iter().map(|submission| Digest::of(&submission.document));
+        let documents: Vec<(Digest, &[u8])> = digests.zip(submissions.iter().map(|submission| submission.document.as_slice())).collect();
+        self.store.keep_documents(&documents).map_err(|error| Problem::io("the job could not be recorded", &error))?;
+        let digests: Vec<Digest> = documents.into_iter().map(|(digest, _)| digest).collect();
+        Ok(submissions.into_iter().zip(digests).map(|(submission, document)| new_record(submission, document)).collect())
     }
 
     /// Counts a job that was accepted.
@@ -214,13 +216,13 @@ impl Desk {
         }
         let BatchSubmission { owner, jobs, idempotency } = submission;
         let id = format!("bat_{}", Uuid::now_v7().simple());
-        let (mut records, mut members) = (Vec::with_capacity(jobs.len()), Vec::with_capacity(jobs.len()));
-        for (name, job) in jobs {
-            let mut record = self.recorded(job)?;
+        let (names, jobs): (Vec<_>, Vec<_>) = jobs.into_iter().unzip();
+        let mut records = self.recorded(jobs)?;
+        let mut members = Vec::with_capacity(records.len());
+        for (name, record) in names.into_iter().zip(&mut records) {
             record.view.batch = Some(id.clone());
             let JobView { id: job, kind, input_digest, .. } = record.view.clone();
             members.push(Member { name, job, kind, input_digest });
-            records.push(record);
         }
         let record = BatchRecord { id, owner, created: crate::clock::now(), jobs: members, idempotency };
         let (batch, replayed) = match &self.ledger {

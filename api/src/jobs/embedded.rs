@@ -185,7 +185,7 @@ impl Embedded {
             book.arriving += more;
         }
         // On the device before they are answered or started: an accepted job is never lost. The batch comes last: without it its jobs were not accepted.
-        let kept = records.iter().try_for_each(|record| self.journal.keep(record));
+        let kept = self.journal.keep_all(&records);
         let kept = kept.and_then(|()| batch.map_or(Ok(()), |batch| self.journal.keep_batch(batch)));
         let mut book = self.book();
         book.arriving -= more;

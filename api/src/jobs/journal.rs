@@ -12,7 +12,8 @@ use crate::digest::Digest;
 use crate::files;
 use crate::store::folder::Folder;
 
-const ROOMS: [&str; 4] = ["jobs", "starts", "answers", "batches"];
+const JOBS: &str = "jobs";
+const ROOMS: [&str; 4] = [JOBS, "starts", "answers", "batches"];
 
 /// The rooms of a data folder in which records are kept.
 #[derive(Debug)]
@@ -30,6 +31,12 @@ impl Journal {
     /// Keeps a job's record in place of its earlier one: on the device when this returns.
     pub(super) fn keep(&self, record: &JobRecord) -> io::Result<()> {
         files::write_whole(&self.job(&record.view.id), &serde_json::to_vec(record)?)
+    }
+
+    /// Keeps the records of several new jobs.
+    pub(super) fn keep_all(&self, records: &[JobRecord]) -> io::Result<()> {
+        let file = |record: &JobRecord| Ok((job_file(&record.view.id), serde_json::to_vec(record)?));
+        files::write_together(&self.root.join(JOBS), &records.iter().map(file).collect::<io::Result<Vec<_>>>()?)
     }
 
     /// Notes that a job is started: a job that brings the process down is known by its attempt. A power failure may undo
@@ -74,7 +81,7 @@ impl Journal {
     /// All records that can be read, the oldest first; one that cannot is told to the log and left alone.
     pub(super) fn jobs(&self) -> io::Result<Vec<JobRecord>> {
         let mut records: Vec<JobRecord> = Vec::new();
-        for entry in fs::read_dir(self.root.join("jobs"))? {
+        for entry in fs::read_dir(self.root.join(JOBS))? {
             let path = entry?.path();
             match read_json(&path) {
                 Ok(Some(record)) => records.push(self.with_start(record)),
@@ -119,7 +126,7 @@ impl Journal {
     }
 
     fn job(&self, id: &str) -> PathBuf {
-        self.root.join("jobs").join(format!("{id}.json"))
+        self.root.join(JOBS).join(job_file(id))
     }
 
     fn batch(&self, id: &str) -> PathBuf {
@@ -133,6 +140,10 @@ impl Journal {
     fn answer_path(&self, work: Digest) -> PathBuf {
         self.root.join("answers").join(format!("{}.json", work.hex()))
     }
+}
+
+fn job_file(id: &str) -> String {
+    format!("{id}.json")
 }
 
 fn absent_is_fine(result: io::Result<()>) -> io::Result<()> {

@@ -13,6 +13,7 @@ use axum::response::sse::{Event as Sent, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::future::BoxFuture;
 use futures_util::stream::{self, FuturesUnordered, Stream, StreamExt};
+use lacuna_kernel::error::LimitFacts;
 use tokio::sync::watch;
 
 use super::events::{PING, RETRY};
@@ -33,6 +34,10 @@ use crate::traces::Context;
 
 const EVENT_STREAM: &str = "text/event-stream";
 const LINES: &str = "application/x-ndjson";
+
+/// Bytes of the jobs' documents, with the stored models that they name, that a batch has at most: all are in memory until the batch is accepted, and a short one can name a long model a
+/// hundred times. Eight times the longest body there is by default.
+const MOST_BYTES: usize = 64 << 20;
 
 /// Submits up to 100 jobs at once.
 ///
@@ -87,12 +92,19 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
     let entries = documents::read_batch(body)?;
     // The request itself has been counted as one.
     state.submissions.draw(owner, entries.len() - 1)?;
-    let find = state.models_of(owner);
+    let (find, mut length) = (state.models_of(owner), 0);
     let (mut jobs, mut refusal) = (Vec::with_capacity(entries.len()), None::<Problem>);
     for entry in entries {
         // One at a time: a mesh that many jobs name is never in memory for all of them.
         match documents::complete(entry.job, &state.config.job_limits, &find) {
-            Ok(order) => jobs.push((entry.name, Submission::of(&owner.0, &order, None, *trace))),
+            Ok(order) => {
+                let submission = Submission::of(&owner.0, &order, None, *trace);
+                length += submission.document.len();
+                if length > MOST_BYTES {
+                    return Err(too_long(length));
+                }
+                jobs.push((entry.name, submission));
+            }
             Err(problem) => match &mut refusal {
                 Some(first) => first.errors.extend(problem.errors),
                 None => refusal = Some(problem),
@@ -103,6 +115,15 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
         Some(problem) => Err(problem),
         None => state.desk.submit_batch(BatchSubmission { owner: owner.0.clone(), jobs, idempotency }),
     }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
+fn too_long(length: usize) -> Problem {
+    let facts = LimitFacts { limit: "batch_bytes", asked: length as f64, allowed: MOST_BYTES as f64, remedy: None };
+    let detail = format!(
+        "the jobs' documents, each with the stored models that it names, have more than {MOST_BYTES} bytes together; send the jobs in smaller batches, or upload their models as mesh files, which stay where they are"
+    );
+    Problem::new(ProblemKind::Limit, detail).code("limit.batch-bytes").limit(&facts)
 }
 
 fn answer(view: BatchView) -> Response {

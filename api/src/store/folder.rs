@@ -60,6 +60,11 @@ impl Folder {
         files::write_whole(&path, bytes)
     }
 
+    /// Puts several things into one room.
+    pub(super) fn put_together(&self, room: &str, things: &[(String, &[u8])]) -> io::Result<()> {
+        files::write_together(&self.path(room), things)
+    }
+
     pub(super) fn get(&self, name: &str) -> io::Result<Option<Vec<u8>>> {
         match fs::read(self.path(name)) {
             Ok(bytes) => Ok(Some(bytes)),
