@@ -270,6 +270,29 @@ fn volumes_that_count_a_place_twice_say_so() {
     assert!(beside.warnings[0].contains("counts -1 times"), "{:?}", beside.warnings);
 }
 
+/// A mesh that closes and yet bounds no solid has the volume of a surface, which is none: that is told, and an open mesh is what it says.
+#[test]
+fn a_mesh_that_closes_without_a_solid_says_so() {
+    let Model { shape: Shape::Mesh(outward), .. } = cubes(&[[0.0, 1.0]]) else { unreachable!("a mesh") };
+    let told = |change: &dyn Fn(&mut PolygonMesh)| {
+        let mut mesh = outward.clone();
+        change(&mut mesh);
+        let found = measured(Model { name: None, shape: Shape::Mesh(mesh) }, Params::new(0.01));
+        assert_within(found.volume_mm3.unwrap(), 0.0, 0.0);
+        found.warnings
+    };
+    let inward = told(&|mesh| mesh.faces.iter_mut().for_each(|face| face.reverse()));
+    assert!(inward[0].contains("its faces look inwards (signed volume -1 mm3); ask for a repair"), "{inward:?}");
+    let flipped = told(&|mesh| mesh.faces[2].reverse());
+    assert!(flipped[0].contains("is taken as a surface") && flipped[0].contains("in the same direction"), "{flipped:?}");
+    let said = told(&|mesh| {
+        mesh.faces[2].reverse();
+        mesh.interior = Interior::Surface;
+    });
+    let open = told(&|mesh| drop(mesh.faces.pop()));
+    assert!(said.is_empty() && open.is_empty(), "{said:?} {open:?}");
+}
+
 /// Volumes and moments beyond the range of numbers are refused, and were once an internal error.
 #[test]
 fn shapes_too_large_for_numbers_are_refused() {

@@ -177,15 +177,25 @@ impl PolygonMesh {
             let origin = corner(elements.triangles[0][0]);
             let six = |t: &[u32; 3]| (corner(t[0]) - origin).dot((corner(t[1]) - origin).cross(corner(t[2]) - origin));
             let volume = elements.triangles.iter().map(six).sum::<f64>() / 6.0;
-            (volume <= 0.0).then(|| format!("its faces look inwards (signed volume {volume} mm3); reverse them"))
+            let how = if volume < 0.0 { "its faces look inwards" } else { "it encloses nothing" };
+            (volume <= 0.0).then(|| format!("{how} (signed volume {volume} mm3)"))
         });
         match (fault, self.interior) {
             (None, _) => Some(true),
             (Some(fault), Interior::Solid) => {
-                draft.error("/interior", "mesh.not-closed", format!("the mesh does not bound a solid: {fault}"));
+                let message = format!("the mesh does not bound a solid: {fault}; mend it, or say \"interior\": \"surface\"");
+                draft.error("/interior", "mesh.not-closed", message);
                 None
             }
-            (Some(_), _) => Some(false),
+            (Some(fault), _) => {
+                // An open surface is one; who closes a mesh means a solid.
+                if has_no_border(&elements.triangles) {
+                    let way_out = "ask for a repair, which turns faces, or say \"interior\": \"surface\"";
+                    let message = format!("the mesh closes, but is taken as a surface, which has no volume: {fault}; {way_out}");
+                    draft.warn("/interior", "mesh.not-oriented", message);
+                }
+                Some(false)
+            }
         }
     }
 }
@@ -199,6 +209,14 @@ fn closed_fault(triangles: &[[u32; 3]]) -> Option<String> {
     }
     let open = edges.iter().find(|&&(a, b)| edges.binary_search(&(b, a)).is_err());
     open.map(|&(a, b)| format!("the edge {a} - {b} has one face only"))
+}
+
+/// Whether every edge has an even number of faces, as those of bodies have, whichever way they run.
+fn has_no_border(triangles: &[[u32; 3]]) -> bool {
+    let edges = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+    let mut edges: Vec<(u32, u32)> = edges.map(|(a, b)| (a.min(b), a.max(b))).collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).all(|faces| faces.len() % 2 == 0)
 }
 
 /// A new state of points, segments or triangles.
