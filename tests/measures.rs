@@ -117,6 +117,31 @@ fn dimensions_of_meshes() {
     }
 }
 
+/// What was told of these as proven was wrong: a needle was a solid or a segment, and tolerances stood for what is known.
+#[test]
+fn dimensions_that_a_tolerance_would_miss() {
+    // A triangle 100 mm long and 1 nm high, turned.
+    let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
+    for number in 0..20 {
+        let vertices = [DVec3::ZERO, DVec3::X * 100.0, DVec3::new(37.0 + f64::from(number), 1e-6, 0.0)].map(|p| turn * p).to_vec();
+        let needle = Shape::Mesh(PolygonMesh { vertices, faces: vec![vec![0, 1, 2]], interior: Interior::Auto });
+        assert_eq!(dimension(needle), ([2.0; 2], DimensionBasis::Elementary));
+    }
+    let pair = |scale: DVec3, at: f64| {
+        let map = |x: f64| AffineMap { linear: DMat3::from_diagonal(scale), translation: DVec3::X * x };
+        Shape::Ifs(Ifs { maps: vec![map(0.0), map(at)], primitive: None, graph: None })
+    };
+    // Cantor's set on the axis: the maps are similar up to 4e-10 only.
+    let third = 1.0 / 3.0;
+    let ([low, high], _) = dimension(pair(third * DVec3::new(1.0, 1.0 - 4e-10, 1.0 - 4e-10), 2.0 * third));
+    let exact = 2.0_f64.ln() / 3.0_f64.ln();
+    assert!(low <= exact && exact <= high, "{exact} is not in [{low}, {high}]");
+    // With gaps of 2e-10 it is as unconnected as any.
+    let ([low, high], _) = dimension(pair(DVec3::new(0.5 - 1e-10, 0.3, 0.3), 0.5 + 1e-10));
+    let exact = 2.0_f64.ln() / -(0.5_f64 - 1e-10).ln();
+    assert!(low <= exact && exact <= high, "{exact} is not in [{low}, {high}]");
+}
+
 #[track_caller]
 fn assert_within(interval: [f64; 2], exact: f64, width: f64) {
     assert!(interval[0] <= exact && exact <= interval[1], "{exact} is not in {interval:?}");

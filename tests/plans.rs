@@ -210,9 +210,23 @@ fn refused_and_mended(scratch: &Scratch, jobs: Vec<(Value, &'static str)>, by_pl
     for (number, (job, name)) in jobs.into_iter().enumerate() {
         std::fs::write(&file, job.to_string()).unwrap();
         let made = scratch.join(&format!("made-{number}"));
-        let ended = run(["run".as_ref(), file.as_os_str(), "-o".as_ref(), made.as_os_str(), "--quiet".as_ref()]);
-        let said = String::from_utf8(ended.stderr).unwrap();
-        assert_eq!(ended.status.code(), Some(4), "{said}");
+        let refused = |threads: &str| {
+            let ended = run([
+                "run".as_ref(),
+                file.as_os_str(),
+                "-o".as_ref(),
+                made.as_os_str(),
+                "--quiet".as_ref(),
+                "--threads".as_ref(),
+                threads.as_ref(),
+            ]);
+            let said = String::from_utf8(ended.stderr).unwrap();
+            assert_eq!(ended.status.code(), Some(4), "{said}");
+            said
+        };
+        let said = refused("2");
+        // Whatever threads had made when the limit was hit.
+        assert_eq!((refused("2"), refused("1")), (said.clone(), said.clone()));
         assert_eq!(said.contains("[plan-exceeds-limit]"), by_plan, "{said}");
         // Refused by its plan, a job does not even make its folder; one that the work ends leaves nothing in it.
         let left = std::fs::read_dir(&made).map(|folder| folder.count()).ok();

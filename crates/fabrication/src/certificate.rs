@@ -6,8 +6,10 @@ use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{Change, CriticalRadius, Dilation, Stability, Verdict};
 use lacuna_kernel::error::Kind;
 use lacuna_kernel::levels::SolidLevel;
-use lacuna_kernel::measure::mass::{MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume};
-use lacuna_kernel::measure::{AxisBox, Dimension, DimensionKnowledge};
+use lacuna_kernel::measure::mass::{
+    MassProperties, area, dilated_area, dilated_volume, mass_properties, mesh_measures, volume, volume_within,
+};
+use lacuna_kernel::measure::{self, AxisBox, Dimension, DimensionKnowledge};
 use lacuna_kernel::solid::{Rounded, Solid, SolidError, Topology, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
@@ -516,18 +518,21 @@ impl Certificate {
     pub(crate) fn state_mass(&mut self, mesh: &TriMesh, difference: f64, bounds: &AxisBox, density_g_cm3: Option<f64>) {
         let Some(MassProperties { volume, centroid, inertia }) = mass_properties(mesh) else { return };
         let reach = (0..3)
-            .map(|axis| (bounds.high[axis].high - centroid[axis]).max(centroid[axis] - bounds.low[axis].low).powi(2))
+            .map(|axis| (bounds.high[axis].high - centroid[axis].low).max(centroid[axis].high - bounds.low[axis].low).powi(2))
             .sum::<f64>()
             .sqrt();
-        let difference = difference + ROUNDING * volume;
-        if difference < volume {
-            let shift = reach * difference / (volume - difference) + ROUNDING * (reach + centroid.length());
-            let spread = reach * reach * difference + (volume + difference) * shift * shift + ROUNDING * volume * reach * reach;
-            self.centroid_mm = Some(centroid.to_array().map(|x| [x - shift, x + shift]));
-            self.inertia_mm5 = Some(inertia.map(|row| row.map(|x| [x - spread, x + spread])));
+        if difference < volume.low {
+            let shift = reach * difference / (volume.low - difference);
+            let spread = reach * reach * difference + (volume.high + difference) * shift * shift;
+            let widened = |x: measure::Interval, by: f64| [x.low - by, x.high + by];
+            self.centroid_mm = Some(centroid.map(|x| widened(x, shift * (1.0 + ROUNDING))));
+            self.inertia_mm5 = Some(inertia.map(|row| row.map(|x| widened(x, spread * (1.0 + ROUNDING)))));
         }
         // 1 cm^3 is 1000 mm^3.
-        self.mass_g = self.volume_mm3.zip(density_g_cm3).map(|(volume, density)| volume.map(|v| v * 1e-3 * density));
+        self.mass_g = self.volume_mm3.zip(density_g_cm3).map(|([low, high], density)| {
+            let [low, high] = [low, high].map(|volume| volume * 1e-3 * density);
+            [low - 2.0 * f64::EPSILON * low.abs(), high + 2.0 * f64::EPSILON * high.abs()]
+        });
     }
 
     /// Adds what was found of the topology at radii nearby, `reached` around the radius.
@@ -678,7 +683,7 @@ pub(crate) fn of_split(
 pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, tolerance: Tolerance) -> Certificate {
     let mut counted = of_one_solid(&dilation.solid, dilation.crossings, attractor.warnings().to_vec(), tolerance);
     let radius = dilation.least_radius_mm;
-    let exact = dilated_volume(volume(dilation.solid.mesh()), radius, dilation.inner_mm, dilation.outer_mm);
+    let exact = dilated_volume(volume_within(dilation.solid.mesh()), radius, dilation.inner_mm, dilation.outer_mm);
     let exact_area = dilated_area(exact, radius);
     if dilation.crossings > 0 {
         counted
@@ -756,8 +761,8 @@ pub(crate) fn of_operation(
     let (inner, outer) = (inner + rounded.moved_mm, outer + rounded.moved_mm);
     // What the operations of two families of sets do not share lies in what the sets do not share.
     let difference = operands.iter().map(|operand| operand.volume_error).sum::<f64>() + swept(rounded.solid.mesh(), rounded.moved_mm);
-    let enclosed = volume(rounded.solid.mesh());
-    let exact = [(enclosed - difference) * (1.0 - ROUNDING), (enclosed + difference) * (1.0 + ROUNDING)];
+    let (enclosed, difference) = (volume_within(rounded.solid.mesh()), difference * (1.0 + ROUNDING));
+    let exact = [enclosed.low - difference, enclosed.high + difference];
     if rounded.crossings > 0 {
         counted.warnings.push(format!("{} pairs of triangles cross or touch where they are not joined", rounded.crossings));
     }
@@ -778,7 +783,7 @@ pub(crate) fn of_operation(
     }
 }
 
-/// Relative rounding of a volume.
+/// Relative rounding of a sum over all triangles of what they sweep.
 const ROUNDING: f64 = 1e-10;
 
 /// The volume that a surface sweeps at most when its points move by `length`: a triangle's edges change by 2 length, so on its way it has no more

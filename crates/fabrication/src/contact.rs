@@ -16,7 +16,6 @@ use crate::certificate::{
     PlaceStatement,
 };
 use crate::job::With;
-use crate::operand::is_solid;
 use crate::run::{JobError, Outcome, lower_all, wrong_inputs};
 use crate::{Geometry, Job};
 
@@ -103,16 +102,14 @@ fn point_of(primitive: &Primitive) -> Vec<DVec3> {
 /// Points looked at together.
 const CHUNK: usize = 1 << 12;
 
-/// The first of the points that a shape which stands for solids holds; none of them is on its surfaces.
+/// The first of the points that lies inside a solid of the shape; none of them is on its surfaces.
 fn held(shape: &Attractor, points: &[DVec3], budget: &Budget) -> Result<Option<DVec3>, JobError> {
-    if is_solid(shape) {
-        for surface in shape.surfaces() {
-            let inside = Inside::new(&surface);
-            for chunk in points.chunks(CHUNK) {
-                budget.cancel.check()?;
-                if let Some(&point) = chunk.iter().find(|point| inside.winding(**point) > 0) {
-                    return Ok(Some(point));
-                }
+    for surface in shape.surfaces() {
+        let inside = Inside::new(&surface);
+        for chunk in points.chunks(CHUNK) {
+            budget.cancel.check()?;
+            if let Some(&point) = chunk.iter().find(|point| inside.winding(**point) > 0) {
+                return Ok(Some(point));
             }
         }
     }

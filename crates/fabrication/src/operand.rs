@@ -5,7 +5,7 @@ use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{dilate, predict};
 use lacuna_kernel::error::Kind;
-use lacuna_kernel::measure::mass::{area, dilated_difference, volume};
+use lacuna_kernel::measure::mass::{area_within, dilated_difference, volume, volume_within};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::CellKind;
 use lacuna_kernel::solid::{Rounded, Solid, SolidError, TriMesh, carried, misplaced_shell};
@@ -117,9 +117,11 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         let (mesh, deviation, leaf_cells) = closed_surface(&input.name, attractor, tolerance, budget)?;
         (vec![mesh], deviation, deviation, leaf_cells)
     };
-    let volume: f64 = meshes.iter().map(volume).sum();
     let volume_error = match (*radius_mm > 0.0, inner > 0.0) {
-        (true, _) => dilated_difference(volume, attractor.radii(*radius_mm)[0], inner, outer),
+        (true, _) => {
+            let least = attractor.radii(*radius_mm)[0];
+            meshes.iter().map(|mesh| dilated_difference(volume_within(mesh), least, inner, outer)).sum()
+        }
         (false, true) => meshes.iter().map(|mesh| neighbourhood(mesh, inner)).sum(),
         (false, false) => 0.0,
     };
@@ -129,7 +131,7 @@ pub(crate) fn operand(source: &Source<'_>, tolerance: Tolerance, budget: &Budget
         inner_bound_mm: inner,
         outer_bound_mm: outer,
         triangles: meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum(),
-        mesh_volume_mm3: volume,
+        mesh_volume_mm3: meshes.iter().map(volume).sum(),
     };
     Ok(Operand { statement, bounds, volume_error, leaf_cells, warnings, meshes, is_proven })
 }
@@ -160,7 +162,7 @@ fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
     let perimeter = |&[a, b, c]: &[u32; 3]| corner(a).distance(corner(b)) + corner(b).distance(corner(c)) + corner(c).distance(corner(a));
     let length: f64 = mesh.triangles.iter().map(perimeter).sum();
     let balls = mesh.triangles.len() as f64 * 4.0 / 3.0 * PI * d.powi(3);
-    2.0 * d * area(mesh) + 0.5 * PI * d * d * length + balls
+    2.0 * d * area_within(mesh).high + 0.5 * PI * d * d * length + balls
 }
 
 impl Operand {

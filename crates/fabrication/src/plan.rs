@@ -99,14 +99,27 @@ pub fn plan(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
     Ok(Plan { memory_bytes, exceeds, ..plan })
 }
 
-/// An error of a limit with a value that would pass, where the plan knows one. Cost: some plans.
+/// An error of a limit with what the plan knows: how much the job takes, and a value that would pass. Cost: some plans.
 pub(crate) fn with_remedy(job: &Job, mut error: JobError, budget: &Budget) -> JobError {
     // Of previews nothing is planned.
     let known = |facts: &&mut LimitFacts| facts.remedy.is_none() && PLANNED.contains(&facts.limit) && !job.params.preview;
     if let Some(facts) = error.limit.as_mut().filter(known) {
-        facts.remedy = remedy(job, None, facts.limit, budget);
+        let plan = planned(job, &quiet(budget)).ok();
+        // What is stopped says nothing.
+        if budget.cancel.check().is_err() {
+            return error;
+        }
+        // Who works until a limit is hit knows only that there is more, and by how much is another number every time.
+        let asked = plan.as_ref().and_then(|plan| plan.count(job.kind, &budget.limits, facts.limit));
+        facts.asked = asked.map_or(facts.asked, |asked| asked.round().max(facts.asked));
+        facts.remedy = remedy(job, plan.as_ref(), facts.limit, budget);
     }
     error
+}
+
+/// A budget for searches that nobody is told of.
+fn quiet(budget: &Budget) -> Budget {
+    Budget { progress: None, ..budget.clone() }
 }
 
 /// The limits that plans tell of.
@@ -123,12 +136,17 @@ impl Plan {
         let allowed = [limits.cells as f64, limits.triangles as f64, limits.memory_bytes as f64];
         std::array::from_fn(|index| (PLANNED[index], asked[index], allowed[index]))
     }
+
+    /// What is held against one of the limits.
+    fn count(&self, kind: JobKind, limits: &Limits, limit: &str) -> Option<f64> {
+        self.counts(kind, limits).into_iter().find(|&(name, ..)| name == limit).map(|(_, asked, _)| asked)
+    }
 }
 
 /// A value that would pass where a plan, or the job itself, exceeds a limit: of the tolerance, or of the limit where no tolerance is enough. `None` when
 /// somebody stops the search, or there is no plan.
 fn remedy(job: &Job, plan: Option<&Plan>, limit: &'static str, budget: &Budget) -> Option<(&'static str, f64)> {
-    let quiet = Budget { progress: None, ..budget.clone() };
+    let quiet = quiet(budget);
     let (mut job, kind, mut fails) = (job.clone(), job.kind, job.params.tolerance_mm);
     let mut at = |tolerance_mm: f64| {
         job.params.tolerance_mm = tolerance_mm;
@@ -137,11 +155,8 @@ fn remedy(job: &Job, plan: Option<&Plan>, limit: &'static str, budget: &Budget) 
         budget.cancel.check().ok().map(|()| found)
     };
     let passes = |plan: &Plan| plan.counts(kind, &budget.limits).iter().all(|(_, asked, allowed)| CERTAIN * asked <= *allowed);
-    let asked = |plan: &Plan| plan.counts(kind, &budget.limits).iter().find(|(name, ..)| *name == limit).map(|(_, asked, _)| *asked);
-    let needed = match plan {
-        Some(plan) => asked(plan),
-        None => at(fails)?.as_ref().and_then(asked),
-    };
+    let asked = |plan: &Plan| plan.count(kind, &budget.limits, limit);
+    let needed = plan.and_then(asked);
     let mut last = needed;
     for _ in 0..STEPS {
         let tolerance_mm = STEP * fails;

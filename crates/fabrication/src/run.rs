@@ -4,7 +4,7 @@ use lacuna_kernel::attractor::{Attractor, RefineError, refine, refine_with_norma
 use lacuna_kernel::budget::{Budget, Stopped};
 use lacuna_kernel::dilation::{DilationError, dilate_unsimplified};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume};
+use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume_within};
 use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
 use lacuna_kernel::model::{Finding, Lowered, Model, PolygonMesh};
 use lacuna_kernel::solid::{Crossings, Solid};
@@ -298,7 +298,7 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
     let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
     let mut certificate = certificate::of_dilation(attractor, &dilation, tolerance);
     let mesh = dilation.solid.mesh();
-    let difference = dilated_difference(volume(mesh), dilation.least_radius_mm, dilation.inner_mm, dilation.outer_mm);
+    let difference = dilated_difference(volume_within(mesh), dilation.least_radius_mm, dilation.inner_mm, dilation.outer_mm);
     certificate.state_mass(mesh, difference, &dilation.bounds.grown(dilation.outer_mm), job.params.density_g_cm3);
     certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
     if let Some(direction) = job.params.direction {

@@ -8,7 +8,7 @@ use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::dilation::{Dilation, dilate};
 use lacuna_kernel::measure::bounding_box;
-use lacuna_kernel::measure::mass::{dilated_area, dilated_volume, mesh_measures, volume};
+use lacuna_kernel::measure::mass::{dilated_area, dilated_volume, mesh_measures, volume_within};
 use lacuna_kernel::model::{AffineMap, BezierCurve, CornerCutting, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use oracle::{Oracle, Random, distance, winding};
@@ -186,7 +186,7 @@ fn volumes_and_areas_of_known_solids() {
         let faces = vec![if length == 0.0 { vec![0] } else { vec![0, 1] }];
         let result = dilated(&mesh(ends, faces), radius, tolerance, 2);
         let exact = pi * radius * radius * (4.0 / 3.0 * radius + length);
-        let found = dilated_volume(volume(result.solid.mesh()), radius, result.inner_mm, result.outer_mm);
+        let found = dilated_volume(volume_within(result.solid.mesh()), radius, result.inner_mm, result.outer_mm);
         assert!(found.low <= exact && exact <= found.high, "{exact} {found:?}");
         let area = dilated_area(found, radius);
         let exact = pi * radius * (4.0 * radius + 2.0 * length);

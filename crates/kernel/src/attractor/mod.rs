@@ -458,9 +458,10 @@ impl Attractor {
         self.precisions[state.index()].as_ref()
     }
 
-    /// Whether the attractor of a state is proven to be connected.
-    pub(crate) fn is_proven_connected(&self, state: StateId) -> bool {
-        self.connected[state.index()].is_some()
+    /// The widest gap that the attractor of a state may have where points are compared in double precision, as a share of its size, when it is proven to have no wider
+    /// one: see `connected`.
+    pub(crate) fn widest_gap(&self, state: StateId) -> Option<f64> {
+        self.connected[state.index()]
     }
 
     /// Whether cells of a state may be needles: it is proven connected, and its cells are of different proportions.

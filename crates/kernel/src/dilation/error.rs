@@ -16,9 +16,7 @@ pub enum DilationError {
     Triangles {
         /// What was asked.
         tolerance_mm: f64,
-        /// Triangles of the lattice when it was stopped.
-        made: u64,
-        /// The limit.
+        /// The limit. How many were made when it was hit is a matter of chance.
         allowed: u64,
     },
     /// Single precision cannot carry the tolerance at these coordinates.
@@ -136,8 +134,8 @@ impl DilationError {
             Self::Cells { allowed } => {
                 Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
             }
-            Self::Triangles { made, allowed, .. } => {
-                Some(LimitFacts { limit: "triangles", asked: made as f64, allowed: allowed as f64, remedy: None })
+            Self::Triangles { allowed, .. } => {
+                Some(LimitFacts { limit: "triangles", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
             }
             Self::Precision { tolerance_mm, reachable_mm, .. } => Some(LimitFacts {
                 limit: "tolerance_mm",

@@ -369,7 +369,7 @@ impl<'a> Pass<'a> {
         let total = self.triangles.fetch_add(made, Ordering::Relaxed) + made;
         let allowed = self.budget.limits.triangles;
         if total > allowed {
-            return Err(DilationError::Triangles { tolerance_mm: self.setting.tolerance, made: total, allowed });
+            return Err(DilationError::Triangles { tolerance_mm: self.setting.tolerance, allowed });
         }
         Ok(Some(surface))
     }

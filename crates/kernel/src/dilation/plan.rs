@@ -369,10 +369,10 @@ impl<'a> Plan<'a> {
             let task = Task::Changed(&Changed::new(&new), &blocks);
             let made = self.surfaces(&setting, &space, &grading, task, budget)?;
             critical = add(&setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
-            let total =
+            let total: u64 =
                 blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
             if total > budget.limits.triangles {
-                return Err(DilationError::Triangles { tolerance_mm: self.aimed, made: total, allowed: budget.limits.triangles });
+                return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
             }
         }
         let uncertain = uncertain.len() + critical.len();

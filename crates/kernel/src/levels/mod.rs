@@ -18,7 +18,7 @@ mod lattice;
 
 use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
-use crate::measure::mass::{area, volume};
+use crate::measure::mass::{area_within, volume_within};
 use crate::measure::{AxisBox, Interval};
 use crate::model::{Ifs, Primitive};
 use crate::solid::{Crossings, Solid, SolidError, TriMesh, fans, rounding};
@@ -337,7 +337,7 @@ impl Start {
         let unit = lattice.unit(level);
         let place = |p: &lattice::Point| lattice.place(p, unit);
         let exact_mesh = TriMesh { vertices: surface.points.iter().map(place).collect(), triangles };
-        let exact_area = area(&exact_mesh);
+        let exact_area = area_within(&exact_mesh);
         let bounds = box_of(&exact_mesh.vertices);
         let narrow = |vertices: &[DVec3]| -> Vec<DVec3> { vertices.iter().map(|p| p.as_vec3().as_dvec3()).collect() };
         let mut mesh = TriMesh { vertices: narrow(&exact_mesh.vertices), triangles: exact_mesh.triangles };
@@ -366,10 +366,10 @@ impl Start {
         };
         // On a grid along the axes, rounding keeps the order of the planes of the grid: rectangles stay rectangles, and meet only as before.
         let contacts = if parallel && doubled_vertices == 0 { 0 } else { Crossings::of(solid.mesh(), budget)?.count };
-        let enclosed = volume(&first.placed(&lattice)) * determinants;
+        let enclosed = volume_within(&first.placed(&lattice));
         let extent = solid.mesh().vertices.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let moved_mm = lattice.moved_mm(&body.corners, level) + rounding(extent);
-        let relative = |value: f64| Interval::new(value * (1.0 - SUMS), value * (1.0 + SUMS));
+        let relative = |low: f64, high: f64| Interval { low: low * (1.0 - CORNERS), high: high * (1.0 + CORNERS) };
         Ok(SolidLevel {
             solid,
             primitive,
@@ -377,16 +377,16 @@ impl Start {
             cancelled_faces,
             doubled_vertices,
             contacts,
-            volume: relative(enclosed),
-            area: relative(exact_area),
+            volume: relative(enclosed.low * determinants, enclosed.high * determinants),
+            area: relative(exact_area.low, exact_area.high),
             bounds,
             moved_mm,
         })
     }
 }
 
-/// Relative rounding of sums of positive terms: a chunk has at most 2^15 of them, there are fewer chunks than that, and every term loses some 30 roundings.
-const SUMS: f64 = 66_000.0 * f64::EPSILON;
+/// Relative rounding of what is measured on corners that were rounded: each is off by some 8 roundings of the whole shape, which has fewer than 2^13 faces side by side.
+const CORNERS: f64 = 66_000.0 * f64::EPSILON;
 
 fn box_of(points: &[DVec3]) -> AxisBox {
     let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();

@@ -13,6 +13,8 @@
 //! In all other cases: cells at level n have diameters below a multiple of rate^n, with the bound of the joint spectral radius as the rate, and their number
 //! grows like the spectral radius of the automaton's graph; so the upper box dimension is at most the quotient of the logarithms.
 //!
+//! Models are made of numbers with 16 digits: what is proven holds for the shapes that they mean, where similar is similar, flat is flat and what touches touches up to 12 of them.
+//!
 //! No dimension is above that of the smallest affine space that holds the shape. For every state s let b_s be a point of its attractor K_s, in barycentric
 //! coordinates, and D_s a space of directions, such that T b_t - b_s and T D_t lie in D_s for all transitions T from s to states t. Then T maps b_t + D_t into
 //! b_s + D_s. Start with the sets {b_s} and replace each by the union of its T times those of the t: all stay within the b_s + D_s, which are closed, and they
@@ -24,6 +26,7 @@ use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, child_points, cross, dot, subtract};
 use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::{Budget, Stopped};
+use robust::{Coord, orient2d};
 use std::collections::{BTreeSet, HashMap};
 
 /// How much of a dimension is known.
@@ -56,18 +59,24 @@ impl Dimension {
 
 /// Hulls that overlap by less than this share of their size count as apart.
 pub const SEPARATION: f64 = 1e-9;
-/// How far Gram matrices may be from proportional, relative to their size.
-const SIMILAR: f64 = 1e-9;
+/// How far Gram matrices may be from proportional, relative to their size: what the digits of the model's numbers lose on their way.
+const SIMILAR: f64 = 1e-13;
 /// What a root found from ratios in double precision may be off.
 const ROUNDING: f64 = 1e-13;
+/// Ratios may be off by so much of themselves, and by what their Gram matrices are from proportional.
+const RATIO: f64 = 1e-15;
+/// Of a Gram matrix with a determinant below this share of its trace's power nothing is concluded.
+const SINGULAR: f64 = 1e-9;
 /// States with similarities of their own, at most: their matrices are dense.
 const MOST_STATES: usize = 300;
 /// Transitions of a state whose hulls are compared in pairs, at most.
 const MOST_SIBLINGS: usize = 64;
 /// Steps of power iteration, and towards points of attractors.
 const STEPS: usize = 2_000;
-/// Directions that are less than this, relative to barycentric coordinates, are rounding.
+/// Directions that are less than this, relative to barycentric coordinates, are rounding, and so is what is thinner than this share of its size.
 const FLAT: f64 = 1e-12;
+/// Gaps that are less than this share of the size are rounding.
+const GAP: f64 = 1e-12;
 
 /// The dimension of an attractor: the largest of its root cells'. Roots of the same state and similar control points count once.
 ///
@@ -87,7 +96,7 @@ pub fn dimension(attractor: &Attractor, budget: &Budget) -> Result<Dimension, St
             return Ok(Dimension::SOLID);
         }
         if state.transitions.is_empty() && matches!(state.leaf, LeafPrimitive::Simplex) {
-            result = larger(result, elementary(f64::from(rank(&points))));
+            result = larger(result, elementary(f64::from(simplex_rank(&points))));
             continue;
         }
         let edges = gram(&points);
@@ -152,8 +161,9 @@ fn of_root(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Bud
     let mut exponent = 0.0_f64;
     let mut highest = 0.0_f64;
     for component in system.components() {
-        let Some(found) = system.exponent(&component) else { return Ok(general) };
-        (exponent, highest) = (exponent.max(found.low), highest.max(found.high));
+        let [least, most] = [1.0 - system.ratios_off, 1.0 + system.ratios_off].map(|share| system.exponent(&component, share));
+        let (Some(least), Some(most)) = (least, most) else { return Ok(general) };
+        (exponent, highest) = (exponent.max(least.low), highest.max(most.high));
     }
     let similarity = Interval { low: (exponent - ROUNDING).max(0.0), high: highest + ROUNDING };
     if system.is_separated(attractor, budget)? {
@@ -176,7 +186,8 @@ fn by_contraction(attractor: &Attractor, index: usize, facts: &StateFacts, budge
     };
     let high = covering.min(spread);
     let mut low = 0.0;
-    if high > 0.0 && attractor.is_proven_connected(root.state) && attractor.root_window(index).is_none() {
+    let is_connected = attractor.widest_gap(root.state).is_some_and(|gap| gap <= GAP);
+    if high > 0.0 && is_connected && attractor.root_window(index).is_none() {
         for axis in 0..3 {
             let mut ends = [0.0; 2];
             for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
@@ -254,7 +265,7 @@ fn directions(attractor: &Attractor, start: StateId) -> Option<Vec<Vec<f64>>> {
             change = change.max(moved / size);
             points[own] = next;
         }
-        is_settled = change <= 1e-2 * FLAT;
+        is_settled = change <= FLAT;
         if is_settled {
             break;
         }
@@ -329,24 +340,56 @@ fn gram(points: &[Point]) -> Vec<f64> {
     (0..edges.len()).flat_map(|i| (i..edges.len()).map(move |j| (i, j))).map(|(i, j)| dot(&edges[i], &edges[j])).collect()
 }
 
-/// c, when the second Gram matrix is c^2 times the first; 0 for a point.
-fn ratio(first: &[f64], second: &[f64]) -> Option<f64> {
+/// c, when the second Gram matrix is c^2 times the first, and what c may be off relative to itself; 0 for a point.
+///
+/// For matrices G and H = c^2 G + E of n rows, x^T H x is between (c^2 - n e / l) and (c^2 + n e / l) times x^T G x, with e the largest entry of E and l the least eigenvalue of G: that is at
+/// least det G / (tr G / (n - 1))^(n - 1), as the other ones have at most that product.
+fn ratio(first: &[f64], second: &[f64]) -> Option<(f64, f64)> {
     let size = |gram: &[f64]| gram.iter().map(|x| x.abs()).fold(0.0, f64::max);
     let (from, to) = (size(first), size(second));
     if to == 0.0 {
-        return Some(0.0);
+        return Some((0.0, 0.0));
     }
     // Least squares: the sum over all entries has the least rounding.
     let square = first.iter().zip(second).map(|(a, b)| a * b).sum::<f64>() / first.iter().map(|a| a * a).sum::<f64>();
-    let similar = from > 0.0 && first.iter().zip(second).all(|(a, b)| (b - square * a).abs() <= SIMILAR * to);
-    similar.then(|| square.sqrt())
+    let off = first.iter().zip(second).map(|(a, b)| (b - square * a).abs()).fold(0.0, f64::max);
+    if !(from > 0.0 && square > 0.0 && off <= SIMILAR * to) {
+        return None;
+    }
+    let least = match *first {
+        [a] => a,
+        [a, b, d] => (a * d - b * b) / (a + d),
+        [a, b, c, d, e, f] => {
+            let determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d);
+            determinant / (0.5 * (a + d + f)).powi(2)
+        }
+        _ => 0.0,
+    };
+    // Control points that are more than the corners of a simplex follow each other up to rounding only.
+    let share = if least > SINGULAR * from { 3.0 * off / (least * square) } else { SIMILAR };
+    Some((square.sqrt(), RATIO + share))
 }
 
 fn longest_edge(points: &[ControlPoint]) -> f64 {
     gram(&projected(points, false)).into_iter().fold(0.0, f64::max).sqrt()
 }
 
-/// The dimension of the points' affine hull.
+/// The dimension of a simplex, exactly: of its affine hull.
+fn simplex_rank(points: &[Point]) -> u8 {
+    let in_plane = |axis: usize, p: &Point| Coord { x: p[axis], y: p[(axis + 1) % 3] };
+    match points {
+        [] | [_] => 0,
+        [a, b] => u8::from(a != b),
+        [a, b, c] => match (0..3).any(|axis| orient2d(in_plane(axis, a), in_plane(axis, b), in_plane(axis, c)) != 0.0) {
+            true => 2,
+            false => u8::from(a != b || a != c),
+        },
+        // The leaves of automata are points, segments and triangles.
+        _ => rank(points),
+    }
+}
+
+/// The dimension of the points' affine hull, up to rounding.
 fn rank(points: &[Point]) -> u8 {
     let Some(first) = points.first() else { return 0 };
     let edges: Vec<Point> = points[1..].iter().map(|point| subtract(point, first)).collect();
@@ -354,14 +397,17 @@ fn rank(points: &[Point]) -> u8 {
     let Some(longest) = edges.iter().max_by(|a, b| square(a).total_cmp(&square(b))).filter(|edge| square(edge) > 0.0) else { return 0 };
     let scale = square(longest);
     let normals: Vec<Point> = edges.iter().map(|edge| cross(longest, edge)).collect();
-    let Some(normal) = normals.iter().max_by(|a, b| square(a).total_cmp(&square(b))).filter(|n| square(n) > 1e-24 * scale * scale) else {
+    let Some(normal) = normals.iter().max_by(|a, b| square(a).total_cmp(&square(b))).filter(|n| square(n) > FLAT * FLAT * scale * scale)
+    else {
         return 1;
     };
-    2 + u8::from(edges.iter().any(|edge| dot(edge, normal).powi(2) > 1e-24 * square(normal) * scale))
+    2 + u8::from(edges.iter().any(|edge| dot(edge, normal).powi(2) > FLAT * FLAT * square(normal) * scale))
 }
 
 /// A graph-directed system of similarities: a cell of every state, and the ratios between.
 struct System {
+    /// What ratios may be off, relative to themselves.
+    ratios_off: f64,
     /// By the number of the state here: its first cell, and its control points.
     cells: Vec<(Cell, Vec<ControlPoint>)>,
     /// By state: number of the child's state, and ratio.
@@ -374,24 +420,34 @@ impl System {
         let mut numbers = vec![usize::MAX; attractor.automaton().states().len()];
         let start = attractor.root_cell(root);
         numbers[start.state.index()] = 0;
-        let mut system = Self { cells: vec![(start, attractor.roots()[root].points.clone())], ratios: Vec::new() };
-        let mut grams = vec![gram(&projected(&system.cells[0].1, false))];
+        let points = &attractor.roots()[root].points;
+        let mut system = Self { ratios_off: 0.0, cells: vec![(start, points.clone())], ratios: Vec::new() };
+        // Far from the origin digits would be lost: these cells are where the root begins in it.
+        let first = points[0];
+        let near = |point: &ControlPoint| [point[0] - first[0], point[1] - first[1], point[2] - first[2], point[3]];
+        let mut frames: Vec<Vec<ControlPoint>> = vec![points.iter().map(near).collect()];
+        let mut grams = vec![gram(&projected(&frames[0], false))];
         while system.ratios.len() < system.cells.len() {
             let (cell, points) = system.cells[system.ratios.len()].clone();
+            let frame = frames[system.ratios.len()].clone();
             let state = attractor.state_of(&cell);
             if state.transitions.is_empty() && !matches!(state.leaf, LeafPrimitive::Simplex) {
                 return None;
             }
             let mut own = Vec::with_capacity(state.transitions.len());
             for (index, transition) in state.transitions.iter().enumerate() {
-                let mut child = vec![[0.0; 4]; transition.operator.columns()];
-                child_points(&points, &transition.operator, &mut child);
-                let edges = gram(&projected(&child, false));
+                let mut small = vec![[0.0; 4]; transition.operator.columns()];
+                child_points(&frame, &transition.operator, &mut small);
+                let edges = gram(&projected(&small, false));
                 let number = numbers[transition.to.index()];
                 if number != usize::MAX {
-                    own.push((number, ratio(&grams[number], &edges)?));
+                    let (found, off) = ratio(&grams[number], &edges)?;
+                    system.ratios_off = system.ratios_off.max(off);
+                    own.push((number, found));
                     continue;
                 }
+                let mut child = small.clone();
+                child_points(&points, &transition.operator, &mut child);
                 let number = system.cells.len();
                 if number == MOST_STATES || edges.iter().all(|&x| x == 0.0) {
                     return None;
@@ -399,6 +455,7 @@ impl System {
                 numbers[transition.to.index()] = number;
                 own.push((number, 1.0));
                 system.cells.push((attractor.child_cell(&cell, index, &child), child));
+                frames.push(small);
                 grams.push(edges);
             }
             system.ratios.push(own);
@@ -430,14 +487,14 @@ impl System {
             .collect()
     }
 
-    /// s with rho(M(s)) = 1 on a component, between two numbers where the radius is proven to be above and below 1.
-    fn exponent(&self, component: &[usize]) -> Option<Interval> {
+    /// s with rho(M(s)) = 1 on a component for a share of the ratios, between two numbers where the radius is proven to be above and below 1.
+    fn exponent(&self, component: &[usize], share: f64) -> Option<Interval> {
         // A ratio of 1 or more on a cycle cannot be: the automaton contracts. Single ratios may be.
         let (mut low, mut high) = (0.0, 1.0);
-        if self.compare(component, low) == Some(std::cmp::Ordering::Equal) {
+        if self.compare(component, share, low) == Some(std::cmp::Ordering::Equal) {
             return Some(Interval { low: 0.0, high: 0.0 });
         }
-        while self.compare(component, high) == Some(std::cmp::Ordering::Greater) {
+        while self.compare(component, share, high) == Some(std::cmp::Ordering::Greater) {
             (low, high) = (high, 2.0 * high);
             if high > 1e3 {
                 return None;
@@ -448,7 +505,7 @@ impl System {
             if middle <= low || middle >= high {
                 break;
             }
-            match self.compare(component, middle) {
+            match self.compare(component, share, middle) {
                 Some(std::cmp::Ordering::Greater) => low = middle,
                 Some(std::cmp::Ordering::Less) => high = middle,
                 // At the root up to rounding.
@@ -458,14 +515,17 @@ impl System {
         Some(Interval { low, high })
     }
 
-    /// How rho(M(s)) compares with 1 on a component: by the least and the largest quotient of (M + 1) v and v for a positive v (Collatz and Wielandt).
+    /// How rho(M(s)) compares with 1 on a component for a share of the ratios: by the least and the largest quotient of (M + 1) v and v for a positive v (Collatz and Wielandt).
     /// `None` when that is not settled after [`STEPS`].
-    fn compare(&self, component: &[usize], s: f64) -> Option<std::cmp::Ordering> {
+    fn compare(&self, component: &[usize], share: f64, s: f64) -> Option<std::cmp::Ordering> {
         let place = |state: usize| component.binary_search(&state).ok();
         let rows: Vec<Vec<(usize, f64)>> = component
             .iter()
             .map(|&state| {
-                self.ratios[state].iter().filter_map(|&(to, c)| Some((place(to)?, if c > 0.0 { c.powf(s) } else { return None }))).collect()
+                self.ratios[state]
+                    .iter()
+                    .filter_map(|&(to, c)| Some((place(to)?, if c > 0.0 { (share * c).powf(s) } else { return None })))
+                    .collect()
             })
             .collect();
         let mut v = vec![1.0_f64; component.len()];

@@ -3,6 +3,7 @@
 pub mod bounds;
 pub mod contact;
 pub mod dimension;
+mod double;
 pub mod enclosed;
 mod functional;
 pub mod hausdorff;

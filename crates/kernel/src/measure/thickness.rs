@@ -7,6 +7,7 @@
 //! nearest, so the least height over a face is its thickness, and parts of the tree are left out that are beside the prism over the face or higher than what was found.
 
 use super::Interval;
+use super::double::normal;
 use crate::budget::{Budget, Stopped};
 use crate::solid::TriMesh;
 use crate::solid::box_tree::{Box32, BoxTree};
@@ -61,7 +62,7 @@ struct Face {
 impl Face {
     fn new(points: [DVec3; 3], side: Side) -> Option<Self> {
         let [a, b, c] = points;
-        let normal = (b - a).cross(c - a).try_normalize()?;
+        let normal = normal(points).try_normalize()?;
         let direction = if side == Side::Wall { -normal } else { normal };
         let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (normal.cross(to - from), from));
         Some(Self { origin: a, direction, sides })

@@ -4,6 +4,7 @@ use super::CellKind;
 use super::lower::{Draft, Finding};
 use crate::attractor::{Root, SolidSurface};
 use crate::automaton::{LeafPrimitive, State, StateId};
+use crate::measure::mass::enclosed_by;
 use crate::solid::TriMesh;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -173,12 +174,10 @@ impl PolygonMesh {
             return Some(false);
         }
         let fault = closed_fault(&elements.triangles).or_else(|| {
-            let corner = |index: u32| self.vertices[index as usize];
-            let origin = corner(elements.triangles[0][0]);
-            let six = |t: &[u32; 3]| (corner(t[0]) - origin).dot((corner(t[1]) - origin).cross(corner(t[2]) - origin));
-            let volume = elements.triangles.iter().map(six).sum::<f64>() / 6.0;
-            let how = if volume < 0.0 { "its faces look inwards" } else { "it encloses nothing" };
-            (volume <= 0.0).then(|| format!("{how} (signed volume {volume} mm3)"))
+            let volume = enclosed_by(&self.vertices, &elements.triangles);
+            let how = if volume.high < 0.0 { "its faces look inwards" } else { "it encloses nothing" };
+            let signed = 0.5 * (volume.low + volume.high);
+            (volume.low <= 0.0).then(|| format!("{how} (signed volume {signed} mm3)"))
         });
         match (fault, self.interior) {
             (None, _) => Some(true),

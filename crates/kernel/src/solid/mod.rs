@@ -13,7 +13,7 @@ mod shells;
 pub(crate) mod topology;
 
 use crate::budget::{Budget, Stopped};
-use crate::measure::mass::volume;
+use crate::measure::mass::{volume, volume_within};
 pub use crossings::Crossings;
 use glam::DVec3;
 pub use inside::Inside;
@@ -116,9 +116,8 @@ impl Solid {
         if !topology.is_closed_manifold() {
             return Err(SolidError::NotManifold(Box::new(topology)));
         }
-        let volume = volume(&mesh);
-        if volume <= 0.0 {
-            return Err(SolidError::Inward(volume));
+        if volume_within(&mesh).low <= 0.0 {
+            return Err(SolidError::Inward(volume(&mesh)));
         }
         Ok(Self { mesh, topology })
     }
