@@ -90,6 +90,20 @@ fn slabs_and_plates() {
     assert_eq!(least(&apart, Side::Gap), None);
 }
 
+/// A corner of the lid that is up to a nanometre from an edge makes a needle, and sides that are along the lid's normals but for rounding.
+#[test]
+fn plates_with_needles() {
+    let turn = DMat3::from_axis_angle(DVec3::new(2.0, -1.0, 3.0).normalize(), 0.6);
+    for height in [1e-3, 1e-4, 1e-5, 1e-6] {
+        let corners = [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]];
+        let at = |z: f64| corners.map(|[x, y]| turn * DVec3::new(x, y, z));
+        let vertices = [at(0.0).as_slice(), &at(10.0), &[turn * DVec3::new(37.0, height, 10.0)]].concat();
+        let sides = [[0, 3, 2], [0, 2, 1], [0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]];
+        let lid = [[4, 5, 8], [5, 6, 8], [6, 7, 8], [7, 4, 8]];
+        assert_is(least(&TriMesh { vertices, triangles: [sides.as_slice(), &lid].concat() }, Side::Wall), 10.0);
+    }
+}
+
 #[test]
 fn wedges_are_thinnest_where_faces_without_a_common_corner_are() {
     // A lid over a box at a slope: z from 1 at x = 0 to 3 at x = 10, thinnest at the low end, seen from the bottom along z and from the lid along its normal.

@@ -48,7 +48,7 @@ pub struct ThicknessMap {
 
 /// Leaves of the tree whose triangles are looked at one after the other.
 const CHUNK: usize = 64;
-/// Shadows of less area than this share of the squared lengths have none: faces along the normal.
+/// Shadows of less area than this share of the squared lengths have none, and so have faces whose normals are this near to a right angle with the direction: those along it.
 const FLAT: f64 = 1e-12;
 
 /// A face with a frame: the direction that is measured along, and the planes through its edges along it.
@@ -60,9 +60,11 @@ struct Face {
 }
 
 impl Face {
-    fn new(points: [DVec3; 3], side: Side) -> Option<Self> {
-        let [a, b, c] = points;
-        let normal = normal(points).try_normalize()?;
+    /// None for a face without area.
+    fn new([a, b, c]: [DVec3; 3], normal: DVec3, side: Side) -> Option<Self> {
+        if normal == DVec3::ZERO {
+            return None;
+        }
         let direction = if side == Side::Wall { -normal } else { normal };
         let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (normal.cross(to - from), from));
         Some(Self { origin: a, direction, sides })
@@ -84,7 +86,11 @@ impl Face {
     }
 
     /// The least height of another triangle over the face, and where it is, if its shadow has an area in common with it.
-    fn height(&self, other: [DVec3; 3], polygons: &mut [Vec<DVec3>; 2]) -> Option<(f64, DVec3)> {
+    fn height(&self, other: [DVec3; 3], normal: DVec3, polygons: &mut [Vec<DVec3>; 2]) -> Option<(f64, DVec3)> {
+        // What is left of it after clipping may be too small to tell.
+        if normal.dot(self.direction).abs() <= FLAT {
+            return None;
+        }
         let [polygon, clipped] = polygons;
         polygon.clear();
         polygon.extend(other);
@@ -132,6 +138,8 @@ fn corners(mesh: &TriMesh, triangle: u32) -> [DVec3; 3] {
 /// A mesh with a tree over its triangles.
 struct Faces<'m> {
     mesh: &'m TriMesh,
+    /// Unit normals; zero for triangles without area.
+    normals: Vec<DVec3>,
     tree: BoxTree,
 }
 
@@ -139,13 +147,19 @@ impl<'m> Faces<'m> {
     fn of(mesh: &'m TriMesh) -> Self {
         let mut tree = BoxTree::default();
         tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(mesh, triangle).map(|p| p.to_array()))), true);
-        Self { mesh, tree }
+        let normals =
+            (0..mesh.triangles.len() as u32).into_par_iter().map(|face| normal(corners(mesh, face)).normalize_or_zero()).collect();
+        Self { mesh, normals, tree }
+    }
+
+    fn face(&self, number: u32, side: Side) -> Option<Face> {
+        Face::new(corners(self.mesh, number), self.normals[number as usize], side)
     }
 
     /// The nearest face over another one, at most as high as a bound; of equally high ones the first. One that is over a neighbour, and those beside it, are looked at
     /// before the tree is searched, for what they tell is often the answer, and leaves little to search.
     fn over(&self, below: u32, side: Side, bound: f64, guess: Option<u32>, polygons: &mut [Vec<DVec3>; 2]) -> Option<Over> {
-        let face = Face::new(corners(self.mesh, below), side)?;
+        let face = self.face(below, side)?;
         let own = self.mesh.triangles[below as usize];
         let mut best: Option<Over> = None;
         let entry = |around: &Box32| face.entry(around);
@@ -154,7 +168,7 @@ impl<'m> Faces<'m> {
                 if entry(around).is_none() || self.mesh.triangles[other as usize].iter().any(|corner| own.contains(corner)) {
                     continue;
                 }
-                if let Some((height, point)) = face.height(corners(self.mesh, other), polygons)
+                if let Some((height, point)) = face.height(corners(self.mesh, other), self.normals[other as usize], polygons)
                     && height <= bound
                     && best.is_none_or(|best| (height, other) < (best.0, best.1))
                 {
@@ -210,7 +224,7 @@ impl Search<'_> {
         let high = mesh.vertices.iter().copied().reduce(DVec3::max).unwrap_or_default();
         let slack = 64.0 * f64::EPSILON * (low.abs().max(high.abs()).max_element() + low.distance(high));
         let least = Interval { low: (height - slack).max(0.0), high: height + slack };
-        let foot = Face::new(corners(mesh, face), self.side).map_or(point, |face| point - face.direction * height);
+        let foot = self.faces.face(face, self.side).map_or(point, |face| point - face.direction * height);
         Some(Thickness { least, between: [foot, point], faces: [face, other] })
     }
 }
