@@ -186,6 +186,18 @@ fn many_operands() {
     assert_eq!(certificate.components, Some(1));
 }
 
+/// Far from the origin single precision is coarse, and a tolerance makes solids reach farther still.
+#[test]
+fn what_is_offered_far_from_the_origin_passes() {
+    let far = |at: f64| (cube([1e5 + at, 0.0, 0.0], 1.0), None);
+    let refused = combine(Operation::Union, 1e-3, vec![far(0.0), far(0.5)], &Budget::default()).unwrap_err();
+    let Some(("tolerance_mm", offered)) = refused.limit.as_ref().and_then(|facts| facts.remedy) else { panic!("{refused:?}") };
+    assert!(offered < 0.5, "{offered}");
+    let (_, certificate) = solid(Operation::Union, offered, vec![far(0.0), far(0.5)]);
+    // What may be swept on the way to single precision is a share of the tolerance wide, all over the surface.
+    assert_volume(&certificate, 1.5, 3.0);
+}
+
 #[test]
 fn what_is_no_solid_is_refused() {
     let cubes = |first: Shape| vec![(first, None), (cube([1.0; 3], 2.0), None)];

@@ -196,6 +196,14 @@ fn what_lies_inside_a_solid_is_not_apart_from_it() {
         );
         assert_within(&found["inside"]["surface_distance_mm"], 9.0, 0.05);
     }
+    // Also where it is a part among others, which enclose nothing.
+    let wire = json!({ "family": "mesh", "vertices": [[50, 0, 0], [60, 0, 0]], "faces": [[0, 1]] });
+    let mixed = write(&folder, "mixed.json", &json!({ "family": "group", "parts": [cube(-10.0, 10.0), wire] }));
+    let found = contact(&["--with", "point:5,5,5"], &[&mixed]);
+    assert_eq!(
+        (&found["verdict"], &found["distance_mm"], &found["inside"]["holder"]),
+        (&json!("touching"), &json!([0.0, 0.0]), &json!("first"))
+    );
     // Beside each other they are apart, and neither holds the other.
     let beside = write(&folder, "beside.json", &cube(13.0, 15.0));
     let found = contact(&[], &[&outer, &beside]);

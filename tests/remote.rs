@@ -219,6 +219,31 @@ fn ctrl_c_stops_the_job_first() {
     assert!(!made.exists());
 }
 
+/// A terminal that is closed stops what runs in it, and nothing half written stays; what shall outlive it does.
+#[test]
+#[cfg(unix)]
+fn a_closed_terminal_stops_a_command() {
+    let scratch = Scratch::new();
+    let job = long(&scratch);
+    for (outlives, prefix) in [(false, ""), (true, "trap '' HUP; ")] {
+        let made = scratch.join("made");
+        let words = format!("{prefix}exec \"$0\" run \"$1\" -o \"$2\"");
+        let mut process =
+            Command::new("sh").arg("-c").arg(words).arg(lacuna()).arg(&job).arg(&made).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+        assert!(process.try_wait().unwrap().is_none(), "the job is too short for this test");
+        let send = |signal: &str| assert!(Command::new("kill").args([signal, &process.id().to_string()]).status().unwrap().success());
+        send("-HUP");
+        if outlives {
+            std::thread::sleep(Duration::from_millis(1500));
+            assert!(process.try_wait().unwrap().is_none(), "it was to outlive its terminal");
+            assert!(Command::new("kill").args(["-TERM", &process.id().to_string()]).status().unwrap().success());
+        }
+        assert_eq!(process.wait().unwrap().code(), Some(130));
+        assert!(std::fs::read_dir(&made).map_or(0, |left| left.count()) == 0, "half a file is left");
+    }
+}
+
 #[test]
 fn jobs_one_step_at_a_time() {
     let scratch = Scratch::new();

@@ -115,6 +115,27 @@ fn every_command_repairs_only_when_asked() {
     refused(&run(words(union, &[&other, &other, &out])), &["ask for a repair", "--repair"]);
 }
 
+/// Files that were not written to their ends are told as such, and not as bad documents.
+#[test]
+fn files_that_are_cut_off_are_named() {
+    let scratch = Scratch::new();
+    let (whole, cut, empty, out) = (scratch.join("whole.stl"), scratch.join("cut.stl"), scratch.join("empty.stl"), scratch.join("out.stl"));
+    let source = scratch.join("box.obj");
+    std::fs::write(&source, obj(&cuboid([0.0; 3], [4.0; 3]))).unwrap();
+    succeed(words("convert FILE FILE", &[&source, &whole]));
+    let bytes = std::fs::read(&whole).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() - 3]).unwrap();
+    std::fs::write(&empty, "").unwrap();
+    for command in ["measure FILE --tolerance 0.01", "inspect FILE"] {
+        refused(&run(words(command, &[&cut])), &["binary STL", "12 triangles", "684 bytes, and it has 681"]);
+        refused(&run(words(command, &[&empty])), &["the file is empty"]);
+    }
+    // Two files in one place would leave one.
+    let twice = run(words("convert FILE FILE FILE", &[&whole, &out, &out]));
+    assert!(twice.status.code() == Some(2) && String::from_utf8_lossy(&twice.stderr).contains("is named for two outputs"));
+    assert!(!out.exists());
+}
+
 #[test]
 fn what_cannot_be_repaired_is_refused_with_its_place() {
     let scratch = Scratch::new();

@@ -438,3 +438,31 @@ fn the_topology_is_exact_beside_critical_radii() {
     assert_eq!(found(edges(), face - near), (1, 0, 1));
     assert_eq!(found(edges(), face + near), (1, 0, 0));
 }
+
+/// Triangles without area, up to rounding or altogether: the sets are segments, and so are their dilations, whatever corner comes first.
+#[test]
+fn triangles_without_area() {
+    let ball = |radius: f64| 4.0 / 3.0 * PI * radius.powi(3);
+    let mut random = Random(11);
+    let mut number = || 2.0 * random.unit() - 1.0;
+    for round in 0..12 {
+        let (from, along) = (DVec3::new(number(), number(), number()), 5.0 * DVec3::new(number(), number(), number()));
+        let share = [0.0, 0.3, 1.0][round % 3];
+        let mut corners = [from, from + along, from + share * along];
+        corners.rotate_left(round / 3 % 3);
+        let params = Params { radius_mm: Some(1.0), ..Params::new(0.1) };
+        let (_, certificate) = solid(mesh(corners.to_vec(), &[&[0, 1, 2]]), params);
+        let [low, high] = certificate.volume_mm3.unwrap();
+        let exact = ball(1.0) + PI * along.length();
+        assert!(low <= exact && exact <= high, "{exact} is not in [{low}, {high}]: {corners:?}");
+        assert_eq!((certificate.components, certificate.genus), (Some(1), Some(0)));
+    }
+    // A triangle with a whisker, which is a triangle with two corners in one place.
+    let places = [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 0.0], [2.0, 0.0], [12.0, 0.0]].map(|[x, y]| DVec3::new(x, y, 0.0));
+    for whisker in [[3, 4, 5], [5, 3, 4], [4, 5, 3]] {
+        let params = Params { radius_mm: Some(1.0), ..Params::new(0.1) };
+        let (mesh, certificate) = solid(mesh(places.to_vec(), &[&[0, 1, 2], &whisker]), params);
+        let reach = mesh.vertices.iter().map(|vertex| vertex.x).fold(0.0, f64::max);
+        assert!((12.9..13.1).contains(&reach) && certificate.components == Some(1), "{reach}");
+    }
+}

@@ -11,7 +11,7 @@ use lacuna_kernel::model::{Interior, PolygonMesh};
 
 use super::args::ConvertArgs;
 use super::inspect::mesh_file;
-use super::output::{Target, finish, start, target};
+use super::output::{Target, check_distinct, finish, start, target};
 use crate::inspection;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{format_problem, guarded};
@@ -20,6 +20,7 @@ use crate::production::{format_problem, guarded};
 pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
     let named = |path: &Path| target(path, args.format.as_deref().filter(|_| path == Path::new("-")));
     let targets: Vec<Target> = args.outputs.iter().map(|path| named(path)).collect::<Result<_, _>>()?;
+    check_distinct(targets.iter().map(|target| target.path.as_path()))?;
     let (mut file, _) = mesh_file(&args.file)?;
     for (word, count) in &file.facts.left_out {
         // With stderr gone there is nobody left to tell.

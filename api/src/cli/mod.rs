@@ -128,6 +128,11 @@ fn folder_of(document: &Path) -> Option<&Path> {
 /// Documents are longer on the command line than over HTTP, but not endless.
 const DOCUMENT_BYTES: u64 = 256 << 20;
 
+/// A number as one would write it: counts without a fraction, and no row of zeros.
+fn shown(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value:.0}") } else { format!("{value:?}") }
+}
+
 fn tell(problem: &Problem, format: ErrorFormat) -> io::Result<()> {
     let mut stderr = io::stderr().lock();
     if format == ErrorFormat::Json {
@@ -144,10 +149,10 @@ fn tell(problem: &Problem, format: ErrorFormat) -> io::Result<()> {
         }
     }
     if let (Some(limit), Some(asked), Some(allowed)) = (&problem.limit, problem.asked, problem.allowed) {
-        writeln!(stderr, "  limit {limit}: asked {asked:?}, allowed {allowed:?}")?;
+        writeln!(stderr, "  limit {limit}: asked {}, allowed {}", shown(asked), shown(allowed))?;
     }
     for (name, value) in problem.remedy.iter().flatten() {
-        writeln!(stderr, "  this would pass: {name} = {value:?}")?;
+        writeln!(stderr, "  this would pass: {name} = {}", shown(*value))?;
     }
     Ok(())
 }

@@ -46,6 +46,16 @@ pub(super) fn target(path: &Path, format: Option<&str>) -> Result<Target, Proble
     Ok(Target { path: path.to_owned(), format, name: Some(format.facts().ending) })
 }
 
+/// Two files in one place would leave one of them.
+pub(super) fn check_distinct<'a>(paths: impl Iterator<Item = &'a Path>) -> Result<(), Problem> {
+    let mut paths: Vec<&Path> = paths.collect();
+    paths.sort();
+    match paths.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(Problem::new(ProblemKind::Usage, format!("{} is named for two outputs", pair[0].display()))),
+        None => Ok(()),
+    }
+}
+
 /// Writes all files, completes the certificate with their digests, and puts everything in place.
 pub(super) fn deliver(
     outcome: &mut Outcome,

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use lacuna_exchange::format::{self, ReadLimits};
+use lacuna_exchange::format::ReadLimits;
 use lacuna_fabrication::{Input, Job, JobKind, Params};
 use lacuna_kernel::budget::Limits;
 use serde_json::{Value, json};
 
 use super::args::{BlessArgs, DiffArgs, VerifyArgs};
 use super::remote::questions::AtServer;
-use super::work::Manner;
+use super::work::{Manner, is_mesh_file};
 use super::{DOCUMENT_BYTES, print, print_json, read_input};
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
@@ -119,8 +119,7 @@ impl Subject {
     /// A certificate, by itself or in what `lacuna run`, a service or a blessing tells; or a mesh file.
     fn read(path: &Path) -> Result<Self, Problem> {
         let bytes = read_input(path, DOCUMENT_BYTES.max(ReadLimits::default().file_bytes))?;
-        let is_document = bytes.iter().find(|byte| !byte.is_ascii_whitespace()).is_none_or(|&byte| byte == b'{');
-        if !is_document && format::detect(&bytes).is_some() {
+        if is_mesh_file(path, &bytes) {
             return Ok(Self::Mesh(bytes));
         }
         let unfit = |why: String| {

@@ -1,11 +1,11 @@
-//! Ctrl-C and the time limit.
+//! Ctrl-C, the wish of the system, and a terminal that is closed.
 
 use lacuna_kernel::budget::{CancelToken, StopReason};
 use tokio::signal;
 
 use crate::problem::Problem;
 
-/// Fires the token on the first SIGINT or SIGTERM, so that nothing half written stays; the second ends the
+/// Fires the token on the first SIGINT, SIGTERM or SIGHUP, so that nothing half written stays; the second ends the
 /// process at once.
 ///
 /// # Errors
@@ -15,7 +15,7 @@ pub(super) fn on_signals(token: &CancelToken) -> Result<(), Problem> {
     on_signals_do(move || token.fire(StopReason::Cancelled))
 }
 
-/// Does something on the first SIGINT or SIGTERM, as [`on_signals`] fires a token.
+/// Does something on the first of these signals, as [`on_signals`] fires a token.
 ///
 /// # Errors
 /// As [`on_signals`].
@@ -40,11 +40,33 @@ pub(super) async fn asked() {
         let Ok(mut terminate) = signal::unix::signal(signal::unix::SignalKind::terminate()) else {
             return std::future::pending().await;
         };
+        let hangup = async {
+            if !outlives_its_terminal()
+                && let Ok(mut hangup) = signal::unix::signal(signal::unix::SignalKind::hangup())
+            {
+                hangup.recv().await
+            } else {
+                std::future::pending().await
+            }
+        };
         tokio::select! {
             _ = signal::ctrl_c() => {}
             _ = terminate.recv() => {}
+            _ = hangup => {}
         }
     }
     #[cfg(not(unix))]
     let _ = signal::ctrl_c().await;
+}
+
+/// Whether whoever started the process had it ignore that its terminal is closed, as `nohup` does. Where the system does not tell, it is not so.
+#[cfg(unix)]
+fn outlives_its_terminal() -> bool {
+    static IGNORED: std::sync::OnceLock<bool> = std::sync::OnceLock::new();
+    *IGNORED.get_or_init(|| {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        // SIGHUP is the first signal.
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
+    })
 }

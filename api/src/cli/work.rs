@@ -1,6 +1,6 @@
 //! Commands that compute: one job each, as the service does them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use lacuna_exchange::format::{self, Format, ReadLimits};
 use lacuna_fabrication::{
@@ -15,7 +15,7 @@ use super::args::{
 };
 use super::batch;
 use super::convert::title;
-use super::output::{Target, Written, deliver, deliver_streamed, finish, start, target};
+use super::output::{Target, Written, check_distinct, deliver, deliver_streamed, finish, start, target};
 use super::progress::Reporter;
 use super::remote::{self, Server};
 use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
@@ -139,7 +139,7 @@ pub(super) fn intersect(args: &IntersectArgs, manner: Manner<'_>) -> Result<(), 
     if operation.is_none() {
         let wanted = if args.with.is_some() { 1 } else { 2 };
         if inputs.len() != wanted {
-            let detail = format!("{} models are given; name two, one and --with, or an --operation", inputs.len());
+            let detail = format!("number of models that are given: {}; name two, one and --with, or an --operation", inputs.len());
             return Err(Problem::new(ProblemKind::Usage, detail));
         }
         return tell(JobKind::Intersect, inputs, params, &[], &args.limits, manner);
@@ -261,7 +261,8 @@ fn make(
         .iter()
         .map(|path| target(path, output.format.as_deref().filter(|_| path == Path::new("-"))))
         .collect::<Result<_, _>>()?;
-    check_distinct(&targets, output)?;
+    let others = output.certificate.iter().chain(&output.preview).map(PathBuf::as_path);
+    check_distinct(targets.iter().map(|target| target.path.as_path()).chain(others))?;
     let names: Vec<&str> = targets.iter().filter_map(|target| target.name).collect();
     let order = order_of(kind, inputs, params, &names, limit_args);
     if let Some(path) = &output.preview {
@@ -290,17 +291,6 @@ fn make(
     Ok(())
 }
 
-/// Two files in one place would leave one of them.
-fn check_distinct(targets: &[Target], output: &OutputArgs) -> Result<(), Problem> {
-    let others = output.certificate.iter().chain(&output.preview);
-    let mut paths: Vec<&Path> = targets.iter().map(|target| target.path.as_path()).chain(others.map(|path| path.as_path())).collect();
-    paths.sort();
-    match paths.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(Problem::new(ProblemKind::Usage, format!("{} is named for two outputs", pair[0].display()))),
-        None => Ok(()),
-    }
-}
-
 fn order_of(kind: JobKind, inputs: Vec<Given>, params: Params, outputs: &[&str], limit_args: &LimitArgs) -> Order {
     let mut names: Vec<String> = Vec::new();
     for output in outputs {
@@ -312,12 +302,18 @@ fn order_of(kind: JobKind, inputs: Vec<Given>, params: Params, outputs: &[&str],
     Order::new(Job { kind, inputs, params, outputs: names, limits: limits(Limits::default(), limit_args) }, references)
 }
 
+/// Whether a file is, or by its ending shall be, a mesh file and no document.
+pub(super) fn is_mesh_file(path: &Path, bytes: &[u8]) -> bool {
+    let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+    let ending = path.extension().and_then(|ending| Format::from_name(&ending.to_string_lossy()));
+    first != Some(&b'{') && (format::detect(bytes).is_some() || ending.is_some_and(|format| format.facts().reads))
+}
+
 /// An argument as an input: a model document, or a mesh file, which is called by its name. A service gets the file.
 fn input_of(path: &Path, manner: Manner<'_>) -> Result<Given, Problem> {
     let reading = ReadLimits::default();
     let bytes = read_input(path, DOCUMENT_BYTES.max(reading.file_bytes))?;
-    let is_document = bytes.iter().find(|byte| !byte.is_ascii_whitespace()).is_none_or(|&byte| byte == b'{');
-    if is_document || format::detect(&bytes).is_none() {
+    if !is_mesh_file(path, &bytes) {
         let model = documents::read_model_in(&bytes, folder_of(path))?;
         let input = Input { name: model.name.clone().unwrap_or_else(|| "shape".to_owned()), model, radius_mm: None };
         return Ok(Given { input, reference: None });

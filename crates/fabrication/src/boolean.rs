@@ -36,9 +36,11 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
     if combined.triangles.is_empty() {
         let message = match operation {
             Operation::Union | Operation::Hull => "the inputs have no volume",
-            Operation::Intersection => "the result is empty: no point lies inside of all inputs, though surfaces may touch",
+            Operation::Intersection => {
+                "the result is empty: no point lies inside of all inputs, but for what is as thin as rounding, though surfaces may touch"
+            }
             Operation::Trim | Operation::Split => "nothing of the solid lies behind the plane: turn its normal, or move it",
-            Operation::Difference => "the result is empty: the other inputs cover all of the first",
+            Operation::Difference => "the result is empty: the other inputs cover all of the first, but for what is as thin as rounding",
         };
         return Err(JobError::new(Kind::Unreachable, "boolean.empty", message.into()));
     }

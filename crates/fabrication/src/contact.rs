@@ -53,7 +53,7 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     if !found.complete {
         certificate
             .warnings
-            .push("the search ended at a limit: there may be more places, and the distance is not as narrow as the tolerance".into());
+            .push(format!("the search ended at a limit, of {MOST_PAIRS} pairs of cells near each other or of the job's cells: there may be more places, and the distance is not as narrow as the tolerance; a larger tolerance would do"));
     }
     if found.places.len() > MOST_PLACES {
         certificate.warnings.push(format!("{} of {} places are described", MOST_PLACES, found.places.len()));
@@ -125,7 +125,7 @@ pub(crate) fn compare(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     let found = hausdorff(first, second, tolerance, budget)?;
     let mut certificate = certificate::of_shapes(&shapes, found.distance_mm().width(), tolerance);
     if !found.complete {
-        certificate.warnings.push("the search ended at a limit: the distance is not as narrow as the tolerance".into());
+        certificate.warnings.push("the search ended at a limit, of the job's cells or memory: the distance is not as narrow as the tolerance; a larger tolerance, or larger limits, would do".into());
     }
     let Hausdorff { from_first, from_second, .. } = &found;
     let directed =

@@ -52,9 +52,24 @@ pub(crate) fn convert(mesh: &PolygonMesh, tolerance: Tolerance, budget: &Budget)
         SolidError::Stopped(stopped) => stopped.into(),
         other => JobError::new(Kind::Invalid, "convert.mesh", other.to_string()),
     })?;
-    let certificate = certificate::of_polygons(&cut, &topology, &mesh.vertices, moved_mm, tolerance);
+    let mut certificate = certificate::of_polygons(&cut, &topology, &mesh.vertices, moved_mm, tolerance);
+    let collapsed = collapsed(&cut, &mesh.vertices);
+    if collapsed > 0 {
+        certificate.warnings.push(format!(
+            "{collapsed} triangles have corners that are one place in single precision; a shape nearer to the origin keeps them, or a repair takes them away (--repair, \"repair\": true)"
+        ));
+    }
     let rounded = PolygonMesh { vertices: cut.vertices, faces: mesh.faces.clone(), interior: mesh.interior };
     Ok(Outcome { geometry: Geometry::Polygons { mesh: rounded, closed: topology.is_closed_manifold() }, certificate })
+}
+
+/// Triangles with corners that were at different places and are not any more.
+fn collapsed(rounded: &TriMesh, given: &[DVec3]) -> usize {
+    let is_one = |a: u32, b: u32| {
+        let [a, b] = [a, b].map(|corner| corner as usize);
+        rounded.vertices[a] == rounded.vertices[b] && given[a] != given[b]
+    };
+    rounded.triangles.iter().filter(|&&[a, b, c]| is_one(a, b) || is_one(b, c) || is_one(c, a)).count()
 }
 
 /// What is known of it beforehand.

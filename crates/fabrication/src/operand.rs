@@ -57,7 +57,8 @@ pub(crate) fn sources<'a>(job: &'a Job, budget: &Budget) -> Result<Vec<Source<'a
         let attractor = lowered.attractor;
         let radius_mm = input.radius_mm.or(job.params.radius_mm).unwrap_or(0.0);
         if radius_mm == 0.0 && !may_be_solid(&attractor) {
-            return Err(not_a_solid(&input.name, "it is no closed surface"));
+            let fault = attractor.warnings().iter().find(|warning| warning.contains("is taken as a surface"));
+            return Err(not_a_solid(&input.name, fault.map_or("it is no closed surface", String::as_str)));
         }
         let largest = if radius_mm > 0.0 { attractor.radii(radius_mm)[1] } else { 0.0 };
         let bounds = bounding_box(&attractor, budget)?.grown(largest);
@@ -89,11 +90,14 @@ pub(crate) fn is_solid(attractor: &Attractor) -> bool {
 
 /// The tolerance that single precision leaves.
 pub(crate) fn share(sources: &[Source<'_>], tolerance: Tolerance) -> Result<Tolerance, JobError> {
+    let exact = sources.iter().map(|source| source.bounds.extent()).fold(0.0, f64::max);
     // A solid may reach beyond the exact one by the tolerance.
-    let extent = sources.iter().map(|source| source.bounds.extent()).fold(0.0, f64::max) + tolerance.mm();
-    let taken = carried(extent);
+    let taken_of = |tolerance_mm: f64| carried(exact + tolerance_mm);
+    let taken = taken_of(tolerance.mm());
     if tolerance.mm() < 2.0 * taken {
-        return Err(not_carried(tolerance, extent, 2.0 * taken));
+        // With the one that is offered the solid reaches farther still, by a share that is nearly nothing.
+        let offered = 2.0 * taken_of(2.0 * taken) * (1.0 + 1e-6);
+        return Err(not_carried(tolerance, exact + tolerance.mm(), offered));
     }
     Ok(Tolerance::new(tolerance.mm() - taken)?)
 }

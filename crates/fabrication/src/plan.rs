@@ -176,7 +176,7 @@ fn remedy(job: &Job, plan: Option<&Plan>, limit: &'static str, budget: &Budget) 
         }
         (fails, last) = (tolerance_mm, now.or(last));
     }
-    needed.map(|asked| (limit, CERTAIN * asked))
+    needed.map(|asked| (limit, (CERTAIN * asked).ceil()))
 }
 
 /// The plan of a job whose meshes are as they shall be. Its memory is what the work takes beside the process that does it, as limits of memory count it.

@@ -77,8 +77,8 @@ pub enum FormatError {
     )]
     NoAddresses,
     /// No format of the table fits the bytes.
-    #[error("the bytes fit none of the formats that are read")]
-    UnknownFormat,
+    #[error("{0}")]
+    UnknownFormat(String),
     /// There is nothing to write.
     #[error("the geometry is empty")]
     Empty,
@@ -200,7 +200,7 @@ impl FormatError {
             | Self::CannotVerify { .. }
             | Self::CannotDraw { .. }
             | Self::NoAddresses
-            | Self::UnknownFormat
+            | Self::UnknownFormat(_)
             | Self::Empty
             | Self::NotFinite { .. }
             | Self::IndexOutOfRange { .. }
@@ -227,7 +227,7 @@ impl FormatError {
             Self::CannotVerify { .. } => "format.cannot-verify",
             Self::CannotDraw { .. } => "format.cannot-draw",
             Self::NoAddresses => "format.no-addresses",
-            Self::UnknownFormat => "format.unknown",
+            Self::UnknownFormat(_) => "format.unknown",
             Self::Empty => "format.empty-geometry",
             Self::NotSinglePrecision { .. } => "format.not-single-precision",
             Self::NotFinite { .. } => "format.not-finite",

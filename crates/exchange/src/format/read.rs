@@ -3,7 +3,7 @@
 use super::error::FormatError;
 use super::error::Place;
 use super::limits::{MeshBuilder, within};
-use super::{Format, ReadLimits, obj, off, ply, stl, threemf, vrml};
+use super::{FORMATS, Format, ReadLimits, obj, off, ply, stl, threemf, vrml};
 use lacuna_kernel::solid::TriMesh;
 use std::convert::Infallible;
 
@@ -175,6 +175,24 @@ pub fn detect(bytes: &[u8]) -> Option<Format> {
     obj::looks_like(bytes).then_some(Format::Obj)
 }
 
+/// What is said of bytes that fit no format: most often a file that was not written to its end.
+fn unknown(bytes: &[u8]) -> String {
+    if bytes.is_empty() {
+        return "the file is empty".to_owned();
+    }
+    let names: Vec<&str> = FORMATS.iter().filter(|facts| facts.reads).map(|facts| facts.name).collect();
+    let known = format!("the bytes fit none of the formats that are read: {}", names.join(", "));
+    match stl::announced_bytes(bytes) {
+        Some((facets, whole)) if std::str::from_utf8(bytes).is_err() => {
+            let length = bytes.len();
+            format!(
+                "{known}; as a binary STL file of the {facets} triangles that it announces it would have {whole} bytes, and it has {length}: is all of it there, and nothing more?"
+            )
+        }
+        _ => known,
+    }
+}
+
 /// Reads a mesh. The format is detected unless it is given.
 ///
 /// Polygons become fans of triangles and are kept as such, units become mm, the objects of a 3MF file are placed where its build
@@ -186,7 +204,7 @@ pub fn detect(bytes: &[u8]) -> Option<Format> {
 /// and never more memory than the limits and the file's own length justify.
 pub fn read(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result<MeshFile, FormatError> {
     within(Place::File, "file_bytes", bytes.len() as u64, limits.file_bytes)?;
-    let format = format.or_else(|| detect(bytes)).ok_or(FormatError::UnknownFormat)?;
+    let format = format.or_else(|| detect(bytes)).ok_or_else(|| FormatError::UnknownFormat(unknown(bytes)))?;
     match format {
         Format::Stl => stl::read(bytes, limits),
         Format::ThreeMf => threemf::read(bytes, limits),

@@ -77,7 +77,12 @@ fn write_facet(facet: &mut [u8; FACET_BYTES], corners: [DVec3; 3]) {
 
 /// Whether the length is that of a binary file with the count that stands at byte 80.
 pub(crate) fn is_binary(bytes: &[u8]) -> bool {
-    announced(bytes).is_some_and(|facets| bytes.len() as u64 == PREFIX_BYTES + facets * FACET_BYTES as u64)
+    announced_bytes(bytes).is_some_and(|(_, whole)| bytes.len() as u64 == whole)
+}
+
+/// The count that stands at byte 80, and the length of a binary file with so many facets.
+pub(crate) fn announced_bytes(bytes: &[u8]) -> Option<(u64, u64)> {
+    announced(bytes).map(|facets| (facets, PREFIX_BYTES + facets * FACET_BYTES as u64))
 }
 
 /// Whether the bytes begin as the text form does.

@@ -122,7 +122,7 @@ pub enum AttractorError {
     Automaton(#[from] AutomatonError),
     /// A cycle does not contract.
     #[error(
-        "the maps do not contract: along the cycle {} from state '{state}' lengths are multiplied by {rate:.6} at each step, and must shrink",
+        "the maps do not contract, or too little to be proven: along the cycle {} from state '{state}' lengths are multiplied by {rate} at each step, and must shrink",
         joined(.labels)
     )]
     NotContractive {

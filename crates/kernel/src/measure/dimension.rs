@@ -265,7 +265,7 @@ fn directions(attractor: &Attractor, start: StateId) -> Option<Vec<Vec<f64>>> {
             change = change.max(moved / size);
             points[own] = next;
         }
-        is_settled = change <= FLAT;
+        is_settled = change <= 1e-2 * FLAT;
         if is_settled {
             break;
         }

@@ -127,7 +127,7 @@ pub fn length_mm(points: &[DVec2]) -> f64 {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SectionError {
     /// An offset is not a number, or infinite.
-    #[error("offset {index} is {value_mm}")]
+    #[error("offset {index} is {value_mm}, and must be a number of mm")]
     Offset {
         /// Its place among the offsets.
         index: usize,
