@@ -228,8 +228,7 @@ fn a_closed_terminal_stops_a_command() {
     for (outlives, prefix) in [(false, ""), (true, "trap '' HUP; ")] {
         let made = scratch.join("made");
         let words = format!("{prefix}exec \"$0\" run \"$1\" -o \"$2\"");
-        let mut process =
-            Command::new("sh").arg("-c").arg(words).arg(lacuna()).arg(&job).arg(&made).stderr(Stdio::null()).spawn().unwrap();
+        let mut process = Command::new("sh").arg("-c").arg(words).arg(lacuna()).arg(&job).arg(&made).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(1500));
         assert!(process.try_wait().unwrap().is_none(), "the job is too short for this test");
         let send = |signal: &str| assert!(Command::new("kill").args([signal, &process.id().to_string()]).status().unwrap().success());
