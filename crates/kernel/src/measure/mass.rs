@@ -209,7 +209,7 @@ pub fn mass_properties(mesh: &TriMesh) -> Option<MassProperties> {
     let [volume, first @ .., _, _, _, _, _, _] = moments;
     let volume = volume.scaled(one_of(6.0));
     let (least, lost) = (volume.value.nearest() - 2.0 * volume.error(), volume.error());
-    if !(least > 0.0) {
+    if least.is_nan() || least <= 0.0 {
         return None;
     }
     // The offset of the centroid from the origin, and what each of its coordinates may be off: |m / v - m' / v'| <= (|m - m'| + |m'| |v - v'| / v') / v.
