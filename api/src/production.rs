@@ -11,7 +11,6 @@ use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::model::Model;
-use lacuna_kernel::solid::TriMesh;
 
 use crate::digest::Digest;
 use crate::files::{PendingFile, Stoppable};

@@ -119,8 +119,9 @@ pub fn cut(vertices: &[DVec3], corners: &[u32], triangles: &mut Vec<[u32; 3]>) -
     if let Some(vertex) = repeated(corners) {
         return Err(PolygonFault::Touching { vertex });
     }
-    let (points, reach) = scaled(vertices, corners);
-    if is_line(&points, reach) {
+    let arms = Arms::of(vertices, corners);
+    let points: Vec<DVec3> = corners.iter().map(|&corner| arms.arm(vertices[corner as usize])).collect();
+    if is_line(&points, arms.reach(vertices, corners)) {
         triangles.extend(fan(corners));
         return Ok(());
     }
@@ -139,31 +140,41 @@ pub fn cut(vertices: &[DVec3], corners: &[u32], triangles: &mut Vec<[u32; 3]>) -
     Ok(())
 }
 
-/// A fan is the polygon when no triangle of it turns against the whole, and it does not go round its first corner more than once.
+/// A fan is the polygon when no triangle of it turns against the whole, no edge passes its first corner, and it does not go round that more than once.
 fn is_star_shaped(vertices: &[DVec3], corners: &[u32]) -> bool {
-    let first = vertices[corners[0] as usize];
-    let arm = |k: usize| vertices[corners[k] as usize] - first;
+    let arms = Arms::of(vertices, corners);
+    let arm = |k: usize| arms.arm(vertices[corners[k] as usize]);
+    let is_here = |k: usize| arm(k) == DVec3::ZERO;
+    // Corners at the place of the first may only be the next ones and those before: elsewhere the polygon comes back to it.
+    let (mut from, mut to) = (1, corners.len() - 1);
+    while from < to && is_here(from) {
+        from += 1;
+    }
+    while to > from && is_here(to) {
+        to -= 1;
+    }
     let turn = |k: usize| arm(k).cross(arm(k + 1));
-    let last = corners.len() - 1;
-    let whole: DVec3 = (1..last).map(turn).sum();
+    let whole: DVec3 = (from..to).map(turn).sum();
     let area = whole.length_squared();
-    let least = -ROUNDING * area;
-    // Turns that cancel to the last digit are no fan, though what is left of them has no direction to turn against.
-    let cancels = |turn: DVec3| turn.length_squared() * ROUNDING * ROUNDING > area;
-    if (1..last).map(turn).any(|turn| turn.dot(whole) < least || cancels(turn)) {
+    let rounding = ROUNDING * area;
+    let is_turned = (from..to).any(|k| {
+        let along = turn(k).dot(whole);
+        // Turns that cancel to the last digit are no fan, though what is left of them has no direction to turn against.
+        let cancels = turn(k).length_squared() * ROUNDING * ROUNDING > area;
+        let passes = along <= rounding && (is_here(k) || arm(k).dot(arm(k + 1)) < 0.0);
+        along < -rounding || cancels || passes
+    });
+    if is_turned {
         return false;
     }
-    if corners.len() < 5 {
-        return true;
-    }
-    let start = arm(1);
+    let start = arm(from);
     let mut past_half = false;
-    for k in 2..=last {
+    for k in from..=to {
         let side = start.cross(arm(k)).dot(whole);
-        if past_half && side > -least {
+        if past_half && side > rounding {
             return false;
         }
-        past_half |= side < least;
+        past_half |= side < -rounding;
     }
     true
 }
@@ -175,16 +186,33 @@ pub(super) fn repeated(corners: &[u32]) -> Option<u32> {
     sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
-/// The corners from the first, made smaller than 1 by a power of two, so that no product overflows or vanishes; and how far they reach from the origin in
-/// that measure.
-fn scaled(vertices: &[DVec3], corners: &[u32]) -> (Vec<DVec3>, f64) {
-    let first = vertices[corners[0] as usize];
-    // Halves, because the difference of two numbers may be none.
-    let halves: Vec<DVec3> = corners.iter().map(|&corner| 0.5 * vertices[corner as usize] - 0.5 * first).collect();
-    let extent = halves.iter().map(|point| point.abs().max_element()).fold(0.0, f64::max);
-    let scale = if extent > 0.0 { 0.5 * (-extent.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 };
-    let reach = corners.iter().map(|&corner| (vertices[corner as usize] * (0.5 * scale)).length()).fold(0.0, f64::max);
-    (halves.into_iter().map(|point| point * scale).collect(), reach)
+/// A polygon seen from its first corner, made smaller than 1 by a power of two, so that no product overflows or vanishes.
+struct Arms {
+    first: DVec3,
+    scale: f64,
+}
+
+impl Arms {
+    fn of(vertices: &[DVec3], corners: &[u32]) -> Self {
+        let first = vertices[corners[0] as usize];
+        let extent = corners.iter().map(|&corner| Self::half(vertices[corner as usize], first).abs().max_element()).fold(0.0, f64::max);
+        let scale = if extent > 0.0 { 0.5 * (-extent.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 };
+        Self { first, scale }
+    }
+
+    /// Halves, because the difference of two numbers may be none.
+    fn half(vertex: DVec3, first: DVec3) -> DVec3 {
+        0.5 * vertex - 0.5 * first
+    }
+
+    fn arm(&self, vertex: DVec3) -> DVec3 {
+        Self::half(vertex, self.first) * self.scale
+    }
+
+    /// How far the polygon reaches from the origin in the measure of the arms.
+    fn reach(&self, vertices: &[DVec3], corners: &[u32]) -> f64 {
+        corners.iter().map(|&corner| (vertices[corner as usize] * (0.5 * self.scale)).length()).fold(0.0, f64::max)
+    }
 }
 
 /// Whether a polygon is so narrow that rounding alone tells its sides apart: any triangles are its then.
