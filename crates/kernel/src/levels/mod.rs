@@ -279,10 +279,10 @@ fn sets(ifs: &Ifs) -> (Vec<Vec<usize>>, Vec<usize>) {
     (sets, after)
 }
 
-/// The triangles of faces; and the faces, in triangles where they are not star-shaped from their first corner.
-fn cut(vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Result<(Vec<[u32; 3]>, Vec<Vec<u32>>), LevelError> {
+/// The triangles of faces. Faces that are not star-shaped from their first corner become their triangles.
+fn cut(vertices: &[DVec3], faces: &mut Vec<Vec<u32>>) -> Result<Vec<[u32; 3]>, LevelError> {
     let (mut triangles, mut pieces) = (Vec::new(), Vec::with_capacity(faces.len()));
-    for face in faces {
+    for face in faces.drain(..) {
         let first = triangles.len();
         polygon::cut(vertices, &face, &mut triangles)
             .map_err(|_| LevelError::NoPrimitive { reason: "one of its faces meets itself; split it into faces that do not" })?;
@@ -292,7 +292,8 @@ fn cut(vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Result<(Vec<[u32; 3]>, Vec<V
             pieces.extend(triangles[first..].iter().map(|corners| corners.to_vec()));
         }
     }
-    Ok((triangles, pieces))
+    *faces = pieces;
+    Ok(triangles)
 }
 
 /// What is known before anything is copied.
@@ -313,7 +314,7 @@ impl Start {
                 (vertices, faces, LevelPrimitive::Box)
             }
         };
-        let (triangles, faces) = cut(&vertices, faces)?;
+        let triangles = cut(&vertices, &mut faces)?;
         let mesh = TriMesh { vertices, triangles };
         Solid::new(mesh.clone(), budget).map_err(|error| match error {
             SolidError::Stopped(stopped) => LevelError::Stopped(stopped),
