@@ -24,6 +24,7 @@
 //! | `thickening` | do walls, closings and radii that vary hold their bounds? |
 //! | `faults` | what does one process lose when it is killed, its disk is full, its clients misbehave? |
 //! | `plans` | is what is predicted near what is made? |
+//! | `polygons` | are concave polygons filled, and those without an inside refused? |
 //! | `previews` | are previews what they say, and never taken for results? |
 //! | `processes` | what does a job take with it when it takes down its process? |
 //! | `distributed` | and several, with their database and object store? |
@@ -57,6 +58,7 @@ mod independent;
 mod levels;
 mod measures;
 mod plans;
+mod polygons;
 mod previews;
 mod processes;
 mod properties;

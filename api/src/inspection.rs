@@ -6,6 +6,7 @@ use lacuna_exchange::format::{self, Format, MeshFile, ReadLimits, Unit};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::measure::mass;
 use lacuna_kernel::model::HalfEdgeMesh;
+use lacuna_kernel::model::polygon::PolygonFault;
 use lacuna_kernel::solid::{Topology, TriMesh};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -135,14 +136,15 @@ pub fn report(file: &MeshFile, bytes: u64) -> Result<MeshReport, Problem> {
     let topology = topology(file)?;
     let (mesh, facts) = (&file.mesh, &file.facts);
     let (volume, area) = (mass::volume(mesh), mass::area(mesh));
-    let finite = |value: f64| value.is_finite().then_some(value);
+    // Of faces that have no inside there is nothing to count.
+    let finite = |value: f64| (value.is_finite() && file.unfilled.is_empty()).then_some(value);
     Ok(MeshReport {
         format: facts.format.facts().ending.to_owned(),
         encoding: facts.encoding.to_owned(),
         bytes,
         unit: facts.unit.map_or("none, taken for mm", unit_word).to_owned(),
         objects: facts.object_names.clone(),
-        polygons_fanned: file.fans.len() as u64,
+        polygons_fanned: file.polygons.len() as u64,
         left_out: facts.left_out.iter().map(|(word, count)| ((*word).to_owned(), *count)).collect(),
         cage: cage(file),
         vertices: mesh.vertices.len() as u64,
@@ -164,6 +166,19 @@ pub fn report(file: &MeshFile, bytes: u64) -> Result<MeshReport, Problem> {
         area_mm2: finite(area),
         prompts: prompts(file, volume, &topology),
     })
+}
+
+/// Polygons that no triangles fill, as findings.
+#[must_use]
+pub fn unfilled(file: &MeshFile) -> Vec<Finding> {
+    let finding = |(face, fault): &(u64, PolygonFault)| Finding {
+        pointer: format!("/faces/{face}"),
+        code: fault.code().to_owned(),
+        message: format!("face {face}: {fault}"),
+        line: None,
+        column: None,
+    };
+    file.unfilled.iter().map(finding).collect()
 }
 
 fn cage(file: &MeshFile) -> Cage {
@@ -235,6 +250,15 @@ fn prompts(file: &MeshFile, volume: f64, topology: &Topology) -> Vec<Prompt> {
     }
     for (word, count) in &file.facts.left_out {
         prompt("file.left-out", format!("{count} shapes of the kind {word} hold no polygons and were left out"));
+    }
+    if let Some((face, fault)) = file.unfilled.first() {
+        prompt(
+            fault.code(),
+            format!(
+                "{} faces have no inside, so that area and volume mean nothing; the first is face {face}: {fault}",
+                file.unfilled.len()
+            ),
+        );
     }
     if !topology.is_closed_manifold() {
         prompt("mesh.not-manifold", "the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing; lacuna convert --repair mends what leaves no doubt".to_owned());

@@ -5,13 +5,12 @@ use std::io::{BufReader, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
-use lacuna_exchange::format::{self, Fan, Format, FormatError, Metadata, NamedMesh, PointFile, ScalarField};
+use lacuna_exchange::format::{self, Format, FormatError, Metadata, NamedMesh, PointFile, ScalarField};
 use lacuna_fabrication::shape_measures::MappedThickness;
 use lacuna_fabrication::{Certificate, Geometry, Job, Outcome, Plan, SolveRefusal, Solved, Stack, StreamError, Validation};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::model::{Model, PolygonMesh};
-use lacuna_kernel::solid::TriMesh;
+use lacuna_kernel::model::Model;
 
 use crate::digest::Digest;
 use crate::files::{PendingFile, Stoppable};
@@ -171,12 +170,8 @@ pub fn write_file(
         return Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed);
     }
     let parts = parts(&outcome.geometry);
-    let cut;
     let geometry = match &outcome.geometry {
-        Geometry::Polygons { mesh, closed } => {
-            cut = Cut::of(mesh);
-            cut.geometry(*closed)
-        }
+        Geometry::Polygons { mesh, closed } => format::Geometry::Polygons { mesh: &mesh.mesh, polygons: &mesh.polygons, closed: *closed },
         other => view(other, &parts).ok_or_else(|| no_geometry(format))?,
     };
     guarded(|| format::write(format, geometry, &metadata, &mut sink))?.map_err(|error| format_problem(&error))?;
@@ -289,23 +284,6 @@ fn view<'g>(geometry: &'g Geometry, parts: &'g [NamedMesh<'g>]) -> Option<format
         Geometry::Parts(_) => Some(parts.into()),
         Geometry::Tessellation(tessellation) => Some(tessellation.into()),
         Geometry::Polygons { .. } | Geometry::Sections(_) | Geometry::Thickness(_) | Geometry::None => None,
-    }
-}
-
-/// Polygons as the formats take them: cut into triangles, with a note of which belong together.
-struct Cut {
-    mesh: TriMesh,
-    fans: Vec<Fan>,
-}
-
-impl Cut {
-    fn of(mesh: &PolygonMesh) -> Self {
-        let (triangles, fans) = format::fanned(&mesh.faces);
-        Self { mesh: TriMesh { vertices: mesh.vertices.clone(), triangles }, fans }
-    }
-
-    fn geometry(&self, closed: bool) -> format::Geometry<'_> {
-        format::Geometry::Polygons { mesh: &self.mesh, fans: &self.fans, closed }
     }
 }
 

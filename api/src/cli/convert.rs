@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
 
-use lacuna_fabrication::repaired_mesh;
+use lacuna_fabrication::{JobError, repaired_mesh};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{Interior, PolygonMesh};
 
@@ -15,6 +15,9 @@ use super::output::{Target, check_distinct, finish, start, target};
 use crate::inspection;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{format_problem, guarded};
+
+/// Faces without an inside are listed up to this number.
+const MOST_FINDINGS: usize = 20;
 
 /// Reads a mesh and writes it, repaired only if that is asked for. All files are written before the first one takes its place.
 pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
@@ -30,6 +33,7 @@ pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
     if args.repair {
         repair(&mut file, &title)?;
     }
+    filled(&file)?;
     let closed = inspection::topology(&file)?.is_closed_manifold();
     let mut pending = Vec::with_capacity(targets.len());
     for target in &targets {
@@ -40,13 +44,23 @@ pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
     pending.into_iter().try_for_each(|(part, path)| finish(part, path))
 }
 
+/// Refuses polygons that no triangles fill: whoever reads them would have to guess.
+fn filled(file: &MeshFile) -> Result<(), Problem> {
+    let mut findings = inspection::unfilled(file);
+    if findings.is_empty() {
+        return Ok(());
+    }
+    findings.truncate(MOST_FINDINGS);
+    Err(Problem::new(ProblemKind::InvalidFile, findings[0].message.clone()).code(findings[0].code.clone()).errors(findings))
+}
+
 /// Makes the mesh a solid and says what was done to it.
 fn repair(file: &mut MeshFile, title: &str) -> Result<(), Problem> {
     let mesh = PolygonMesh { vertices: file.mesh.vertices.clone(), faces: file.faces(), interior: Interior::Auto };
     let (made, statement) = guarded(|| repaired_mesh(title, &mesh, &Budget::default()))??;
     if let Some(PolygonMesh { vertices, faces, .. }) = made {
-        (file.mesh.triangles, file.fans) = format::fanned(&faces);
-        file.mesh.vertices = vertices;
+        let cut = PolygonMesh { vertices, faces, interior: Interior::Auto }.cut().map_err(JobError::model)?;
+        (file.mesh, file.polygons) = (cut.mesh, cut.polygons);
     }
     for warning in statement.warnings() {
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
@@ -64,7 +78,7 @@ fn write(format: Format, file: &MeshFile, title: &str, closed: bool, part: &mut 
     let metadata = Metadata { title: Some(title), ..Metadata::default() };
     let mut sink = BufWriter::with_capacity(1 << 16, part);
     let written =
-        guarded(|| format::write(format, Geometry::Polygons { mesh: &file.mesh, fans: &file.fans, closed }, &metadata, &mut sink))?;
+        guarded(|| format::write(format, Geometry::Polygons { mesh: &file.mesh, polygons: &file.polygons, closed }, &metadata, &mut sink))?;
     written.map_err(|error| match error {
         // The file is at fault, not a model.
         format::FormatError::CannotCarry { .. } => Problem { kind: ProblemKind::InvalidFile, ..format_problem(&error) },

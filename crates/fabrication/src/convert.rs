@@ -22,12 +22,12 @@ pub(crate) fn polygons(job: &Job) -> Option<&PolygonMesh> {
     }
 }
 
-/// Triangles of polygons that are cut from their first corner.
+/// Triangles that the polygons become.
 fn triangles(mesh: &PolygonMesh) -> u64 {
     mesh.faces.iter().map(|face| face.len() as u64 - 2).sum()
 }
 
-/// Rounds the mesh to single precision and counts. Cost: linear.
+/// Cuts the polygons, rounds the mesh to single precision and counts. Cost: linear, but for faces that are not star-shaped from their first corner.
 pub(crate) fn convert(mesh: &PolygonMesh, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let count = triangles(mesh);
     if count > budget.limits.triangles {
@@ -46,21 +46,21 @@ pub(crate) fn convert(mesh: &PolygonMesh, tolerance: Tolerance, budget: &Budget)
         return Err(not_carried(tolerance, extent, moved_mm));
     }
     budget.cancel.check()?;
-    let cut = |face: &Vec<u32>| (1..face.len() - 1).map(|k| [face[0], face[k], face[k + 1]]).collect::<Vec<_>>();
-    let cut = TriMesh { vertices, triangles: mesh.faces.iter().flat_map(cut).collect() };
-    let topology = Topology::of(&cut, budget).map_err(|error| match error {
+    // As given: rounding may fold what is thinner than itself.
+    let mut cut = mesh.cut().map_err(JobError::model)?;
+    cut.mesh.vertices = vertices;
+    let topology = Topology::of(&cut.mesh, budget).map_err(|error| match error {
         SolidError::Stopped(stopped) => stopped.into(),
         other => JobError::new(Kind::Invalid, "convert.mesh", other.to_string()),
     })?;
-    let mut certificate = certificate::of_polygons(&cut, &topology, &mesh.vertices, moved_mm, tolerance);
-    let collapsed = collapsed(&cut, &mesh.vertices);
+    let mut certificate = certificate::of_polygons(&cut.mesh, &topology, &mesh.vertices, moved_mm, tolerance);
+    let collapsed = collapsed(&cut.mesh, &mesh.vertices);
     if collapsed > 0 {
         certificate.warnings.push(format!(
             "{collapsed} triangles have corners that are one place in single precision; a shape nearer to the origin keeps them, or a repair takes them away (--repair, \"repair\": true)"
         ));
     }
-    let rounded = PolygonMesh { vertices: cut.vertices, faces: mesh.faces.clone(), interior: mesh.interior };
-    Ok(Outcome { geometry: Geometry::Polygons { mesh: rounded, closed: topology.is_closed_manifold() }, certificate })
+    Ok(Outcome { geometry: Geometry::Polygons { mesh: cut, closed: topology.is_closed_manifold() }, certificate })
 }
 
 /// Triangles with corners that were at different places and are not any more.

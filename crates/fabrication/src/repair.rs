@@ -116,7 +116,7 @@ pub fn repaired_mesh(name: &str, mesh: &PolygonMesh, budget: &Budget) -> Result<
         let message = format!("a repair makes a solid, and input '{name}' says \"interior\": \"surface\"; leave out one of the two");
         return Err(JobError::new(Kind::Invalid, "repair.surface", message));
     }
-    let triangles = mesh.fanned().map_err(JobError::model)?;
+    let triangles = mesh.cut().map_err(JobError::model)?.mesh;
     let Repaired { solid, repair } = repair(&triangles, budget).map_err(|error| match error {
         RepairError::Stopped(stopped) => stopped.into(),
         other => {

@@ -6,7 +6,7 @@ use lacuna_kernel::dilation::{DilationError, dilate_unsimplified};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume_within};
 use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
-use lacuna_kernel::model::{Finding, Lowered, Model, PolygonMesh};
+use lacuna_kernel::model::{CutMesh, Finding, Lowered, Model};
 use lacuna_kernel::solid::{Crossings, Solid};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
@@ -30,10 +30,10 @@ pub enum Geometry {
     Parts(Vec<Part>),
     /// An evaluation.
     Tessellation(Tessellation),
-    /// A mesh with its polygons whole, in single-precision numbers.
+    /// A mesh with its polygons, in single-precision numbers.
     Polygons {
-        /// The mesh.
-        mesh: PolygonMesh,
+        /// The mesh, and which of its triangles are polygons.
+        mesh: CutMesh,
         /// Whether it was counted to be a closed 2-manifold.
         closed: bool,
     },

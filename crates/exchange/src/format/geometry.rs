@@ -1,9 +1,10 @@
 //! What is written: one view on solids, parts and evaluations that every encoder shares.
 
 use super::error::{FormatError, Place};
-use super::read::{Fan, each_face, face_count};
+use super::read::{each_face, face_count};
 use super::{Carries, text};
 use glam::DVec3;
+use lacuna_kernel::model::polygon::PolygonRun;
 use lacuna_kernel::solid::{Solid, TriMesh};
 use lacuna_kernel::tessellation::{Normals, Tessellation};
 
@@ -33,7 +34,7 @@ pub enum Geometry<'a> {
         /// The mesh; coordinates are rounded to single precision.
         mesh: &'a TriMesh,
         /// Which of its triangles are polygons.
-        fans: &'a [Fan],
+        polygons: &'a [PolygonRun],
         /// Whether it is proven to be a closed 2-manifold.
         closed: bool,
     },
@@ -70,7 +71,7 @@ pub(crate) struct Piece<'a> {
     pub(crate) vertices: &'a [DVec3],
     pub(crate) triangles: &'a [[u32; 3]],
     /// Which triangles are polygons.
-    fans: &'a [Fan],
+    polygons: &'a [PolygonRun],
     pub(crate) segments: &'a [[u32; 2]],
     pub(crate) points: &'a [u32],
     /// At the corners of the triangles.
@@ -85,7 +86,7 @@ impl<'a> Piece<'a> {
             name,
             vertices: &mesh.vertices,
             triangles: &mesh.triangles,
-            fans: &[],
+            polygons: &[],
             segments: &[],
             points: &[],
             normals: None,
@@ -97,12 +98,12 @@ impl<'a> Piece<'a> {
 impl Piece<'_> {
     /// Hands over the corners of every face in turn, polygons whole.
     pub(crate) fn each_face(&self, take: impl FnMut(&[u32]) -> Result<(), FormatError>) -> Result<(), FormatError> {
-        each_face(self.triangles, self.fans, take)
+        each_face(self.triangles, self.polygons, take)
     }
 
     /// The most corners that a face has; 3 without faces.
     pub(crate) fn most_corners(&self) -> u32 {
-        self.fans.iter().map(|fan| fan.count).max().unwrap_or(1) + 2
+        self.polygons.iter().map(|polygon| polygon.count).max().unwrap_or(1) + 2
     }
 
     /// Whether the mesh bounds material, so that only its outside need be seen.
@@ -144,13 +145,13 @@ impl<'a> Geometry<'a> {
                 name: None,
                 vertices: &sample.vertices,
                 triangles: &sample.triangles,
-                fans: &[],
+                polygons: &[],
                 segments: &sample.segments,
                 points: &sample.points,
                 normals: sample.normals.as_deref(),
                 exact: false,
             }],
-            Self::Polygons { mesh, fans, .. } => vec![Piece { fans, exact: false, ..Piece::closed(None, mesh) }],
+            Self::Polygons { mesh, polygons, .. } => vec![Piece { polygons, exact: false, ..Piece::closed(None, mesh) }],
         }
     }
 }
@@ -214,7 +215,7 @@ pub(crate) fn counts(pieces: &[Piece<'_>]) -> Counts {
     pieces.iter().fold(Counts::default(), |sum, piece| Counts {
         vertices: sum.vertices + piece.vertices.len() as u64,
         triangles: sum.triangles + piece.triangles.len() as u64,
-        faces: sum.faces + face_count(piece.triangles, piece.fans),
+        faces: sum.faces + face_count(piece.triangles, piece.polygons),
         segments: sum.segments + piece.segments.len() as u64,
         points: sum.points + piece.points.len() as u64,
     })

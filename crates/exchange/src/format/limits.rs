@@ -1,8 +1,8 @@
 //! How much a file that somebody sent may ask for.
 
 use super::error::{FormatError, Place};
-use super::read::Fan;
 use glam::DVec3;
+use lacuna_kernel::model::polygon::{self, PolygonFault, PolygonRun};
 use lacuna_kernel::solid::TriMesh;
 
 /// Bounds on a file that is read. Each is checked before memory is taken for what it bounds.
@@ -55,20 +55,34 @@ pub(crate) fn reserve<T>(vector: &mut Vec<T>, count: usize, place: &Place) -> Re
         .map_err(|_| FormatError::OutOfMemory { place: place.clone(), bytes: (count as u64).saturating_mul(size_of::<T>() as u64) })
 }
 
+/// What a file's faces are.
+#[derive(Default)]
+pub(crate) struct Read {
+    pub(crate) mesh: TriMesh,
+    /// Which triangles are polygons.
+    pub(crate) polygons: Vec<PolygonRun>,
+    /// Polygons that no triangles fill, by the number of their face.
+    pub(crate) unfilled: Vec<(u64, PolygonFault)>,
+}
+
 /// A mesh under construction, kept within the limits.
 pub(crate) struct MeshBuilder<'a> {
     limits: &'a ReadLimits,
-    mesh: TriMesh,
-    fans: Vec<Fan>,
+    read: Read,
+    /// Triangles beyond the first of every polygon: those that are no faces of their own.
+    beyond: u64,
+    /// A polygon's corners and triangles, kept for their room.
+    corners: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl<'a> MeshBuilder<'a> {
     pub(crate) fn new(limits: &'a ReadLimits) -> Self {
-        Self { limits, mesh: TriMesh::default(), fans: Vec::new() }
+        Self { limits, read: Read::default(), beyond: 0, corners: Vec::new(), triangles: Vec::new() }
     }
 
     pub(crate) fn vertex_count(&self) -> usize {
-        self.mesh.vertices.len()
+        self.read.mesh.vertices.len()
     }
 
     /// Refuses announced counts over the limits; takes memory only for what the file has bytes for.
@@ -77,8 +91,8 @@ impl<'a> MeshBuilder<'a> {
         within(place.clone(), "triangles", triangles, self.limits.triangles)?;
         // Neither a vertex nor a face is shorter than four bytes in any format read here.
         let backed = |count: u64| usize::try_from(count.min(bytes_left / 4)).unwrap_or(usize::MAX);
-        reserve(&mut self.mesh.vertices, backed(vertices), place)?;
-        reserve(&mut self.mesh.triangles, backed(triangles), place)
+        reserve(&mut self.read.mesh.vertices, backed(vertices), place)?;
+        reserve(&mut self.read.mesh.triangles, backed(triangles), place)
     }
 
     pub(crate) fn vertex(&mut self, position: DVec3, place: &dyn Fn() -> Place) -> Result<(), FormatError> {
@@ -86,38 +100,54 @@ impl<'a> MeshBuilder<'a> {
             let value = position.to_array().into_iter().find(|value| !value.is_finite()).unwrap_or(f64::NAN);
             return Err(FormatError::NotFinite { place: place(), value });
         }
-        let count = self.mesh.vertices.len() as u64 + 1;
+        let count = self.read.mesh.vertices.len() as u64 + 1;
         if count > self.limits.vertices {
             return Err(FormatError::limit(place(), "vertices", count, self.limits.vertices));
         }
-        if self.mesh.vertices.len() == self.mesh.vertices.capacity() {
-            reserve(&mut self.mesh.vertices, 1, &place())?;
+        if self.read.mesh.vertices.len() == self.read.mesh.vertices.capacity() {
+            reserve(&mut self.read.mesh.vertices, 1, &place())?;
         }
-        self.mesh.vertices.push(position);
+        self.read.mesh.vertices.push(position);
         Ok(())
     }
 
-    /// Adds a polygon as a fan about its first corner. Faces with fewer than three corners hold no
-    /// area and are left out.
+    /// Adds a polygon, cut into triangles; one that has no inside as a fan, and notes that. Faces with fewer than three corners
+    /// hold no area and are left out.
     pub(crate) fn polygon(&mut self, corners: &[i64], place: &dyn Fn() -> Place) -> Result<(), FormatError> {
+        self.corners.clear();
         for &index in corners {
-            self.index(index, place)?;
+            let index = self.index(index, place)?;
+            self.corners.push(index);
         }
-        let first = self.mesh.triangles.len() as u32;
-        for pair in corners.get(1..).unwrap_or_default().windows(2) {
-            self.triangle([self.index(corners[0], place)?, self.index(pair[0], place)?, self.index(pair[1], place)?], place)?;
+        match *self.corners.as_slice() {
+            [] | [_] | [_, _] => return Ok(()),
+            [a, b, c] => return self.triangle([a, b, c], place),
+            _ => {}
         }
-        if corners.len() > 3 {
-            if self.fans.len() == self.fans.capacity() {
-                reserve(&mut self.fans, 1, &place())?;
+        let first = self.read.mesh.triangles.len();
+        let count = corners.len() - 2;
+        within(place(), "triangles", (first + count) as u64, self.limits.triangles)?;
+        self.triangles.clear();
+        reserve(&mut self.triangles, count, &place())?;
+        if let Err(fault) = polygon::cut(&self.read.mesh.vertices, &self.corners, &mut self.triangles) {
+            self.triangles.extend(polygon::fan(&self.corners));
+            if self.read.unfilled.len() == self.read.unfilled.capacity() {
+                reserve(&mut self.read.unfilled, 1, &place())?;
             }
-            self.fans.push(Fan { first, count: self.mesh.triangles.len() as u32 - first });
+            self.read.unfilled.push((first as u64 - self.beyond, fault));
         }
+        reserve(&mut self.read.mesh.triangles, count, &place())?;
+        self.read.mesh.triangles.extend_from_slice(&self.triangles);
+        if self.read.polygons.len() == self.read.polygons.capacity() {
+            reserve(&mut self.read.polygons, 1, &place())?;
+        }
+        self.read.polygons.push(PolygonRun { first: first as u32, count: count as u32 });
+        self.beyond += count as u64 - 1;
         Ok(())
     }
 
     fn index(&self, index: i64, place: &dyn Fn() -> Place) -> Result<u32, FormatError> {
-        let vertices = self.mesh.vertices.len() as u64;
+        let vertices = self.read.mesh.vertices.len() as u64;
         match u32::try_from(index) {
             Ok(index) if u64::from(index) < vertices => Ok(index),
             _ => Err(FormatError::IndexOutOfRange { place: place(), index, vertices }),
@@ -126,19 +156,19 @@ impl<'a> MeshBuilder<'a> {
 
     /// Adds a triangle whose indices are known to be in range.
     pub(crate) fn triangle(&mut self, corners: [u32; 3], place: &dyn Fn() -> Place) -> Result<(), FormatError> {
-        let count = self.mesh.triangles.len() as u64 + 1;
+        let count = self.read.mesh.triangles.len() as u64 + 1;
         if count > self.limits.triangles {
             return Err(FormatError::limit(place(), "triangles", count, self.limits.triangles));
         }
-        if self.mesh.triangles.len() == self.mesh.triangles.capacity() {
-            reserve(&mut self.mesh.triangles, 1, &place())?;
+        if self.read.mesh.triangles.len() == self.read.mesh.triangles.capacity() {
+            reserve(&mut self.read.mesh.triangles, 1, &place())?;
         }
-        self.mesh.triangles.push(corners);
+        self.read.mesh.triangles.push(corners);
         Ok(())
     }
 
-    /// The mesh, and which of its triangles are polygons.
-    pub(crate) fn finish(self) -> (TriMesh, Vec<Fan>) {
-        (self.mesh, self.fans)
+    /// What was built.
+    pub(crate) fn finish(self) -> Read {
+        self.read
     }
 }

@@ -43,7 +43,7 @@ pub use error::{FormatError, Place};
 pub use geometry::{Geometry, NamedMesh};
 pub use limits::ReadLimits;
 pub use ply::{PointFile, ScalarField, write_fields};
-pub use read::{Fan, MeshFacts, MeshFile, Unit, detect, fanned, read};
+pub use read::{MeshFacts, MeshFile, Unit, detect, read};
 
 use geometry::Piece;
 use lacuna_fabrication::certificate::Certificate;

@@ -2,8 +2,9 @@
 
 use super::error::FormatError;
 use super::error::Place;
-use super::limits::{MeshBuilder, within};
+use super::limits::{MeshBuilder, Read, within};
 use super::{FORMATS, Format, ReadLimits, obj, off, ply, stl, threemf, vrml};
+use lacuna_kernel::model::polygon::{PolygonFault, PolygonRun};
 use lacuna_kernel::solid::TriMesh;
 use std::convert::Infallible;
 
@@ -70,34 +71,28 @@ impl MeshFacts {
 /// A mesh that was read. Nothing is proven of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshFile {
-    /// The mesh, in mm, polygons cut into triangles about their first corner.
+    /// The mesh, in mm, polygons cut into triangles.
     pub mesh: TriMesh,
     /// Which triangles are polygons, in order.
-    pub fans: Vec<Fan>,
+    pub polygons: Vec<PolygonRun>,
+    /// Polygons that no triangles fill, by the number of their face, in order: in the mesh they are fans that fold. They may be
+    /// faces of a cage all the same.
+    pub unfilled: Vec<(u64, PolygonFault)>,
     /// What else the file said.
     pub facts: MeshFacts,
 }
 
-/// A polygon of four corners or more, as a run of triangles about its first corner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fan {
-    /// The first triangle.
-    pub first: u32,
-    /// How many there are: two less than the polygon has corners.
-    pub count: u32,
-}
-
 impl MeshFile {
     pub(crate) fn new(builder: MeshBuilder<'_>, facts: MeshFacts) -> Self {
-        let (mesh, fans) = builder.finish();
-        Self { mesh, fans, facts }
+        let Read { mesh, polygons, unfilled } = builder.finish();
+        Self { mesh, polygons, unfilled, facts }
     }
 
     /// The faces as the file has them: its polygons whole, their corners in its order.
     #[must_use]
     pub fn faces(&self) -> Vec<Vec<u32>> {
-        let mut faces = Vec::with_capacity(face_count(&self.mesh.triangles, &self.fans) as usize);
-        let Ok(()) = each_face(&self.mesh.triangles, &self.fans, |face| {
+        let mut faces = Vec::with_capacity(face_count(&self.mesh.triangles, &self.polygons) as usize);
+        let Ok(()) = each_face(&self.mesh.triangles, &self.polygons, |face| {
             faces.push(face.to_vec());
             Ok::<(), Infallible>(())
         });
@@ -105,36 +100,23 @@ impl MeshFile {
     }
 }
 
-/// Faces of three corners or more as triangles about their first corners, and which of those are polygons.
-#[must_use]
-pub fn fanned(faces: &[Vec<u32>]) -> (Vec<[u32; 3]>, Vec<Fan>) {
-    let (mut triangles, mut fans) = (Vec::with_capacity(faces.len()), Vec::new());
-    for face in faces {
-        let first = triangles.len() as u32;
-        triangles.extend((1..face.len().saturating_sub(1)).map(|k| [face[0], face[k], face[k + 1]]));
-        if face.len() > 3 {
-            fans.push(Fan { first, count: triangles.len() as u32 - first });
-        }
-    }
-    (triangles, fans)
-}
-
 /// How many faces there are.
-pub(crate) fn face_count(triangles: &[[u32; 3]], fans: &[Fan]) -> u64 {
-    triangles.len() as u64 - fans.iter().map(|fan| u64::from(fan.count) - 1).sum::<u64>()
+pub(crate) fn face_count(triangles: &[[u32; 3]], polygons: &[PolygonRun]) -> u64 {
+    triangles.len() as u64 - polygons.iter().map(|polygon| u64::from(polygon.count) - 1).sum::<u64>()
 }
 
 /// Hands over the corners of every face in turn.
-pub(crate) fn each_face<E>(triangles: &[[u32; 3]], fans: &[Fan], mut take: impl FnMut(&[u32]) -> Result<(), E>) -> Result<(), E> {
+pub(crate) fn each_face<E>(
+    triangles: &[[u32; 3]],
+    polygons: &[PolygonRun],
+    mut take: impl FnMut(&[u32]) -> Result<(), E>,
+) -> Result<(), E> {
     let (mut at, mut corners) = (0, Vec::new());
-    for fan in fans {
-        triangles[at..fan.first as usize].iter().try_for_each(|triangle| take(triangle))?;
-        let polygon = &triangles[fan.first as usize..(fan.first + fan.count) as usize];
-        corners.clear();
-        corners.extend_from_slice(&polygon[0]);
-        corners.extend(polygon[1..].iter().map(|triangle| triangle[2]));
+    for polygon in polygons {
+        triangles[at..polygon.first as usize].iter().try_for_each(|triangle| take(triangle))?;
+        polygon.corners(triangles, &mut corners);
         take(&corners)?;
-        at = (fan.first + fan.count) as usize;
+        at = (polygon.first + polygon.count) as usize;
     }
     triangles[at..].iter().try_for_each(|triangle| take(triangle))
 }
@@ -195,7 +177,7 @@ fn unknown(bytes: &[u8]) -> String {
 
 /// Reads a mesh. The format is detected unless it is given.
 ///
-/// Polygons become fans of triangles and are kept as such, units become mm, the objects of a 3MF file are placed where its build
+/// Polygons become triangles of which is known where they belong, units become mm, the objects of a 3MF file are placed where its build
 /// puts them, and vertices of an STL file with equal coordinates become one. A decimal is read as
 /// the nearest double. Nothing is repaired.
 ///

@@ -20,6 +20,7 @@ use crate::budget::{Budget, Stopped};
 use crate::error::{Kind, LimitFacts};
 use crate::measure::mass::{area_within, volume_within};
 use crate::measure::{AxisBox, Interval};
+use crate::model::polygon;
 use crate::model::{Ifs, Primitive};
 use crate::solid::{Crossings, Solid, SolidError, TriMesh, fans, rounding};
 use disjoint::Body;
@@ -278,6 +279,23 @@ fn sets(ifs: &Ifs) -> (Vec<Vec<usize>>, Vec<usize>) {
     (sets, after)
 }
 
+/// The triangles of faces. Faces that are not star-shaped from their first corner become their triangles.
+fn cut(vertices: &[DVec3], faces: &mut Vec<Vec<u32>>) -> Result<Vec<[u32; 3]>, LevelError> {
+    let (mut triangles, mut pieces) = (Vec::new(), Vec::with_capacity(faces.len()));
+    for face in faces.drain(..) {
+        let first = triangles.len();
+        polygon::cut(vertices, &face, &mut triangles)
+            .map_err(|_| LevelError::NoPrimitive { reason: "one of its faces meets itself; split it into faces that do not" })?;
+        if polygon::is_fan(&triangles[first..]) {
+            pieces.push(face);
+        } else {
+            pieces.extend(triangles[first..].iter().map(|corners| corners.to_vec()));
+        }
+    }
+    *faces = pieces;
+    Ok(triangles)
+}
+
 /// What is known before anything is copied.
 struct Start {
     lattice: Lattice,
@@ -296,7 +314,7 @@ impl Start {
                 (vertices, faces, LevelPrimitive::Box)
             }
         };
-        let triangles = faces.iter().flat_map(|face| (2..face.len()).map(|k| [face[0], face[k - 1], face[k]])).collect();
+        let triangles = cut(&vertices, &mut faces)?;
         let mesh = TriMesh { vertices, triangles };
         Solid::new(mesh.clone(), budget).map_err(|error| match error {
             SolidError::Stopped(stopped) => LevelError::Stopped(stopped),

@@ -2,6 +2,7 @@
 
 use super::CellKind;
 use super::lower::{Draft, Finding};
+use super::polygon::{self, PolygonRun};
 use crate::attractor::{Root, SolidSurface};
 use crate::automaton::{LeafPrimitive, State, StateId};
 use crate::measure::mass::enclosed_by;
@@ -21,8 +22,7 @@ pub enum Interior {
     Surface,
 }
 
-/// A polygon mesh, with planar or nearly planar faces that are fanned into triangles from their
-/// first corner.
+/// A polygon mesh, with planar or nearly planar faces, which may be concave; see [`polygon::cut`] for the triangles that they become.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct PolygonMesh {
     /// Corner points in mm.
@@ -33,7 +33,16 @@ pub struct PolygonMesh {
     pub interior: Interior,
 }
 
-/// Faces by number of corners, polygons fanned into triangles.
+/// A polygon mesh as triangles over the same vertices.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct CutMesh {
+    /// The triangles, in the order of the faces.
+    pub mesh: TriMesh,
+    /// Which of them are polygons of four corners or more, in order.
+    pub polygons: Vec<PolygonRun>,
+}
+
+/// Faces by number of corners, polygons cut into triangles.
 #[derive(Default)]
 pub(super) struct Elements {
     pub(super) points: Vec<u32>,
@@ -44,31 +53,35 @@ pub(super) struct Elements {
 /// Findings of one kind are listed up to this number.
 const MOST_FINDINGS: usize = 20;
 
-/// Sorts faces by kind and fans polygons from their first corner. `None` after an error.
+/// Sorts faces by kind and cuts polygons. `None` after an error.
 pub(super) fn elements(vertices: &[DVec3], faces: &[Vec<u32>], draft: &mut Draft) -> Option<Elements> {
     let mut elements = Elements::default();
     let mut errors = 0;
     for (index, face) in faces.iter().enumerate() {
-        let fault = corner_fault(vertices, face).or_else(|| repetition(face)).or_else(|| concavity(vertices, face));
+        let fault = corner_fault(vertices, face).or_else(|| repetition(face)).or_else(|| match face.as_slice() {
+            [point] => {
+                elements.points.push(*point);
+                None
+            }
+            [start, end] => {
+                elements.segments.push([*start, *end]);
+                None
+            }
+            corners => cut_fault(vertices, corners, &mut elements.triangles),
+        });
         if let Some((code, message)) = fault {
             errors += 1;
             if errors <= MOST_FINDINGS {
                 draft.error(&format!("/faces/{index}"), code, format!("face {index}: {message}"));
             }
-            continue;
-        }
-        match face.as_slice() {
-            [point] => elements.points.push(*point),
-            [start, end] => elements.segments.push([*start, *end]),
-            corners => elements.triangles.extend(fan(corners)),
         }
     }
     (errors == 0).then_some(elements)
 }
 
-/// A polygon as triangles about its first corner.
-fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
-    (1..corners.len() - 1).map(|k| [corners[0], corners[k], corners[k + 1]])
+/// Adds the triangles of a polygon to others, or says why it has none.
+fn cut_fault(vertices: &[DVec3], corners: &[u32], triangles: &mut Vec<[u32; 3]>) -> Option<(&'static str, String)> {
+    polygon::cut(vertices, corners, triangles).err().map(|fault| (fault.code(), fault.to_string()))
 }
 
 fn corner_fault(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, String)> {
@@ -83,37 +96,25 @@ fn corner_fault(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, Strin
 }
 
 fn repetition(face: &[u32]) -> Option<(&'static str, String)> {
-    let mut sorted = face.to_vec();
-    sorted.sort_unstable();
-    let pair = sorted.windows(2).find(|pair| pair[0] == pair[1]);
-    pair.map(|pair| {
-        ("mesh.repeated-vertex", format!("vertex {} occurs twice; a repair (--repair, \"repair\": true) takes such faces away", pair[0]))
+    polygon::repeated(face).map(|vertex| {
+        ("mesh.repeated-vertex", format!("vertex {vertex} occurs twice; a repair (--repair, \"repair\": true) takes such faces away"))
     })
 }
 
-/// A fan is the polygon when no triangle of it turns against the whole.
-fn concavity(vertices: &[DVec3], face: &[u32]) -> Option<(&'static str, String)> {
-    if face.len() < 4 {
-        return None;
-    }
-    let turns: Vec<DVec3> =
-        fan(face).map(|corners| corners.map(|corner| vertices[corner as usize])).map(|[a, b, c]| (b - a).cross(c - a)).collect();
-    let whole: DVec3 = turns.iter().copied().sum();
-    let turns_back = turns.iter().any(|turn| turn.dot(whole) < -1e-12 * whole.length_squared());
-    turns_back.then(|| ("mesh.concave-face", "it is not star-shaped from its first corner; split it into convex faces".into()))
-}
-
 impl PolygonMesh {
-    /// The polygons as triangles about their first corners, with the same vertices; a face may name a vertex twice. Cost: linear.
+    /// The polygons as triangles, with the same vertices; a face that is star-shaped from its first corner may name a vertex twice. Cost: that of
+    /// [`polygon::cut`].
     ///
     /// # Errors
-    /// Findings of faces that are points or segments, name what is no place, or are not star-shaped from their first corner.
-    pub fn fanned(&self) -> Result<TriMesh, Vec<Finding>> {
+    /// Findings of faces that are points or segments, name what is no place, or meet themselves in their plane.
+    pub fn cut(&self) -> Result<CutMesh, Vec<Finding>> {
+        let (mut triangles, mut polygons) = (Vec::with_capacity(self.faces.len()), Vec::new());
         let mut findings = Vec::new();
         for (index, face) in self.faces.iter().enumerate() {
+            let first = triangles.len();
             let fault = corner_fault(&self.vertices, face).or_else(|| {
                 let few = || ("mesh.no-polygon", format!("it has {} corners, and bounds nothing; leave it out", face.len()));
-                if face.len() < 3 { Some(few()) } else { concavity(&self.vertices, face) }
+                if face.len() < 3 { Some(few()) } else { cut_fault(&self.vertices, face, &mut triangles) }
             });
             if let Some((code, message)) = fault {
                 let (pointer, message) = (format!("/faces/{index}"), format!("face {index}: {message}"));
@@ -122,11 +123,14 @@ impl PolygonMesh {
                     break;
                 }
             }
+            if face.len() > 3 {
+                polygons.push(PolygonRun { first: first as u32, count: (triangles.len() - first) as u32 });
+            }
         }
         if !findings.is_empty() {
             return Err(findings);
         }
-        Ok(TriMesh { vertices: self.vertices.clone(), triangles: self.faces.iter().flat_map(|face| fan(face)).collect() })
+        Ok(CutMesh { mesh: TriMesh { vertices: self.vertices.clone(), triangles }, polygons })
     }
 
     pub(super) fn lower(&self, draft: &mut Draft) {

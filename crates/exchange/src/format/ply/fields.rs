@@ -30,7 +30,7 @@ pub fn write_fields<W: Write>(
     metadata: &Metadata<'_>,
     sink: &mut W,
 ) -> Result<(), FormatError> {
-    fit_pieces(Format::Ply, &Geometry::Polygons { mesh, fans: &[], closed: true })?;
+    fit_pieces(Format::Ply, &Geometry::Polygons { mesh, polygons: &[], closed: true })?;
     let (vertices, triangles) = (mesh.vertices.len() as u64, mesh.triangles.len() as u64);
     check_count(vertices)?;
     let properties: String = fields.iter().map(|field| format!("property float {}\n", field.name)).collect();

@@ -38,26 +38,28 @@ fn polygons_go_through_every_format_that_has_them() {
     let faces = cage.faces();
     assert_eq!(faces.iter().map(Vec::len).collect::<Vec<_>>(), [3, 4, 5, 3, 3, 300, 4]);
     assert_eq!(faces[5], (9..309).collect::<Vec<u32>>());
-    assert_eq!(cage.fans.len(), 4);
+    assert_eq!(cage.polygons.len(), 4);
     for format in [Format::Obj, Format::Ply, Format::Off, Format::Vrml] {
-        let bytes = written(format, Geometry::Polygons { mesh: &cage.mesh, fans: &cage.fans, closed: false }, &Metadata::default());
+        let bytes = written(format, Geometry::Polygons { mesh: &cage.mesh, polygons: &cage.polygons, closed: false }, &Metadata::default());
         let back = read(&bytes, None, &ReadLimits::default()).unwrap();
         assert!(back.faces() == faces, "{format}");
         assert!(back.mesh == cage.mesh, "{format}");
     }
     // Formats of triangles have them cut.
-    let bytes = written(Format::Stl, Geometry::Polygons { mesh: &cage.mesh, fans: &cage.fans, closed: false }, &Metadata::default());
+    let bytes =
+        written(Format::Stl, Geometry::Polygons { mesh: &cage.mesh, polygons: &cage.polygons, closed: false }, &Metadata::default());
     assert_eq!(read(&bytes, None, &ReadLimits::default()).unwrap().faces().len(), cage.mesh.triangles.len());
     let error = write(
         Format::ThreeMf,
-        Geometry::Polygons { mesh: &cage.mesh, fans: &cage.fans, closed: false },
+        Geometry::Polygons { mesh: &cage.mesh, polygons: &cage.polygons, closed: false },
         &Metadata::default(),
         &mut Cursor::new(vec![]),
     );
     assert_eq!(error.unwrap_err().code(), "format.cannot-carry");
     // Quads alone take one byte for their number in a PLY file.
     let quads = scene(SQUARE).unwrap();
-    let bytes = written(Format::Ply, Geometry::Polygons { mesh: &quads.mesh, fans: &quads.fans, closed: false }, &Metadata::default());
+    let bytes =
+        written(Format::Ply, Geometry::Polygons { mesh: &quads.mesh, polygons: &quads.polygons, closed: false }, &Metadata::default());
     assert_eq!(bytes.len(), bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11 + 4 * 12 + 1 + 4 * 4);
 }
 

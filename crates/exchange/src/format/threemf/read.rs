@@ -332,7 +332,7 @@ impl ModelReading<'_> {
             return Ok(());
         }
         if let Some((id, mut object, builder)) = self.object.take() {
-            (object.mesh, _) = builder.finish();
+            object.mesh = builder.finish().mesh;
             self.parsed.0 += object.mesh.vertices.len() as u64;
             self.parsed.1 += object.mesh.triangles.len() as u64;
             within(self.place(byte), "vertices", self.parsed.0, self.limits.vertices)?;
