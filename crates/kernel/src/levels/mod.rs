@@ -306,7 +306,7 @@ struct Start {
 
 impl Start {
     fn new(ifs: &Ifs, bounds: &AxisBox, level: u32, budget: &Budget) -> Result<Self, LevelError> {
-        let (vertices, faces, primitive) = match &ifs.primitive {
+        let (vertices, mut faces, primitive) = match &ifs.primitive {
             Some(Primitive::Solid { vertices, faces }) => (vertices.clone(), faces.clone(), LevelPrimitive::Stated),
             Some(_) => return Err(LevelError::NoPrimitive { reason: "points, polylines and surfaces enclose nothing" }),
             None => {
