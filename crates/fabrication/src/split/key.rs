@@ -97,7 +97,12 @@ impl Key {
     /// What must lie in the socket's part.
     pub(super) fn around_socket(&self) -> TriMesh {
         let outwards = -self.gap() - self.wall;
-        Self::between(&[self.ring(outwards, 0.0), self.ring(outwards, self.length + self.clearance + self.wall)])
+        Self::between(&[self.ring(outwards, 0.0), self.ring(outwards, self.depth())])
+    }
+
+    /// What a socket with its wall takes of its part, in mm.
+    pub(super) fn depth(&self) -> f64 {
+        self.length + self.clearance + self.wall
     }
 
     /// What must lie in the peg's part.

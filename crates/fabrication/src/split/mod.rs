@@ -85,16 +85,17 @@ pub(crate) fn split(job: &Job, split: &Split, tolerance: Tolerance, budget: &Bud
     let whole = operand.meshes.pop().unwrap_or_default();
     let key = split.key.map(|key| Key::new(key.width_mm, key.clearance_mm));
     let ends = ends(&whole);
-    let cuts = Cuts::new(split, ends, key.as_ref().map_or(0.0, |key| key.length))?;
+    // Parts are apart by twice the pegs, or by a twentieth of the largest side: no two touch in a file.
+    let gap = key.as_ref().map_or(0.05 * (ends[1] - ends[0]).max_element(), |key| 2.0 * key.length);
+    let gap = f64::from(gap as f32);
+    let cuts = Cuts::new(split, ends, key.as_ref().map_or(0.0, |key| key.length), gap)?;
     let whole_volume_mm3 = volume(&whole);
     let mut cells = divide(whole, &cuts, budget)?;
     let (mut keys, mut warnings) = (0, operand.warnings.clone());
+    warnings.extend_from_slice(&cuts.warnings);
     if let Some(key) = &key {
         (keys, warnings) = connect(&mut cells, &cuts, key, warnings, budget)?;
     }
-    // Apart by twice the pegs, or by a twentieth of the largest side: no two parts touch in a file.
-    let gap = key.as_ref().map_or(0.05 * (ends[1] - ends[0]).max_element(), |key| 2.0 * key.length);
-    let gap = f64::from(gap as f32);
     let (mut parts, mut statements) = (Vec::with_capacity(cells.len()), Vec::with_capacity(cells.len()));
     let (mut crossings, mut moved_mm) = (0, 0.0_f64);
     for cell in cells {
@@ -199,13 +200,20 @@ fn connect(cells: &mut [Cell], cuts: &Cuts, key: &Key, mut warnings: Vec<String>
                 let placed = join(cells, [lower, upper], &frame, offset, key, budget)?;
                 keys += placed.keys;
                 if placed.bare > 0 {
-                    warnings.push(format!(
-                        "{} of {} faces across {} at {offset} mm are too small for a key of {} mm with its walls: nothing holds the parts there",
-                        placed.bare,
-                        placed.faces,
-                        ["x", "y", "z"][axis],
-                        key.width
-                    ));
+                    let (at, width) = (format!("across {} at {offset} mm", ["x", "y", "z"][axis]), key.width);
+                    // The next cut is nearer than the end of the part.
+                    let room = cuts.offsets[axis].get(place + 1).map_or(f64::INFINITY, |next| next - offset);
+                    warnings.push(if room < key.depth() {
+                        format!(
+                            "the next cut is {room} mm beyond the one {at}, and a key of {width} mm takes {} mm there with its walls: nothing holds the parts there; take smaller keys or longer parts",
+                            key.depth()
+                        )
+                    } else {
+                        format!(
+                            "{} of {} faces {at} are too small for a key of {width} mm with its walls: nothing holds the parts there",
+                            placed.bare, placed.faces
+                        )
+                    });
                 }
             }
         }
