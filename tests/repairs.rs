@@ -134,6 +134,19 @@ fn files_that_are_cut_off_are_named() {
     let twice = run(words("convert FILE FILE FILE", &[&whole, &out, &out]));
     assert!(twice.status.code() == Some(2) && String::from_utf8_lossy(&twice.stderr).contains("is named for two outputs"));
     assert!(!out.exists());
+    // What would be passed over is refused.
+    let cases = [
+        ("convert FILE FILE --format obj", "--format is for stdout"),
+        ("slice FILE --tolerance 0.01 -o FILE", "<--at <MM>|--step <MM>>"),
+        ("slice FILE --tolerance 0.01 --at 1,nan -o FILE", "a number is expected"),
+        ("intersect FILE FILE --operation hull --tolerance 0.01 -o x.stl --preview x.jpg", "name end in .png"),
+    ];
+    for (command, named) in cases {
+        let refused = run(words(command, &[&whole, &out]));
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(refused.status.code() == Some(2) && said.contains(named), "{command}: {said}");
+        assert!(!out.exists());
+    }
 }
 
 #[test]

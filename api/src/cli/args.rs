@@ -234,7 +234,7 @@ pub(super) struct OutputArgs {
     #[arg(long, value_name = "FILE")]
     pub(super) certificate: Option<PathBuf>,
     /// Write a picture.
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(long, value_name = "FILE.png", value_parser = picture)]
     pub(super) preview: Option<PathBuf>,
 }
 
@@ -400,7 +400,7 @@ pub(super) struct IntersectArgs {
     #[arg(long, value_name = "FILE", requires = "operation")]
     pub(super) certificate: Option<PathBuf>,
     /// Write a picture.
-    #[arg(long, value_name = "FILE.png", requires = "operation")]
+    #[arg(long, value_name = "FILE.png", value_parser = picture, requires = "operation")]
     pub(super) preview: Option<PathBuf>,
     /// Make meshes solids first: join vertices at the same place, take away copies and triangles without area, turn triangles outward. What was done is told;
     /// holes of up to 64 edges are closed by triangles that meet nothing else, and other open meshes are refused.
@@ -411,6 +411,7 @@ pub(super) struct IntersectArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("planes").required(true).args(["at", "step"]))]
 pub(super) struct SliceArgs {
     /// The model document, or an STL, 3MF, OBJ, PLY, OFF or VRML file.
     pub(super) model: PathBuf,
@@ -424,14 +425,7 @@ pub(super) struct SliceArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = point, default_value = "0,0,1", allow_hyphen_values = true)]
     pub(super) normal: [f64; 3],
     /// Where a plane is along the normal, in mm; may be given several times, or as a list with commas.
-    #[arg(
-        long,
-        value_name = "MM",
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        required_unless_present = "step",
-        conflicts_with = "step"
-    )]
+    #[arg(long, value_name = "MM", value_parser = finite, value_delimiter = ',', allow_hyphen_values = true)]
     pub(super) at: Vec<f64>,
     /// Height of layers, in mm: planes in their middles, from the bottom of the solid to its top.
     #[arg(long, value_name = "MM", value_parser = positive)]
@@ -600,6 +594,17 @@ pub(super) struct ServeArgs {
 
 fn role(text: &str) -> Result<Role, String> {
     text.parse().map_err(|()| "all, front or worker is expected".to_owned())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| "a number is expected".to_owned())
+}
+
+/// The name of a picture.
+fn picture(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_named = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+    if is_named { Ok(path) } else { Err("a picture is a PNG file; let its name end in .png".to_owned()) }
 }
 
 fn positive(text: &str) -> Result<f64, String> {

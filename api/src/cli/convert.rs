@@ -11,7 +11,7 @@ use lacuna_kernel::model::{Interior, PolygonMesh};
 
 use super::args::ConvertArgs;
 use super::inspect::mesh_file;
-use super::output::{Target, check_distinct, finish, start, target};
+use super::output::{check_distinct, finish, start, targets};
 use crate::inspection;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{format_problem, guarded};
@@ -21,8 +21,7 @@ const MOST_FINDINGS: usize = 20;
 
 /// Reads a mesh and writes it, repaired only if that is asked for. All files are written before the first one takes its place.
 pub(super) fn convert(args: &ConvertArgs) -> Result<(), Problem> {
-    let named = |path: &Path| target(path, args.format.as_deref().filter(|_| path == Path::new("-")));
-    let targets: Vec<Target> = args.outputs.iter().map(|path| named(path)).collect::<Result<_, _>>()?;
+    let targets = targets(&args.outputs, args.format.as_deref())?;
     check_distinct(targets.iter().map(|target| target.path.as_path()))?;
     let (mut file, _) = mesh_file(&args.file)?;
     for (word, count) in &file.facts.left_out {

@@ -46,6 +46,16 @@ pub(super) fn target(path: &Path, format: Option<&str>) -> Result<Target, Proble
     Ok(Target { path: path.to_owned(), format, name: Some(format.facts().ending) })
 }
 
+/// The files that are named, each in the format of its ending, and stdout in the one that is named for it.
+pub(super) fn targets(paths: &[PathBuf], format: Option<&str>) -> Result<Vec<Target>, Problem> {
+    let is_stdout = |path: &Path| path == Path::new("-");
+    if format.is_some() && !paths.iter().any(|path| is_stdout(path)) {
+        let detail = "--format is for stdout; the format of a file follows the ending of its name";
+        return Err(Problem::new(ProblemKind::Usage, detail.to_owned()));
+    }
+    paths.iter().map(|path| target(path, format.filter(|_| is_stdout(path)))).collect()
+}
+
 /// Two files in one place would leave one of them.
 pub(super) fn check_distinct<'a>(paths: impl Iterator<Item = &'a Path>) -> Result<(), Problem> {
     let mut paths: Vec<&Path> = paths.collect();

@@ -15,7 +15,7 @@ use super::args::{
 };
 use super::batch;
 use super::convert::title;
-use super::output::{Target, Written, check_distinct, deliver, deliver_streamed, finish, start, target};
+use super::output::{Target, Written, check_distinct, deliver, deliver_streamed, finish, start, target, targets};
 use super::progress::Reporter;
 use super::remote::{self, Server};
 use super::{DOCUMENT_BYTES, folder_of, print_json, read_input, stop};
@@ -256,11 +256,7 @@ fn make(
     limit_args: &LimitArgs,
     manner: Manner<'_>,
 ) -> Result<(), Problem> {
-    let mut targets: Vec<Target> = output
-        .outputs
-        .iter()
-        .map(|path| target(path, output.format.as_deref().filter(|_| path == Path::new("-"))))
-        .collect::<Result<_, _>>()?;
+    let mut targets = targets(&output.outputs, output.format.as_deref())?;
     let others = output.certificate.iter().chain(&output.preview).map(PathBuf::as_path);
     check_distinct(targets.iter().map(|target| target.path.as_path()).chain(others))?;
     let names: Vec<&str> = targets.iter().filter_map(|target| target.name).collect();

@@ -91,8 +91,8 @@ pub enum FormatError {
         /// The coordinate in mm.
         value_mm: f64,
     },
-    /// A coordinate is not a number, or infinite.
-    #[error("{place}: coordinate {value} is not finite")]
+    /// A coordinate is not a number, infinite, or beyond what the format's numbers hold.
+    #[error("{place}: coordinate {value:e} {}", if .value.is_finite() { "is beyond single precision, whose numbers end at 3.4e38" } else { "is not finite" })]
     NotFinite {
         /// Where.
         place: Place,

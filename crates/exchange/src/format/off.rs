@@ -144,6 +144,9 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
         read_face(line, &lines, &mut corners)?;
         builder.polygon(&corners, &|| lines.place())?;
     }
+    if let Some(line) = lines.by_ref().map(content).find(|line| !line.is_empty()) {
+        return Err(FormatError::malformed(Format::Off, lines.place(), "the end of the file, as no more faces were announced", line));
+    }
     let facts = MeshFacts::of(Format::Off, "ascii");
     Ok(MeshFile::new(builder, facts))
 }

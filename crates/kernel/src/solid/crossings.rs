@@ -5,7 +5,7 @@ use super::box_tree::{Box32, BoxTree, LEAF};
 use super::contact;
 use super::mend::Facet;
 use crate::attractor::cell::Point;
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, CancelToken, Stopped};
 use rayon::prelude::*;
 
 /// Pairs of triangles that meet elsewhere than in corners and edges they share.
@@ -47,10 +47,8 @@ impl Crossings {
             .into_par_iter()
             .map(|chunk| {
                 let mut found = Self::default();
-                if budget.cancel.check().is_ok() {
-                    for leaf in chunk * CHUNK..((chunk + 1) * CHUNK).min(tree.leaves()) {
-                        of_leaf(mesh, &tree, leaf, kept, &corners, &mut found);
-                    }
+                for leaf in chunk * CHUNK..((chunk + 1) * CHUNK).min(tree.leaves()) {
+                    of_leaf(mesh, &tree, leaf, kept, &corners, &mut found, &budget.cancel);
                 }
                 found
             })
@@ -66,7 +64,19 @@ impl Crossings {
     }
 }
 
-fn of_leaf(mesh: &TriMesh, tree: &BoxTree, leaf: usize, kept: usize, corners: &impl Fn(u32) -> [Point; 3], found: &mut Crossings) {
+/// Adds the crossings of a leaf's triangles with those of this and all later leaves, until it is stopped.
+fn of_leaf(
+    mesh: &TriMesh,
+    tree: &BoxTree,
+    leaf: usize,
+    kept: usize,
+    corners: &impl Fn(u32) -> [Point; 3],
+    found: &mut Crossings,
+    cancel: &CancelToken,
+) {
+    if cancel.check().is_err() {
+        return;
+    }
     let mut note = |a: u32, b: u32| {
         found.count += 1;
         if found.first.len() < kept {
@@ -98,6 +108,7 @@ fn of_leaf(mesh: &TriMesh, tree: &BoxTree, leaf: usize, kept: usize, corners: &i
                 }
             }
         }
-        true
+        // Where everything overlaps, a leaf alone has as many others as there are.
+        cancel.check().is_ok()
     });
 }

@@ -113,6 +113,11 @@ fn errors_name_the_place() {
     assert_eq!((code, words.as_str()), ("format.not-finite", "byte 134: coordinate inf is not finite"));
     let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\n";
     assert_eq!(refused(text, None, &ReadLimits::default()).1, "line 4: STL expects a coordinate, found \"\"");
+    let text = b"OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n# fine\n\n3 0 2 1\n";
+    assert_eq!(
+        refused(text, None, &ReadLimits::default()).1,
+        "line 8: OFF expects the end of the file, as no more faces were announced, found \"3 0 2 1\""
+    );
     assert_eq!(refused(b"v 0 0 0\nf 0 1 1", None, &ReadLimits::default()).0, "format.malformed");
     assert_eq!(refused(b"hello", None, &ReadLimits::default()).0, "format.unknown");
     assert_eq!(
