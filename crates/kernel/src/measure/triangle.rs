@@ -24,7 +24,7 @@ pub fn closest_on_triangle(x: &Point, a: &Point, b: &Point, c: &Point) -> Point 
 const NEEDLE: f64 = 1e-4;
 
 /// The closest point and where it lies. Voronoi regions of the corners and sides are tested in turn, as
-/// in Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but for needles: see [`on_needle`].
+/// in Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but for needles: see `on_needle`.
 #[inline]
 #[must_use]
 pub fn closest_feature(x: &Point, a: &Point, b: &Point, c: &Point) -> (Point, Feature) {
