@@ -10,6 +10,8 @@ use lacuna_fabrication::shape_measures::VolumeMethod;
 use lacuna_fabrication::{Certificate, Input, Job, JobKind, Params, run};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
+use lacuna_tests::support::cases;
+use serde_json::{Value, json};
 
 fn measured(model: Model, params: Params) -> Certificate {
     let inputs = vec![Input { name: "shape".into(), model, radius_mm: None }];
@@ -140,6 +142,61 @@ fn dimensions_that_a_tolerance_would_miss() {
     let ([low, high], _) = dimension(pair(DVec3::new(0.5 - 1e-10, 0.3, 0.3), 0.5 + 1e-10));
     let exact = 2.0_f64.ln() / -(0.5_f64 - 1e-10).ln();
     assert!(low <= exact && exact <= high, "{exact} is not in [{low}, {high}]");
+}
+
+/// The graph of a function that takes itself on both halves of its domain, scaled by d and sheared by h: of box dimension 1 + log_2 2d where d is above 1/2, else 1
+/// (M. Barnsley, "Fractal functions and interpolation", Constr. Approx. 2, 1986, theorem 4).
+fn interpolation(d: f64, h: f64) -> Shape {
+    let operators =
+        [[[1.0, 0.5 - h, 1.0 - d], [0.0, 0.5, 0.0], [0.0, h, d]], [[0.5 - h, 0.0, 0.5 - h - d], [0.5, 1.0, 0.5], [h, 0.0, h + d]]];
+    let transitions: Vec<Value> = operators.iter().map(|operator| json!({ "to": "curve", "operator": operator })).collect();
+    let boundaries = json!([{ "state": "end", "incidence": [[1], [0], [0]] }, { "state": "end", "incidence": [[0], [1], [0]] }]);
+    let states = json!([
+        { "name": "curve", "cell": "edge", "dimension": 3, "transitions": transitions, "boundaries": boundaries },
+        { "name": "end", "cell": "vertex", "dimension": 1, "transitions": [{ "to": "end", "operator": [[1]] }] },
+    ]);
+    let cells = json!([{ "state": "curve", "control_points": [[0, 0, 0], [80, 0, 0], [0, 80, 0]] }]);
+    document(&json!({ "lacuna": 1, "shape": { "family": "bcifs", "states": states, "cells": cells } }).to_string())
+}
+
+/// Curves have dimension 1 at least, and as much as their polygons' lengths grow at most; surfaces that enclose a volume 2 at least.
+#[test]
+fn dimensions_of_curves_and_surfaces() {
+    let case = |name: &str| document(&std::fs::read_to_string(cases::named(name).model()).unwrap());
+    for curve in [
+        "curves/bezier_parabola",
+        "curves/circle",
+        "curves/corner_cutting_third",
+        "curves/catmull_rom_uniform",
+        "curves/beta_spline",
+        "bcifs/rational_arc",
+    ] {
+        let ([low, high], _) = dimension(case(curve));
+        assert!(low == 1.0 && (1.0..=1.0 + 1e-12).contains(&high), "{curve}: [{low}, {high}]");
+    }
+    for curve in ["heighway_dragon", "levy_curve", "terdragon", "gosper_curve"] {
+        assert_eq!(dimension(classic(curve)), ([1.0, 2.0], DimensionBasis::OverlappingSimilarities), "{curve}");
+    }
+    // Copies that share points known to rounding alone.
+    assert_eq!(dimension(case("ifs/heighway_dragon")).0, [1.0, 2.0]);
+    for (d, h) in [(0.2, 0.0), (0.3, 0.4), (0.5, 0.5), (0.55, 0.1), (0.7, 0.3), (0.9, -0.2)] {
+        let ([low, high], basis) = dimension(interpolation(d, h));
+        let exact = 1.0 + f64::max(0.0, f64::log2(2.0 * d));
+        assert!(
+            low == 1.0 && exact <= high && high <= 2.0 && basis == DimensionBasis::Contraction,
+            "{d}, {h}: {exact} is not in [{low}, {high}]"
+        );
+    }
+    for (surface, least) in [
+        ("nurbs/sphere", 1.0),
+        ("nurbs/torus", 1.0),
+        ("bcifs/surface_torus", 2.0),
+        ("subdivision/catmull_clark_cube", 2.0),
+        ("subdivision/doo_sabin_cube", 2.0),
+    ] {
+        let ([low, high], _) = dimension(case(surface));
+        assert!(low == least && (2.0..2.12).contains(&high), "{surface}: [{low}, {high}]");
+    }
 }
 
 #[track_caller]

@@ -381,7 +381,7 @@ pub enum DimensionBasis {
     Similarities,
     /// The shape consists of similar copies, of which that is not known: Moran's equation bounds from above.
     OverlappingSimilarities,
-    /// Bounds from the number of cells and how they contract.
+    /// Bounds from the number of cells and how they contract, from lengths of curves, and from what is connected or parts space.
     Contraction,
 }
 

@@ -269,7 +269,7 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
             return Err(JobError::new(Kind::Invalid, "measure.too-large", message));
         }
         let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
-        certificate.dimension = Some(DimensionStatement::of(dimension(attractor, budget)?));
+        let mut known = dimension(attractor, budget)?;
         if let Some((mesh, true)) = mesh_of(attractor) {
             certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
             // Its triangles, joined.
@@ -281,6 +281,10 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
             Ok(found) => certificate.enclosed = found,
             Err(reason) => certificate.warnings.push(reason),
         }
+        if certificate.enclosed.as_ref().is_some_and(|found| found.volume_mm3[0] > 0.0 || found.volume_mm3[1] < 0.0) {
+            known = known.parting_space();
+        }
+        certificate.dimension = Some(DimensionStatement::of(known));
         if job.params.thickness {
             let surfaces = if is_solid(attractor) { attractor.surfaces() } else { Vec::new() };
             let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };

@@ -11,17 +11,18 @@
 //! have no inner point in common: a direction along which one ends where the next begins, which are suprema of linear functions over the shape.
 //!
 //! In all other cases: cells at level n have diameters below a multiple of rate^n, with the bound of the joint spectral radius as the rate, and their number
-//! grows like the spectral radius of the automaton's graph; so the upper box dimension is at most the quotient of the logarithms.
+//! grows like the spectral radius of the automaton's graph; so the upper box dimension is at most the quotient of the logarithms. Of curves, and products of them,
+//! more is known: see `curve`.
 //!
-//! Models are made of numbers with 16 digits: what is proven holds for the shapes that they mean, where similar is similar, flat is flat and what touches touches up to 12 of them.
+//! Models are made of numbers with 16 digits: what is proven holds for the shapes that they mean, where similar is similar, flat is flat and what touches touches up to 11 of them.
 //!
 //! No dimension is above that of the smallest affine space that holds the shape. For every state s let b_s be a point of its attractor K_s, in barycentric
 //! coordinates, and D_s a space of directions, such that T b_t - b_s and T D_t lie in D_s for all transitions T from s to states t. Then T maps b_t + D_t into
 //! b_s + D_s. Start with the sets {b_s} and replace each by the union of its T times those of the t: all stay within the b_s + D_s, which are closed, and they
 //! converge to the K_s. So K_s lies in b_s + D_s, however the smallest such D_s are found: by adding what lacks until nothing does.
 
-use super::Interval;
 use super::bounds::support_of_cell;
+use super::{Interval, curve};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, child_points, cross, dot, subtract};
 use crate::automaton::{LeafPrimitive, StateId};
@@ -53,6 +54,14 @@ pub struct Dimension {
 }
 
 impl Dimension {
+    /// What is known besides where the shape winds around a volume: it parts space, and no set of a dimension below 2 does (W. Hurewicz, H. Wallman, "Dimension
+    /// Theory", 1941, theorems IV 4 and VII 3).
+    #[must_use]
+    pub fn parting_space(self) -> Self {
+        let Interval { low, high } = self.bounds;
+        Self { bounds: Interval { low: low.max(2.0), high: high.max(2.0) }, ..self }
+    }
+
     /// That of every body.
     pub const SOLID: Self = Self { bounds: Interval { low: 3.0, high: 3.0 }, knowledge: DimensionKnowledge::Elementary };
 }
@@ -75,8 +84,8 @@ const MOST_SIBLINGS: usize = 64;
 const STEPS: usize = 2_000;
 /// Directions that are less than this, relative to barycentric coordinates, are rounding, and so is what is thinner than this share of its size.
 const FLAT: f64 = 1e-12;
-/// Gaps that are less than this share of the size are rounding.
-const GAP: f64 = 1e-12;
+/// Gaps that are less than this share of the size are rounding: points are known to 1e-12 of it, and the share is taken in a norm in which sizes differ a little.
+const GAP: f64 = 1e-11;
 
 /// The dimension of an attractor: the largest of its root cells'. Roots of the same state and similar control points count once.
 ///
@@ -127,14 +136,15 @@ fn larger(a: Dimension, b: Dimension) -> Dimension {
 
 /// What bounds dimensions and does not depend on control points.
 struct StateFacts {
-    growth: f64,
+    /// What coverings by cells, and the lengths of curves, bound the dimension by.
+    covering: f64,
     /// A basis of the directions in which the attractor of the state extends, in barycentric coordinates; `None` when that is not known.
     directions: Option<Vec<Vec<f64>>>,
 }
 
 impl StateFacts {
     fn of(attractor: &Attractor, start: StateId) -> Self {
-        Self { growth: growth(attractor, start), directions: directions(attractor, start) }
+        Self { covering: covering(attractor, start), directions: directions(attractor, start) }
     }
 
     /// The dimension of an affine space that holds the part of the attractor in a cell with these control points.
@@ -176,17 +186,11 @@ fn of_root(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Bud
 /// Bounds for every shape: of the cells' number and size, of the affine space that holds it, and 1 for what is connected and not a point.
 fn by_contraction(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Budget) -> Result<Dimension, Stopped> {
     let root = &attractor.roots()[index];
-    let rate = attractor.contraction().upper;
-    let growth = facts.growth;
     let spread = f64::from(facts.spread(&root.points, root.rational));
-    let covering = match growth {
-        _ if growth <= 1.0 => 0.0,
-        _ if rate > 0.0 => growth.ln() / -rate.ln() * (1.0 + 1e-12),
-        _ => 0.0,
-    };
-    let high = covering.min(spread);
+    let high = facts.covering.min(spread);
     let mut low = 0.0;
-    let is_connected = attractor.widest_gap(root.state).is_some_and(|gap| gap <= GAP);
+    let is_connected =
+        curve::is_connected(attractor.automaton(), root.state) || attractor.widest_gap(root.state).is_some_and(|gap| gap <= GAP);
     if high > 0.0 && is_connected && attractor.root_window(index).is_none() {
         for axis in 0..3 {
             let mut ends = [0.0; 2];
@@ -200,6 +204,20 @@ fn by_contraction(attractor: &Attractor, index: usize, facts: &StateFacts, budge
         }
     }
     Ok(Dimension { bounds: Interval { low, high: high.max(low) }, knowledge: DimensionKnowledge::Contraction })
+}
+
+/// A bound of the upper box dimension of a state's attractor in its barycentric space, and so of its images.
+fn covering(attractor: &Attractor, start: StateId) -> f64 {
+    let (automaton, rate) = (attractor.automaton(), attractor.contraction().upper);
+    // Quotients of logarithms, rounded up.
+    let quotient = |of: f64| if of > 0.0 && rate > 0.0 { of / -rate.ln() * (1.0 + 1e-12) } else { 0.0 };
+    let by_number = quotient(growth(attractor, start).ln());
+    let factors = automaton.factors(start);
+    if !factors.is_empty() {
+        return by_number.min(factors.iter().map(|&factor| covering(attractor, factor)).sum());
+    }
+    let by_length = curve::lengthening(automaton, &reached(attractor, start)).map_or(f64::INFINITY, |growth| 1.0 + quotient(growth));
+    by_number.min(by_length)
 }
 
 /// The spectral radius of the graph of the states that are reached, or a larger number: the number of cells at level n is below a multiple of its powers.

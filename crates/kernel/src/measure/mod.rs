@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub mod contact;
+mod curve;
 pub mod dimension;
 mod double;
 pub mod enclosed;
