@@ -10,7 +10,7 @@
 
 use super::StateBound;
 use super::cell::{Point, distance_squared, dot, matrix_norm, subtract, times};
-use crate::automaton::{Automaton, Contraction, StateId};
+use crate::automaton::{Automaton, Contraction, StateId, SubdivisionOperator, Transition};
 
 /// Points that stand for a state's attractor, in coordinates of its frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +133,7 @@ fn boxes(automaton: &Automaton, covers: &[Option<Vec<Point>>], round: &[Halo]) -
         let offsets: Vec<Point> = (0..states.len()).map(|index| box_overhang(automaton, covers, index, &extents[index])).collect();
         let step = |extents: &[Point]| -> Vec<Point> {
             let through = |index: usize, axis: usize| {
-                let child = |t: &crate::automaton::Transition| -> f64 {
+                let child = |t: &Transition| -> f64 {
                     let entry = |j: usize| (t.operator.entry(axis + 1, j + 1) - t.operator.entry(axis + 1, 0)).abs();
                     (0..3).map(|j| entry(j) * extents[t.to.index()][j]).sum()
                 };
@@ -239,36 +239,40 @@ fn extreme(automaton: &Automaton, bounds: &[StateBound], id: StateId, direction:
             (state, frame) = (first.to, image(&frame, &first.operator));
             continue;
         }
-        let best = transitions.iter().map(|transition| {
-            let child = image(&frame, &transition.operator);
-            (reach(automaton, bounds, transition.to, &child, direction, 2), transition.to, child)
-        });
-        let (_, next, child) = best.max_by(|p, q| p.0.total_cmp(&q.0))?;
-        (state, frame) = (next, child);
+        let heights = frame.map(|point| dot(&point, direction));
+        let reached = |transition: &Transition| reach(automaton, bounds, transition.to, &lifted(&heights, &transition.operator), 2);
+        let (_, best) = transitions.iter().map(|transition| (reached(transition), transition)).max_by(|p, q| p.0.total_cmp(&q.0))?;
+        (state, frame) = (best.to, image(&frame, &best.operator));
     }
     let StateBound::Frame { centre, .. } = &bounds[state.index()] else { return None };
     Some(std::array::from_fn(|i| frame[0][i] + (0..3).map(|j| (frame[j + 1][i] - frame[0][i]) * centre[j]).sum::<f64>()))
 }
 
-fn image(frame: &[Point; 4], operator: &crate::automaton::SubdivisionOperator) -> [Point; 4] {
+fn image(frame: &[Point; 4], operator: &SubdivisionOperator) -> [Point; 4] {
     std::array::from_fn(|column| {
         let weights = operator.column(column);
         std::array::from_fn(|i| (0..4).map(|k| frame[k][i] * weights[k]).sum())
     })
 }
 
-/// The box bound of a cell's support, after looking `depth` levels ahead.
-fn reach(automaton: &Automaton, bounds: &[StateBound], state: StateId, frame: &[Point; 4], direction: &Point, depth: u32) -> f64 {
+/// Heights of a child's frame, from those of its parent's.
+#[inline]
+fn lifted(heights: &[f64; 4], operator: &SubdivisionOperator) -> [f64; 4] {
+    std::array::from_fn(|column| heights.iter().zip(operator.column(column)).map(|(height, weight)| height * weight).sum())
+}
+
+/// The box bound of how high a cell reaches, from the heights of its frame, after looking `depth` levels ahead.
+fn reach(automaton: &Automaton, bounds: &[StateBound], state: StateId, heights: &[f64; 4], depth: u32) -> f64 {
     let StateBound::Frame { low, high, .. } = &bounds[state.index()] else { return f64::NEG_INFINITY };
     let transitions = &automaton.state(state).transitions;
     // Looking ahead is bounded in width too.
     if depth > 0 && transitions.len().pow(depth) <= 64 {
-        let ahead = transitions.iter().map(|t| reach(automaton, bounds, t.to, &image(frame, &t.operator), direction, depth - 1));
+        let ahead = transitions.iter().map(|t| reach(automaton, bounds, t.to, &lifted(heights, &t.operator), depth - 1));
         return ahead.fold(f64::NEG_INFINITY, f64::max);
     }
-    let mut sum = dot(&frame[0], direction);
+    let mut sum = heights[0];
     for j in 0..3 {
-        let along = dot(&subtract(&frame[j + 1], &frame[0]), direction);
+        let along = heights[j + 1] - heights[0];
         sum += (along * low[j]).max(along * high[j]);
     }
     sum
