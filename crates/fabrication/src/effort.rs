@@ -7,13 +7,11 @@
 use lacuna_kernel::dilation::Prediction;
 
 /// For each triangle of a lattice's surface: made, cleaned, joined, verified, written and read back.
-const TRIANGLE: f64 = 5.0e-6;
+const TRIANGLE: f64 = 5.1e-6;
 /// For each leaf cell that a block of the lattice meets: what is near to the block is sorted out, and its distances are found.
-const MET_CELL: f64 = 6.6e-6;
-/// For each triangle of a lattice that is simplified: trials to remove its corners.
-const SIMPLIFIED: f64 = 1.5e-6;
-/// For each byte that the simplification looks at: the sites near a corner, all of which every trial asks.
-const LOOKED_AT_BYTE: f64 = 4.0e-9;
+const MET_CELL: f64 = 3.8e-6;
+/// For each byte that the simplification looks at: the sites near a corner, all of which every trial to remove it asks.
+const LOOKED_AT_BYTE: f64 = 3.4e-9;
 /// For each leaf cell that is drawn by itself, and for each that becomes part of a conforming complex.
 const CELL: f64 = 5.0e-7;
 const FACE: f64 = 2.0e-6;
@@ -30,7 +28,7 @@ const CONVERTED: f64 = 1.0e-6;
 /// Of a dilation.
 pub(crate) fn of_dilation(prediction: &Prediction, simplify: bool) -> f64 {
     let triangles = prediction.triangles.max(prediction.counted_triangles);
-    let simplifying = if simplify { triangles * SIMPLIFIED + prediction.looked_at_bytes * LOOKED_AT_BYTE } else { 0.0 };
+    let simplifying = if simplify { prediction.looked_at_bytes * LOOKED_AT_BYTE } else { 0.0 };
     triangles * TRIANGLE + prediction.leaf_cells * MET_CELL + simplifying
 }
 
