@@ -375,13 +375,20 @@ fn a_mesh_that_closes_without_a_solid_says_so() {
     assert!(said.is_empty() && open.is_empty(), "{said:?} {open:?}");
 }
 
-/// Volumes and moments beyond the range of numbers are refused, and were once an internal error.
+/// Volumes and moments beyond the range of numbers are refused: they were once an internal error, or no more than their rounding.
 #[test]
-fn shapes_too_large_for_numbers_are_refused() {
-    let inputs = vec![Input { name: "shape".into(), model: cubes(&[[0.0, 1e150]]), radius_mm: None }];
-    let job = Job { kind: JobKind::Measure, inputs, params: Params::new(0.01), outputs: Vec::new(), limits: Limits::default() };
-    let error = run(&job, &Budget::default()).unwrap_err();
-    assert_eq!(error.code, "measure.too-large");
+fn shapes_too_large_or_too_small_for_numbers_are_refused() {
+    for (size, code) in [(1e150, "measure.too-large"), (1e-120, "measure.too-small")] {
+        let inputs = vec![Input { name: "shape".into(), model: cubes(&[[0.0, size]]), radius_mm: None }];
+        let job = Job { kind: JobKind::Measure, inputs, params: Params::new(0.01), outputs: Vec::new(), limits: Limits::default() };
+        assert_eq!(run(&job, &Budget::default()).unwrap_err().code, code);
+    }
+    let found = measured(cubes(&[[0.0, 1e-40]]), Params::new(0.01));
+    assert_within(found.volume_mm3.unwrap().map(|volume| volume * 1e120), 1.0, 1e-9);
+    assert_eq!(found.dimension.unwrap().bounds, [3.0; 2]);
+    // A point at the origin has no size, and is measured.
+    let point = Shape::Mesh(PolygonMesh { vertices: vec![DVec3::ZERO], faces: vec![vec![0]], interior: Interior::Auto });
+    assert_eq!(dimension(point), ([0.0; 2], DimensionBasis::Elementary));
     let found = measured(cubes(&[[0.0, 1e40]]), Params::new(0.01));
     assert_within(found.volume_mm3.unwrap().map(|volume| volume / 1e120), 1.0, 1e-9);
     assert_within(found.inertia_mm5.unwrap()[2][2].map(|moment| moment / 1e200), 1.0 / 6.0, 1e-5);

@@ -250,7 +250,7 @@ pub(crate) fn split_of(job: &Job) -> Result<Split, JobError> {
     job.params.split.clone().ok_or_else(missing)
 }
 
-/// Shapes are measured up to this coordinate: moments of inertia grow with its fifth power.
+/// Shapes are measured up to this coordinate, and from the inverse of it on: moments of inertia grow with its fifth power.
 const LARGEST_MM: f64 = 1e50;
 
 fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
@@ -267,6 +267,15 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
                 bounds.extent()
             );
             return Err(JobError::new(Kind::Invalid, "measure.too-large", message));
+        }
+        let has_size = (0..3).any(|axis| bounds.high[axis].low > bounds.low[axis].high);
+        if has_size && bounds.extent() < 1.0 / LARGEST_MM {
+            let message = format!(
+                "the shape lies within {:e} mm of the origin, and below {:e} mm its moments are no numbers; give a larger shape",
+                bounds.extent(),
+                1.0 / LARGEST_MM
+            );
+            return Err(JobError::new(Kind::Invalid, "measure.too-small", message));
         }
         let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
         let mut known = dimension(attractor, budget)?;
