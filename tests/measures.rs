@@ -177,6 +177,8 @@ fn dimensions_of_curves_and_surfaces() {
     for curve in ["heighway_dragon", "levy_curve", "terdragon", "gosper_curve"] {
         assert_eq!(dimension(classic(curve)), ([1.0, 2.0], DimensionBasis::OverlappingSimilarities), "{curve}");
     }
+    // It holds segments.
+    assert_eq!(dimension(classic("binary_tree")).0[0], 1.0);
     // Copies that share points known to rounding alone.
     assert_eq!(dimension(case("ifs/heighway_dragon")).0, [1.0, 2.0]);
     for (d, h) in [(0.2, 0.0), (0.3, 0.4), (0.5, 0.5), (0.55, 0.1), (0.7, 0.3), (0.9, -0.2)] {

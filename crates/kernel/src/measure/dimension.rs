@@ -28,7 +28,7 @@ use crate::attractor::cell::{Cell, ControlPoint, Point, child_points, cross, dot
 use crate::automaton::{LeafPrimitive, StateId};
 use crate::budget::{Budget, Stopped};
 use robust::{Coord, orient2d};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, VecDeque};
 
 /// How much of a dimension is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,20 +183,18 @@ fn of_root(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Bud
     Ok(Dimension { bounds, knowledge: DimensionKnowledge::OverlappingSimilarities })
 }
 
-/// Bounds for every shape: of the cells' number and size, of the affine space that holds it, and 1 for what is connected and not a point.
+/// Bounds for every shape: of the cells' number and size, of the affine space that holds it, and 1 where a part is connected and not a point.
 fn by_contraction(attractor: &Attractor, index: usize, facts: &StateFacts, budget: &Budget) -> Result<Dimension, Stopped> {
     let root = &attractor.roots()[index];
     let spread = f64::from(facts.spread(&root.points, root.rational));
     let high = facts.covering.min(spread);
     let mut low = 0.0;
-    let is_connected =
-        curve::is_connected(attractor.automaton(), root.state) || attractor.widest_gap(root.state).is_some_and(|gap| gap <= GAP);
-    if high > 0.0 && is_connected && attractor.root_window(index).is_none() {
+    if let Some((cell, points)) = connected_part(attractor, index).filter(|_| high > 0.0) {
         for axis in 0..3 {
             let mut ends = [0.0; 2];
             for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
                 let direction = std::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-                *end = support_of_cell(attractor, attractor.root_cell(index), &root.points, &direction, budget)?.low;
+                *end = support_of_cell(attractor, cell, &points, &direction, budget)?.low;
             }
             if ends[0] + ends[1] > 0.0 {
                 low = 1.0;
@@ -204,6 +202,31 @@ fn by_contraction(attractor: &Attractor, index: usize, facts: &StateFacts, budge
         }
     }
     Ok(Dimension { bounds: Interval { low, high: high.max(low) }, knowledge: DimensionKnowledge::Contraction })
+}
+
+/// The first cell below a root, the root included, whose state is proven to be connected; none of a root that is cut along loops.
+fn connected_part(attractor: &Attractor, index: usize) -> Option<(Cell, Vec<ControlPoint>)> {
+    if attractor.root_window(index).is_some() {
+        return None;
+    }
+    let is_connected =
+        |state: StateId| curve::is_connected(attractor.automaton(), state) || attractor.widest_gap(state).is_some_and(|gap| gap <= GAP);
+    let mut seen = vec![false; attractor.automaton().states().len()];
+    let mut open = VecDeque::from([(attractor.root_cell(index), attractor.roots()[index].points.clone())]);
+    seen[open[0].0.state.index()] = true;
+    while let Some((cell, points)) = open.pop_front() {
+        if is_connected(cell.state) {
+            return Some((cell, points));
+        }
+        for (step, transition) in attractor.state_of(&cell).transitions.iter().enumerate() {
+            if !std::mem::replace(&mut seen[transition.to.index()], true) {
+                let mut child = vec![[0.0; 4]; transition.operator.columns()];
+                child_points(&points, &transition.operator, &mut child);
+                open.push_back((attractor.child_cell(&cell, step, &child), child));
+            }
+        }
+    }
+    None
 }
 
 /// A bound of the upper box dimension of a state's attractor in its barycentric space, and so of its images.
