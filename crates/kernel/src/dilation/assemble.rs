@@ -3,7 +3,7 @@
 use super::DilationError;
 use super::block::SIDE;
 use super::octree::{Node, Pass};
-use super::simplify::{Core, Simplifier};
+use super::simplify::{Core, OF_LATTICE, Simplifier};
 use super::stitch;
 use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
@@ -49,7 +49,7 @@ impl Assembly<'_, '_> {
         let core = self.pass.core(node);
         let idle = self.idle.lock().map(|mut idle| idle.pop()).unwrap_or_default();
         let mut simplifier = idle.unwrap_or_else(|| Simplifier::new(self.pass.rule, self.pass.setting));
-        simplifier.run(self.pass.setting, &core, &kept, &mut surface);
+        simplifier.run(self.pass.setting, &OF_LATTICE, &core, &kept, &mut surface);
         if let Ok(mut idle) = self.idle.lock() {
             idle.push(simplifier);
         }

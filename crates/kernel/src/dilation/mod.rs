@@ -18,6 +18,7 @@
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`. Triangles are then saved within the same bounds (`simplify`).
 
 mod affine;
+mod arrangement;
 mod assemble;
 mod block;
 mod certificate;

@@ -1,5 +1,6 @@
 //! Pitch, thresholds and bounds of a dilation.
 
+use super::arrangement::{self, Arranged, Arrangement};
 use super::assemble::Assembly;
 use super::block::{self, WITNESS};
 use super::dust;
@@ -7,6 +8,7 @@ use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Changed, Node, Pass, Task};
 use super::outside::MOST;
 use super::seam;
+use super::simplify::{Core, OF_POLYTOPES, Simplifier};
 use super::smooth::MOST_NOISE;
 use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
@@ -331,6 +333,21 @@ impl<'a> Plan<'a> {
         };
         let setting = self.setting(self.pitch, &unlimited);
         let (space, grading) = (self.space(&setting), Grading::default());
+        // `run` gives bounds of at most this length.
+        let least_thickness_mm = 2.0 * (self.balls.least - self.aimed);
+        if let Some(arrangement) = Arrangement::new(&setting, &self.rule, &space.candidates, budget)? {
+            let triangles = arrangement.triangles;
+            return Ok(Prediction {
+                counted_triangles: triangles,
+                triangles,
+                memory_bytes: triangles * arrangement::BYTES_PER_TRIANGLE,
+                leaf_cells: arrangement.leaves() as f64,
+                simplifying_bytes: 0.0,
+                looked_at_bytes: 0.0,
+                least_thickness_mm,
+                pitch_mm: self.pitch,
+            });
+        }
         let pass = self.pass(&setting, &grading, Task::Whole, &unlimited, space.blocks);
         let expected = pass.expected(space.blocks, &space.candidates, !self.clean_only)?;
         let memory_bytes = expected.made.max(expected.triangles) * BYTES_PER_TRIANGLE;
@@ -341,8 +358,7 @@ impl<'a> Plan<'a> {
             leaf_cells: expected.leaves,
             simplifying_bytes: expected.simplifying,
             looked_at_bytes: expected.looked_at,
-            // `run` gives bounds of at most this length.
-            least_thickness_mm: 2.0 * (self.balls.least - self.aimed),
+            least_thickness_mm,
             pitch_mm: self.pitch,
         })
     }
@@ -352,6 +368,9 @@ impl<'a> Plan<'a> {
     pub(super) fn run(&self, budget: &Budget) -> Result<Dilation, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
+        if let Some(dilation) = self.arranged(&setting, &space, budget)? {
+            return Ok(dilation);
+        }
         let mut grading = Grading::default();
         let made = self.surfaces(&setting, &space, &grading, Task::Whole, budget)?;
         let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
@@ -376,12 +395,40 @@ impl<'a> Plan<'a> {
             }
         }
         let uncertain = uncertain.len() + critical.len();
-        let mut surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
-        let uncertain = uncertain + dust::remove(&setting, &self.rule, &space.candidates, !setting.dense && uncertain == 0, &mut surface);
+        let surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
+        self.finish(&setting, &space, surface, uncertain as u64, budget)
+    }
+
+    /// The dilation by the union of polytopes around points and segments, where that serves better than a lattice.
+    fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+        let Some(arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
+        let Some(Arranged { mut surface, uncertain }) = arrangement.run(budget)? else { return Ok(None) };
+        drop(arrangement);
+        if surface.triangles.len() as u64 > budget.limits.triangles {
+            return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+        }
+        surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
+        let bounds = self.bounds.grown(2.0 * self.radius);
+        let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
+        Simplifier::new(&self.rule, setting).run(setting, &OF_POLYTOPES, &core, &space.candidates, &mut surface);
+        self.finish(setting, space, surface, uncertain, budget).map(Some)
+    }
+
+    /// Removes what is no more than rounding, mends what rounding breaks, and proves what is left.
+    fn finish(
+        &self,
+        setting: &Setting,
+        space: &Space,
+        mut surface: BlockSurface,
+        uncertain: u64,
+        budget: &Budget,
+    ) -> Result<Dilation, DilationError> {
+        let is_proven = !setting.dense && uncertain == 0;
+        let uncertain = uncertain + dust::remove(setting, &self.rule, &space.candidates, is_proven, &mut surface) as u64;
         let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
         budget.report("dilate", 1.0, mended.triangles.len() as u64);
         surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
-        self.certify(&setting, surface, mended.crossings, uncertain as u64, budget)
+        self.certify(setting, surface, mended.crossings, uncertain, budget)
     }
 
     fn surfaces(

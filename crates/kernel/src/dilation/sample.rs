@@ -10,7 +10,7 @@ use super::DilationError;
 use super::lattice::Grading;
 use super::octree::{Changed, Node, Pass, Task};
 use super::plan::Setting;
-use super::simplify::Simplifier;
+use super::simplify::{OF_LATTICE, Simplifier};
 use super::surface::Blocks;
 use super::tree::Candidates;
 use crate::split_mix;
@@ -163,13 +163,13 @@ impl Pass<'_> {
         }
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let core = self.core(node);
-        Simplifier::new(self.rule, cleaning).run(cleaning, &core, candidates, &mut surface);
+        Simplifier::new(self.rule, cleaning).run(cleaning, &OF_LATTICE, &core, candidates, &mut surface);
         let triangles = surface.triangles.len() as u64;
         let (mut simplifying, mut tried) = (0, 0);
         if simplify {
             surface.settled.clear();
             let mut simplifier = Simplifier::new(self.rule, self.setting);
-            simplifier.run(self.setting, &core, candidates, &mut surface);
+            simplifier.run(self.setting, &OF_LATTICE, &core, candidates, &mut surface);
             (simplifying, tried) = (simplifier.bytes(), triangles);
         }
         Ok(Made { made, triangles, leaves, simplifying, tried })

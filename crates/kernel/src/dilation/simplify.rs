@@ -36,10 +36,17 @@ impl Core {
     }
 }
 
-/// How far the new position may be from the planes of the old triangles, in units of the band, pass by pass.
-const PASSES: [f64; 6] = [1e-6, 0.01, 0.05, 0.12, 0.3, 2.0];
-/// Before this pass vertices are lifted.
-const LIFT_BEFORE: usize = 4;
+/// How a surface is simplified.
+pub(super) struct Course {
+    /// How far the new position may be from the planes of the old triangles, in units of the band, pass by pass.
+    passes: &'static [f64],
+    /// Before this pass vertices are lifted.
+    lift_before: Option<usize>,
+}
+
+/// The course for a lattice's surface, whose vertices are all over the band, and for one whose vertices are as far out as may be.
+pub(super) const OF_LATTICE: Course = Course { passes: &[1e-6, 0.01, 0.05, 0.12, 0.3, 2.0], lift_before: Some(4) };
+pub(super) const OF_POLYTOPES: Course = Course { passes: &[0.3, 2.0], lift_before: None };
 /// The share of an edge's length that is added: where all is flat, short edges go first.
 const LENGTH_SHARE: f64 = 1e-3;
 /// Cosine of the angle by which a normal may turn.
@@ -91,7 +98,7 @@ impl<'a> Simplifier<'a> {
 
     /// Simplifies a node's surface. Vertices that are `settled` are tried again only when something around them changes; all that could be
     /// tried become so.
-    pub(super) fn run(&mut self, setting: &Setting, core: &Core, candidates: &Candidates, surface: &mut BlockSurface) {
+    pub(super) fn run(&mut self, setting: &Setting, course: &Course, core: &Core, candidates: &Candidates, surface: &mut BlockSurface) {
         let starts = self.tree.reset(candidates);
         let edge = 2.0 * setting.lattice.pitch;
         let size = (0..3).map(|axis| core.high[axis] - core.low[axis]).fold(0.0, f64::max);
@@ -115,8 +122,9 @@ impl<'a> Simplifier<'a> {
         self.due.clear();
         self.due.resize(mesh.points.len(), 0.0);
         let mut lower = 0.0;
-        for (number, &pass) in PASSES.iter().enumerate() {
-            if number == LIFT_BEFORE {
+        let Course { passes, lift_before } = course;
+        for (number, &pass) in passes.iter().enumerate() {
+            if *lift_before == Some(number) {
                 self.lift_all(setting, core, &mut mesh, &inside, &mut fresh, &mut surface.settled);
             }
             let upper = pass * (setting.outer - setting.least);
@@ -150,7 +158,7 @@ impl<'a> Simplifier<'a> {
             self.due.clear();
             self.due.resize(mesh.points.len(), 0.0);
             self.mender.index(mesh);
-            let upper = (PASSES[0] * (setting.outer - setting.least)).max(SLIVER_MOVE * setting.rounding);
+            let upper = (OF_LATTICE.passes[0] * (setting.outer - setting.least)).max(SLIVER_MOVE * setting.rounding);
             for corner in slivers.iter().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<Vec<u32>>() {
                 if inside[corner as usize] && mesh.is_used(corner) {
                     self.remove(setting, mesh, inside, corner, 0.0, upper);

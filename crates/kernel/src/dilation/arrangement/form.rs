@@ -1,0 +1,168 @@
+//! Polytopes that stand for a ball.
+
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Facets at most: as many as a [`super::polytopes::Mask`] has bits.
+pub(super) const MOST_FACETS: usize = 512;
+
+/// A simple polytope around the unit ball, whose facets touch it, and symmetric about the plane across its axis, z. Facets along the axis form its belt; so the sum with a
+/// segment along the axis has the same facets, edges and vertices.
+#[derive(Debug)]
+pub(super) struct Form {
+    /// Unit normals of the facets.
+    pub(super) normals: Vec<Point>,
+    /// Which end of a segment a facet is at: the second for those above the belt, the first for the others.
+    pub(super) ends: Vec<usize>,
+    pub(super) corners: Vec<Corner>,
+    pub(super) edges: Vec<Edge>,
+    /// The distance of the farthest vertex.
+    pub(super) reach: f64,
+    /// The length of the shortest edge.
+    pub(super) shortest: f64,
+}
+
+/// A vertex.
+#[derive(Debug)]
+pub(super) struct Corner {
+    /// The facets that meet there.
+    pub(super) facets: [u16; 3],
+    /// The end of a segment that it is at.
+    pub(super) end: usize,
+}
+
+/// An edge.
+#[derive(Debug)]
+pub(super) struct Edge {
+    /// From the first vertex to the second,
+    pub(super) corners: [u16; 2],
+    /// counter-clockwise on the first facet seen from outside, clockwise on the second.
+    pub(super) facets: [u16; 2],
+}
+
+/// How many belts, rows above them, and shares of the belt's density in rows are tried.
+const BELTS: usize = 4;
+const ROWS: usize = 6;
+const DENSITIES: [f64; 4] = [0.8, 0.9, 1.0, 1.1];
+/// Rounding of unit vectors, far below any edge.
+const ROUNDING: f64 = 1e-9;
+
+impl Form {
+    /// The one with the fewest facets, of those that are tried, that lies within the ball with radius `most`.
+    pub(super) fn within(most: f64) -> Option<Self> {
+        let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
+        let mut best: Option<Self> = None;
+        for belt in least..least + BELTS {
+            // Rows as far apart as facets of the belt, or up to half as much again.
+            let fewest = (belt / 6).max(1);
+            for rows in fewest..fewest + ROWS {
+                for density in DENSITIES {
+                    let (normals, ends) = rows_of(belt, rows, density);
+                    let is_fewer = best.as_ref().is_none_or(|best| normals.len() < best.normals.len());
+                    if is_fewer && normals.len() <= MOST_FACETS {
+                        best = Self::new(normals, ends, most).or(best);
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// The polytope with these facets, if it is simple, has no vertex on the plane across the axis, and lies within `most`.
+    fn new(normals: Vec<Point>, ends: Vec<usize>, most: f64) -> Option<Self> {
+        let count = normals.len();
+        // Facets that meet in a vertex within `most` are no farther from each other than this.
+        let widest = 2.0 / (most * most) - 1.0 - ROUNDING;
+        let (mut places, mut corners) = (Vec::new(), Vec::new());
+        for a in 0..count {
+            let near: Vec<usize> = (a + 1..count).filter(|&b| dot(&normals[a], &normals[b]) > widest).collect();
+            for (place, &b) in near.iter().enumerate() {
+                for &c in &near[place + 1..] {
+                    let vertex = meeting([&normals[a], &normals[b], &normals[c]], [1.0; 3]);
+                    let Some(vertex) = vertex else { continue };
+                    if normals.iter().any(|normal| dot(normal, &vertex) > 1.0 + ROUNDING) {
+                        continue;
+                    }
+                    let on = normals.iter().filter(|normal| dot(normal, &vertex) > 1.0 - ROUNDING).count();
+                    if on != 3 || vertex[2].abs() < ROUNDING.sqrt() || dot(&vertex, &vertex) > most * most {
+                        return None;
+                    }
+                    corners.push(Corner { facets: [a, b, c].map(|facet| facet as u16), end: usize::from(vertex[2] > 0.0) });
+                    places.push(vertex);
+                }
+            }
+        }
+        let mut edges = Vec::new();
+        for (p, one) in corners.iter().enumerate() {
+            for (q, other) in corners.iter().enumerate().skip(p + 1) {
+                let mut common = one.facets.iter().copied().filter(|facet| other.facets.contains(facet));
+                let (Some(first), Some(second)) = (common.next(), common.next()) else { continue };
+                let along = subtract(&places[q], &places[p]);
+                let left = cross(&normals[usize::from(first)], &along);
+                // The facet lies to the left of its edges.
+                let facets = if dot(&left, &normals[usize::from(second)]) < 0.0 { [first, second] } else { [second, first] };
+                edges.push(Edge { corners: [p as u16, q as u16], facets });
+            }
+        }
+        // Euler's formula, for a simple polytope: nothing is missing.
+        if 2 * edges.len() != 3 * corners.len() || corners.len() + count != edges.len() + 2 {
+            return None;
+        }
+        let reach = places.iter().map(|place| dot(place, place).sqrt()).fold(0.0, f64::max) * (1.0 + ROUNDING);
+        let length = |edge: &Edge| distance_squared(&places[usize::from(edge.corners[0])], &places[usize::from(edge.corners[1])]).sqrt();
+        let shortest = edges.iter().map(length).fold(f64::INFINITY, f64::min);
+        Some(Self { normals, ends, corners, edges, reach, shortest })
+    }
+}
+
+/// Normals in rows around the axis, and the ends they are at.
+fn rows_of(belt: usize, rows: usize, density: f64) -> (Vec<Point>, Vec<usize>) {
+    let (mut normals, mut ends) = (Vec::new(), Vec::new());
+    for place in 0..belt {
+        let (sine, cosine) = (TAU * place as f64 / belt as f64).sin_cos();
+        normals.push([cosine, sine, 0.0]);
+        ends.push(0);
+    }
+    for row in 1..=rows {
+        let (up, out) = (FRAC_PI_2 * row as f64 / rows as f64).sin_cos();
+        let count = if row == rows { 1 } else { ((belt as f64 * out * density).ceil() as usize).max(3) };
+        for place in 0..count {
+            let (sine, cosine) = (TAU * (place as f64 + 0.5 * (row % 2) as f64) / count as f64).sin_cos();
+            for end in [1, 0] {
+                normals.push([cosine * out, sine * out, if end == 1 { up } else { -up }]);
+                ends.push(end);
+            }
+        }
+    }
+    (normals, ends)
+}
+
+/// The point on three planes n . x = c, if there is one to speak of.
+pub(super) fn meeting(normals: [&Point; 3], offsets: [f64; 3]) -> Option<Point> {
+    let [a, b, c] = normals;
+    let dual = [cross(b, c), cross(c, a), cross(a, b)];
+    let determinant = dot(a, &dual[0]);
+    (determinant.abs() > ROUNDING)
+        .then(|| std::array::from_fn(|axis| (0..3).map(|k| offsets[k] * dual[k][axis]).sum::<f64>() / determinant))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forms_lie_between_the_balls_and_hold_to_eulers_formula() {
+        for (most, facets) in [(1.9, 8), (1.22, 24), (1.1, 60), (1.05, 110), (1.02, 256), (1.01, 512)] {
+            let form = Form::within(most).unwrap();
+            assert!(form.reach <= most * (1.0 + 1e-6) && form.normals.len() <= facets, "{most}: {} facets", form.normals.len());
+            assert!(form.shortest > 1e-3, "{most}: {}", form.shortest);
+            // The belt's edges run along the axis, all others stay at their end.
+            for edge in &form.edges {
+                let ends = edge.corners.map(|corner| form.corners[usize::from(corner)].end);
+                let is_belt = edge.facets.iter().all(|&facet| form.normals[usize::from(facet)][2] == 0.0);
+                assert_eq!(ends[0] != ends[1], is_belt);
+            }
+        }
+        assert!(Form::within(1.000_1).is_none());
+    }
+}

@@ -1,0 +1,302 @@
+//! Thickening of points and segments by the union of a polytope around each: where few sites are near to each other, the boundary is found facet by facet, without a lattice.
+//!
+//! With s < r < outer the ends of the band, site S_i has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). Its
+//! boundary consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where `nerve` shows it; where that is in doubt, polytopes are changed until it does.
+
+mod facets;
+mod form;
+mod nerve;
+mod pieces;
+mod polytopes;
+mod triangulate;
+
+use super::plan::Setting;
+use super::surface::BlockSurface;
+use super::tree::{Candidates, Weighted};
+use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points};
+use crate::attractor::sites::{SiteError, SiteRule};
+use crate::budget::{Budget, Stopped};
+use crate::solid::box_tree::Box32;
+use form::Form;
+use nerve::Common;
+use pieces::{Lists, Neighbours};
+use polytopes::{MOST_POLYTOPES, Polytope, Polytopes, Shell};
+
+/// The mean of the third powers of the numbers of neighbours, at most: the nerve costs that much. Where sites have more neighbours, most of their polytopes' facets are hidden, and the lattice, which
+/// does not tell sites apart, costs less.
+const MOST_NEAR: usize = 2_500;
+/// How much narrower the band of finer polytopes is, level by level.
+const FINER: f64 = 3.0;
+/// Levels at most.
+const LEVELS: u32 = 5;
+/// What is tried where rounding leaves a boundary open.
+const TRIALS: u64 = 3;
+
+/// Polytopes that tell how many triangles there will be.
+const SAMPLE: usize = 64;
+/// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
+pub(super) const BYTES_PER_TRIANGLE: f64 = 600.0;
+
+/// The points and segments of an attractor, few of them near to each other.
+pub(super) struct Arrangement<'a> {
+    setting: &'a Setting,
+    sites: Sites,
+    near: Lists,
+    /// About how many triangles will be made.
+    pub(super) triangles: f64,
+}
+
+/// The boundary of a union of polytopes.
+pub(super) struct Arranged {
+    /// Vertices that are corners of polytopes are settled: there is nothing to be saved.
+    pub(super) surface: BlockSurface,
+    /// Sets of sites of which it is not proven that their polytopes have a common point exactly where their dilations have.
+    pub(super) uncertain: u64,
+}
+
+impl<'a> Arrangement<'a> {
+    /// The sites of an attractor; `None` where they are others than points and segments, or so many, or so near to each other, that a lattice serves better.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn new(setting: &'a Setting, rule: &SiteRule<'_>, candidates: &Candidates, budget: &Budget) -> Result<Option<Self>, Stopped> {
+        if setting.dense || setting.clean_only || !rule.attractor().solids().is_empty() {
+            return Ok(None);
+        }
+        let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
+        let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
+        let boxes: Vec<Box32> = sites.list.iter().map(|site| reached(setting, site)).collect();
+        let near = pieces::near(&boxes, MOST_NEAR.saturating_mul(boxes.len()), budget)?;
+        let Some(mut arrangement) = near.map(|near| Self { setting, sites, near, triangles: 0.0 }) else { return Ok(None) };
+        arrangement.triangles = arrangement.expected_triangles();
+        let triangles = arrangement.triangles;
+        let fits = triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64 && triangles < budget.limits.triangles as f64;
+        Ok(fits.then_some(arrangement))
+    }
+
+    /// Leaf cells of the attractor.
+    pub(super) fn leaves(&self) -> u64 {
+        self.sites.leaves
+    }
+
+    /// About how many triangles will be made, from a sample of the polytopes; infinitely many where there is no polytope.
+    ///
+    /// As all vertices have three edges, there are twice as many triangles as vertices, and pieces three times as many: an edge has one on both its facets.
+    fn expected_triangles(&self) -> f64 {
+        let mut engine = self.engine(0);
+        if !engine.begin() {
+            return f64::INFINITY;
+        }
+        let count = self.sites.list.len();
+        let step = count.div_ceil(SAMPLE).max(1);
+        let sample: Vec<u32> = (0..count as u32).step_by(step).collect();
+        let pieces = pieces::count(&engine.polytopes, &self.near, &sample);
+        pieces as f64 / 1.5 * count as f64 / sample.len() as f64
+    }
+
+    /// The boundary of the union of polytopes; `None` where none could be found.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn run(&self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+        for trial in 0..TRIALS {
+            if let Some(mut arranged) = self.engine(trial).run(budget)? {
+                arranged.surface.leaves = self.sites.leaves;
+                arranged.surface.site_error = self.sites.error;
+                return Ok(Some(arranged));
+            }
+        }
+        Ok(None)
+    }
+
+    fn engine(&self, trial: u64) -> Engine<'_> {
+        let sites = &self.sites.list;
+        let states = vec![State::default(); sites.len()];
+        Engine { setting: self.setting, sites, near: &self.near, polytopes: Polytopes::default(), states, trial }
+    }
+}
+
+/// Triangles of a polytope at least.
+const LEAST_TRIANGLES: f64 = 12.0;
+
+/// All sites of an attractor.
+#[derive(Default)]
+struct Sites {
+    list: Vec<Weighted>,
+    /// The largest errors of leaves.
+    error: SiteError,
+    leaves: u64,
+}
+
+impl Sites {
+    /// The sites below some candidates, if they are points and segments, at least one and at most `most`.
+    fn of(rule: &SiteRule<'_>, candidates: &Candidates, most: usize, budget: &Budget) -> Result<Option<Self>, Stopped> {
+        let attractor = rule.attractor();
+        let mut found = Self::default();
+        let mut open: Vec<(Cell, Vec<ControlPoint>)> = Vec::new();
+        for candidate in &candidates.cells {
+            open.push((candidate.cell, candidates.points_of(attractor, candidate).to_vec()));
+            while let Some((cell, points)) = open.pop() {
+                if let Some(error) = rule.leaf(&cell, &points) {
+                    let (deficit, mut are_wires) = (rule.deficit(cell.root), true);
+                    rule.emit(&cell, &points, &mut |site| {
+                        are_wires &= !matches!(site, Site::Triangle(_));
+                        found.list.push(Weighted { site, deficit });
+                    });
+                    found.error = found.error.max(error);
+                    found.leaves += 1;
+                    if !are_wires || found.list.len() > most {
+                        return Ok(None);
+                    }
+                    continue;
+                }
+                budget.cancel.check()?;
+                for (index, transition) in attractor.state_of(&cell).transitions.iter().enumerate().rev() {
+                    let mut child = vec![[0.0; 4]; transition.operator.columns()];
+                    child_points(&points, &transition.operator, &mut child);
+                    open.push((attractor.child_cell(&cell, index, &child), child));
+                }
+            }
+        }
+        Ok((!found.list.is_empty()).then_some(found))
+    }
+}
+
+/// The box around a site that points of the band may be in.
+fn reached(setting: &Setting, site: &Weighted) -> Box32 {
+    let ends: &[Point] = match &site.site {
+        Site::Point(a) => std::slice::from_ref(a),
+        Site::Segment(ends) => ends,
+        Site::Triangle(corners) => corners,
+    };
+    let reach = site.in_space(setting.outer) + setting.slack;
+    Box32::of(&ends.iter().flat_map(|end| [-reach, reach].map(|by| end.map(|x| x + by))).collect::<Vec<Point>>())
+}
+
+/// Sites whose polytopes were not shown to have a common point exactly where the dilations have, and whether these have.
+#[derive(Clone, Debug)]
+struct Doubt {
+    /// In ascending order.
+    sites: Vec<u32>,
+    wanted: Common,
+}
+
+/// Which side of the dilation by r a polytope keeps to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Side {
+    #[default]
+    Both,
+    Within,
+    Around,
+}
+
+/// What a site's polytope is like.
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    level: u32,
+    side: Side,
+}
+
+impl State {
+    /// The index of its form.
+    fn form(self) -> usize {
+        2 * self.level as usize + usize::from(self.side != Side::Both)
+    }
+}
+
+struct Engine<'a> {
+    setting: &'a Setting,
+    sites: &'a [Weighted],
+    near: &'a Lists,
+    polytopes: Polytopes,
+    states: Vec<State>,
+    trial: u64,
+}
+
+impl Engine<'_> {
+    fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+        if !self.begin() {
+            return Ok(None);
+        }
+        let (mut neighbours, mut doubts) = (Neighbours::default(), Vec::<Doubt>::new());
+        let mut changed = vec![true; self.sites.len()];
+        while changed.contains(&true) {
+            let stale = neighbours.update(&self.polytopes, self.near, &changed, budget)?;
+            doubts.retain(|doubt| !stale[doubt.sites[0] as usize]);
+            doubts.extend(nerve::doubts(self.setting, &self.polytopes, self.near, &stale, budget)?);
+            changed = self.refine(&doubts);
+        }
+        let Some(boundary) = facets::boundary(&self.polytopes, &neighbours.pieces, budget)? else { return Ok(None) };
+        let surface = BlockSurface {
+            vertices: boundary.points,
+            triangles: boundary.triangles,
+            settled: boundary.are_corners,
+            ..BlockSurface::default()
+        };
+        Ok(Some(Arranged { surface, uncertain: doubts.len() as u64 }))
+    }
+
+    /// Makes the first polytopes; whether there are such.
+    fn begin(&mut self) -> bool {
+        (0..self.sites.len()).all(|index| {
+            let polytope = self.polytope(index, State::default());
+            let is_there = polytope.is_some();
+            self.polytopes.all.extend(polytope);
+            is_there
+        })
+    }
+
+    /// The band of a site's polytope.
+    fn shell(&self, site: &Weighted, state: State) -> Shell {
+        let [inner, radius, outer] = [self.setting.least, self.setting.reach, self.setting.outer].map(|distance| site.in_space(distance));
+        let (share, slack) = (FINER.powi(-(state.level as i32)), self.setting.slack);
+        let inner = if state.side == Side::Around { radius } else { radius - share * (radius - inner) };
+        let outer = if state.side == Side::Within { radius } else { radius + share * (outer - radius) };
+        Shell { inner: inner + slack, outer: outer - slack }
+    }
+
+    /// A site's polytope in a state; none where no form is fine enough.
+    fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
+        let number = state.form();
+        if number >= self.polytopes.forms.len() {
+            self.polytopes.forms.resize_with(number + 1, || None);
+        }
+        if self.polytopes.forms[number].is_none() {
+            let sides: &[Side] = if state.side == Side::Both { &[Side::Both] } else { &[Side::Within, Side::Around] };
+            let shells = self.sites.iter().flat_map(|site| sides.iter().map(|&side| self.shell(site, State { side, ..state })));
+            let form = Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min));
+            self.polytopes.forms[number] = form;
+        }
+        let seed = (self.trial << 8 | number as u64) << 32 | index as u64;
+        let form = self.polytopes.forms[number].as_ref()?;
+        Polytope::new(self.sites[index], form, number, self.shell(&self.sites[index], state), seed)
+    }
+
+    /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.
+    fn refine(&mut self, doubts: &[Doubt]) -> Vec<bool> {
+        let mut wanted: Vec<Vec<Common>> = vec![Vec::new(); self.sites.len()];
+        for doubt in doubts {
+            doubt.sites.iter().for_each(|&site| wanted[site as usize].push(doubt.wanted));
+        }
+        let mut changed = vec![false; self.sites.len()];
+        for (index, wanted) in wanted.iter().enumerate().filter(|(_, wanted)| !wanted.is_empty()) {
+            let State { level, side } = self.states[index];
+            let is_one_sided = |side: Common| wanted.iter().all(|wanted| *wanted == side);
+            let next = if side != Side::Both || !(is_one_sided(Common::Some) || is_one_sided(Common::None)) {
+                State { level: level + 1, side: Side::Both }
+            } else if is_one_sided(Common::Some) {
+                State { level, side: Side::Around }
+            } else {
+                State { level, side: Side::Within }
+            };
+            if next.level < LEVELS
+                && let Some(polytope) = self.polytope(index, next)
+            {
+                self.states[index] = next;
+                self.polytopes.all[index] = polytope;
+                changed[index] = true;
+            }
+        }
+        changed
+    }
+}

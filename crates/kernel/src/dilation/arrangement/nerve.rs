@@ -1,0 +1,183 @@
+//! Whether a union of polytopes has the topology of the dilation, by their nerves.
+//!
+//! The union of convex bodies has the homotopy type of their nerve, the simplices of which are the sets of bodies with a common point (Leray, 1945; Borsuk, "On the imbedding of systems of compacta in
+//! simplicial complexes", Fund. Math. 35, 1948). Let P_i be the polytope of site S_i and D_i its dilation by r. If sets of polytopes have a common point exactly where the sets of these sites'
+//! dilations have, both unions have as many components, handles and voids. In space sets of up to four tell (Helly, 1923).
+//!
+//! How far a point is from the farthest of some sites is a convex function, and so is how high it is above the highest plane of some polytopes. Their minima are enclosed between bounds by the method of
+//! ellipsoids (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). A common point of the dilations by s, which lie in both
+//! kinds of bodies, settles most sets, and none of those by the band's outer end others.
+
+use super::pieces::Lists;
+use super::polytopes::{Polytopes, height, normal};
+use super::Doubt;
+use super::polytopes::Polytope;
+use crate::attractor::cell::{Point, between, dot, subtract};
+use crate::budget::{Budget, Stopped};
+use crate::dilation::plan::Setting;
+use rayon::prelude::*;
+
+/// Ellipsoids at most, to decide one question.
+const MOST_ELLIPSOIDS: usize = 400;
+/// Distances are told this well, as a share of the band's width, before polytopes are asked.
+const CLOSE: f64 = 0.1;
+/// Steps towards a common point, before.
+const STEPS: usize = 12;
+/// Bodies of a simplex at most.
+const MOST_BODIES: usize = 4;
+
+/// The sets of sites whose polytopes were not shown to have a common point exactly where the dilations have: those whose first site is `stale`.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn doubts(setting: &Setting, polytopes: &Polytopes, near: &Lists, stale: &[bool], budget: &Budget) -> Result<Vec<Doubt>, Stopped> {
+    let nerve = Nerve { setting, polytopes };
+    let of = |first: u32| {
+        budget.cancel.check()?;
+        let mut found = Vec::new();
+        if stale[first as usize] {
+            let later: Vec<u32> = near.of(first).iter().copied().filter(|&other| other > first).collect();
+            nerve.extend(&mut vec![first], &later, &mut found);
+        }
+        Ok(found)
+    };
+    let found: Vec<Vec<Doubt>> = (0..polytopes.count()).into_par_iter().map(of).collect::<Result<_, Stopped>>()?;
+    Ok(found.into_iter().flatten().collect())
+}
+
+struct Nerve<'a> {
+    setting: &'a Setting,
+    polytopes: &'a Polytopes,
+}
+
+/// What is known of some bodies' common points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Common {
+    Some,
+    None,
+    Unknown,
+}
+
+impl Nerve<'_> {
+    /// Looks at the simplex with each of some sites added, and at what holds it.
+    fn extend(&self, simplex: &mut Vec<u32>, later: &[u32], found: &mut Vec<Doubt>) {
+        for (place, &next) in later.iter().enumerate() {
+            simplex.push(next);
+            let (common, doubt) = self.common(simplex);
+            if doubt {
+                found.push(Doubt { sites: simplex.clone(), wanted: common });
+            }
+            if common != Common::None && simplex.len() < MOST_BODIES {
+                self.extend(simplex, &later[place + 1..], found);
+            }
+            simplex.pop();
+        }
+    }
+
+    /// Whether the dilations have a common point, and whether it is in doubt that the polytopes have one exactly then.
+    fn common(&self, simplex: &[u32]) -> (Common, bool) {
+        let Setting { least, reach, outer, slack, .. } = *self.setting;
+        let bodies = || simplex.iter().map(|&index| self.polytopes.of(index));
+        let bounds = |distance: f64| {
+            let mut common = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
+            for body in bodies() {
+                let [low, high] = body.site_box();
+                let by = body.site.in_space(distance) + slack;
+                for axis in 0..3 {
+                    common[0][axis] = common[0][axis].max(low[axis] - by);
+                    common[1][axis] = common[1][axis].min(high[axis] + by);
+                }
+            }
+            common
+        };
+        let within = bounds(outer);
+        if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
+            return (Common::None, false);
+        }
+        // Steps towards the farthest site end where the farthest is nearest.
+        let mut x = between(&within[0], &within[1], 0.5);
+        for step in 0..STEPS {
+            let far = bodies().map(|body| (body.site.distance_squared(&x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((square, body)) = far else { return (Common::Unknown, true) };
+            if square.sqrt() + slack < least {
+                return (Common::Some, false);
+            }
+            x = between(&x, &body.site.closest(&x), 1.0 / (step + 2) as f64);
+        }
+        let distance = |x: &Point| -> (f64, Point) {
+            let far = bodies().map(|body| (body.site.distance_squared(x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
+            far.map_or((0.0, [0.0; 3]), |(square, body)| {
+                let distance = square.sqrt();
+                (distance, subtract(x, &body.site.closest(x)).map(|part| part / distance.max(f64::MIN_POSITIVE)))
+            })
+        };
+        let side = |bounds: [f64; 2], of: f64| {
+            if bounds[1] < of - slack {
+                Common::Some
+            } else if bounds[0] > of + slack {
+                Common::None
+            } else {
+                Common::Unknown
+            }
+        };
+        let is_settled = |bounds: [f64; 2]| side(bounds, least) == Common::Some || side(bounds, outer) == Common::None;
+        let close = CLOSE * (outer - least);
+        let is_known = |bounds: [f64; 2]| side(bounds, reach) != Common::Unknown && bounds[1] - bounds[0] < close;
+        let bounds = least_value(within, distance, |bounds| is_settled(bounds) || is_known(bounds));
+        let common = side(bounds, reach);
+        if is_settled(bounds) {
+            return (common, false);
+        }
+        let beyond = |x: &Point| -> (f64, Point) {
+            let planes = bodies().flat_map(|body| body.planes.iter());
+            let highest = planes.map(|plane| (height(plane, x), plane)).max_by(|a, b| a.0.total_cmp(&b.0));
+            highest.map_or((0.0, [0.0; 3]), |(height, plane)| (height, normal(plane)))
+        };
+        let polytopes = side(least_value(within, beyond, |bounds| side(bounds, 0.0) != Common::Unknown), 0.0);
+        (common, common == Common::Unknown || common != polytopes)
+    }
+}
+
+/// Bounds of the least value in a box of a convex function, given with subgradients no longer than 1, that are as close as is `enough`, or as they come. Values found anywhere are upper bounds.
+///
+/// The ellipsoid {y: (y - x)^T P^-1 (y - x) <= 1} holds all points of the box where the function is less than the best value yet; there it is at least f(x) - sqrt(g^T P g).
+fn least_value([low, high]: [Point; 2], function: impl Fn(&Point) -> (f64, Point), enough: impl Fn([f64; 2]) -> bool) -> [f64; 2] {
+    let mut x = between(&low, &high, 0.5);
+    // The ball around a box is an ellipsoid with the sides' half lengths times the root of 3.
+    let mut shape = [[0.0; 3]; 3];
+    (0..3).for_each(|axis| shape[axis][axis] = 0.75 * (high[axis] - low[axis]).powi(2) * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+    let mut bounds = [f64::NEG_INFINITY, f64::INFINITY];
+    for _ in 0..MOST_ELLIPSOIDS {
+        let (value, slope) = function(&x);
+        let image = shape.map(|row| dot(&row, &slope));
+        let reach = dot(&slope, &image).max(0.0).sqrt();
+        bounds = [bounds[0].max(value - reach), bounds[1].min(value)];
+        if enough(bounds) || reach <= f64::EPSILON * value.abs() {
+            break;
+        }
+        // Points that are no better than the best are cut off.
+        let depth = (value - bounds[1]) / reach;
+        if depth >= 1.0 {
+            break;
+        }
+        let step = (1.0 + 3.0 * depth) / 4.0;
+        let grown = 9.0 / 8.0 * (1.0 - depth * depth) * (1.0 + 1e-12);
+        let flattened = 2.0 * (1.0 + 3.0 * depth) / (4.0 * (1.0 + depth));
+        for axis in 0..3 {
+            x[axis] -= step * image[axis] / reach;
+        }
+        shape = std::array::from_fn(|p| {
+            std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach)))
+        });
+    }
+    bounds
+}
+
+impl Polytope {
+    /// The box of its site.
+    fn site_box(&self) -> [Point; 2] {
+        let ends = self.ends();
+        let end = |least: bool| std::array::from_fn(|axis| if least { ends[0][axis].min(ends[1][axis]) } else { ends[0][axis].max(ends[1][axis]) });
+        [end(true), end(false)]
+    }
+}

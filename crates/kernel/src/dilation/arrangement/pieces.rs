@@ -1,0 +1,381 @@
+//! The edges of a union of polytopes.
+//!
+//! They are pieces of the polytopes' edges, and of the lines where a facet of one meets one of another, less what other polytopes cover. A polytope covers an interval of a line: so all comes down
+//! to intervals. Their ends are corners of polytopes, places where an edge pierces a facet, and places where facets of three polytopes meet: each is named by what meets there, whichever
+//! line it is found on, and ends with one name are one vertex. So the union's boundary is closed if every comparison of heights has one outcome only, which is checked by what comes out: see `facets`.
+
+use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
+use crate::attractor::cell::{Point, between, cross, dot, subtract};
+use crate::budget::{Budget, Stopped};
+use crate::solid::box_tree::{Box32, BoxTree};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What a vertex of the union is called.
+pub(super) type Name = u128;
+
+/// A corner of a polytope.
+fn corner(corner: u32) -> Name {
+    1 << 96 | Name::from(corner)
+}
+
+/// Whether a name is that of a corner.
+pub(super) fn is_corner(name: Name) -> bool {
+    name >> 96 == 1
+}
+
+/// Where an edge pierces a facet.
+fn pierced(edge: u32, facet: u32) -> Name {
+    2 << 96 | Name::from(edge) << 32 | Name::from(facet)
+}
+
+/// Where three facets meet.
+fn meeting(mut facets: [u32; 3]) -> Name {
+    facets.sort_unstable();
+    facets.iter().fold(3, |name, &facet| name << 32 | Name::from(facet))
+}
+
+/// A piece of an edge of the union, with one of its two facets to the left.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub(super) facet: u32,
+    pub(super) ends: [Name; 2],
+}
+
+/// Pieces, and where their ends are.
+#[derive(Debug, Default)]
+pub(super) struct Pieces {
+    pub(super) pieces: Vec<Piece>,
+    pub(super) places: Vec<(Name, Point)>,
+}
+
+/// Lists of polytopes, one for each.
+#[derive(Debug, Default)]
+pub(super) struct Lists(Vec<Vec<u32>>);
+
+impl Lists {
+    #[inline]
+    pub(super) fn of(&self, index: u32) -> &[u32] {
+        &self.0[index as usize]
+    }
+}
+
+/// Of every site, those that a point may be near to as well: their boxes meet. `None` where the third powers of their numbers sum up to more than `most`.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn near(boxes: &[Box32], most: usize, budget: &Budget) -> Result<Option<Lists>, Stopped> {
+    let mut tree = BoxTree::default();
+    tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
+    let total = AtomicUsize::new(0);
+    let of = |index: u32| {
+        budget.cancel.check()?;
+        let (own, mut found) = (&boxes[index as usize], Vec::new());
+        if total.load(Ordering::Relaxed) > most {
+            return Ok(found);
+        }
+        tree.query(own, 0, |leaf| {
+            let items = tree.items(leaf).iter().zip(tree.boxes(leaf));
+            found.extend(items.filter(|&(&item, other)| item != index && own.meets(other)).map(|(&item, _)| item));
+            found.len().pow(3) <= most
+        });
+        total.fetch_add(found.len().pow(3), Ordering::Relaxed);
+        found.sort_unstable();
+        Ok(found)
+    };
+    let lists = (0..boxes.len() as u32).into_par_iter().map(of).collect::<Result<_, Stopped>>()?;
+    Ok((total.into_inner() <= most).then_some(Lists(lists)))
+}
+
+/// What is known of the polytopes' neighbours, and of their parts in the union's edges. It stays where polytopes near are what they were.
+#[derive(Debug, Default)]
+pub(super) struct Neighbours {
+    /// Of every polytope, those that meet it: no facet parts them.
+    met: Vec<Vec<u32>>,
+    /// The facets that lie within another.
+    hidden: Vec<Mask>,
+    /// The pieces that it has with later ones.
+    pub(super) pieces: Vec<Pieces>,
+}
+
+impl Neighbours {
+    /// Finds anew what depends on polytopes that `changed`. Returns which pieces, and facets, may be others now.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn update(&mut self, polytopes: &Polytopes, near: &Lists, changed: &[bool], budget: &Budget) -> Result<Vec<bool>, Stopped> {
+        self.met.resize_with(changed.len(), Vec::new);
+        self.hidden.resize(changed.len(), Mask::default());
+        self.pieces.resize_with(changed.len(), Pieces::default);
+        let indices = || (0..polytopes.count()).into_par_iter();
+        let around = |of: &[bool]| -> Vec<bool> {
+            indices().map(|index| of[index as usize] || near.of(index).iter().any(|&other| of[other as usize])).collect()
+        };
+        let mut stale = around(changed);
+        self.met.par_iter_mut().zip(indices()).filter(|(_, index)| stale[*index as usize]).try_for_each(|(met, index)| {
+            budget.cancel.check()?;
+            met.clear();
+            met.extend(near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))));
+            Ok(())
+        })?;
+        let met = &self.met;
+        // Lines end where facets are hidden: where those are others, so may be the pieces of polytopes near.
+        let altered = self.hidden.par_iter_mut().zip(indices()).map(|(own, index)| {
+            budget.cancel.check()?;
+            if !stale[index as usize] {
+                return Ok(false);
+            }
+            let before = std::mem::replace(own, hidden(polytopes, index, &met[index as usize]));
+            Ok(changed[index as usize] || before != *own)
+        });
+        let altered: Vec<bool> = altered.collect::<Result<_, Stopped>>()?;
+        stale = around(&altered);
+        let arrangement = Arrangement { polytopes, met, hidden: &self.hidden };
+        let pieces = self.pieces.par_iter_mut().zip(indices()).filter(|(_, index)| stale[*index as usize]);
+        pieces.try_for_each_init(Scratch::default, |scratch, (pieces, index)| {
+            budget.cancel.check()?;
+            arrangement.of(index, scratch);
+            *pieces = std::mem::take(&mut scratch.out);
+            Ok(())
+        })?;
+        Ok(stale)
+    }
+}
+
+/// How many pieces some polytopes have, each edge of the union on both its facets.
+pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
+    let total = polytopes.all.len();
+    let (mut met, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
+    for &index in of.iter().chain(of.iter().flat_map(|&index| near.of(index))) {
+        let slot = &mut met[index as usize];
+        if slot.is_none() {
+            let own: Vec<u32> = near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))).collect();
+            masks[index as usize] = hidden(polytopes, index, &own);
+            *slot = Some(own);
+        }
+    }
+    let met: Vec<Vec<u32>> = met.into_iter().map(Option::unwrap_or_default).collect();
+    let arrangement = Arrangement { polytopes, met: &met, hidden: &masks };
+    let mut scratch = Scratch::default();
+    of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
+    scratch.out.pieces.len()
+}
+
+/// Whether no facet of either polytope parts it from the other.
+fn meet(one: &Polytope, other: &Polytope) -> bool {
+    let is_beyond = |planes: &[Plane], points: &[Point]| planes.iter().any(|plane| points.iter().all(|point| height(plane, point) > 0.0));
+    !is_beyond(&one.planes, &other.corners) && !is_beyond(&other.planes, &one.corners)
+}
+
+/// The facets of a polytope that lie within another.
+fn hidden(polytopes: &Polytopes, index: u32, met: &[u32]) -> Mask {
+    let (form, corners) = (polytopes.form(index), &polytopes.of(index).corners);
+    let mut hidden = Mask::default();
+    for &other in met {
+        let mut seen = Mask::default();
+        for (corner, point) in form.corners.iter().zip(corners) {
+            if !polytopes.of(other).contains(point) {
+                corner.facets.iter().for_each(|&facet| seen.add(usize::from(facet)));
+            }
+        }
+        (0..form.normals.len()).filter(|&facet| !seen.has(facet)).for_each(|facet| hidden.add(facet));
+    }
+    hidden
+}
+
+/// An end of what a polytope covers of a line: where that is, and the facet that is pierced there, unless it is the line's own end.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    at: f64,
+    facet: Option<u32>,
+}
+
+/// What a polytope covers of the way from p to q, given the facets that they are beyond: none where the same facet parts both.
+fn covered(polytopes: &Polytopes, index: u32, [p, q]: [&Point; 2], beyond: [&Mask; 2]) -> Option<[Cut; 2]> {
+    let planes = &polytopes.of(index).planes;
+    let mut cuts = [Cut { at: 0.0, facet: None }, Cut { at: 1.0, facet: None }];
+    for facet in beyond[0].either(beyond[1]) {
+        let (from, to) = (height(&planes[facet], p), height(&planes[facet], q));
+        let at = from / (from - to);
+        let cut = Cut { at, facet: Some(facet_number(index, facet)) };
+        if from > 0.0 {
+            if at > cuts[0].at {
+                cuts[0] = cut;
+            }
+        } else if at < cuts[1].at {
+            cuts[1] = cut;
+        }
+        if cuts[0].at >= cuts[1].at {
+            return None;
+        }
+    }
+    Some(cuts)
+}
+
+/// What is left of a line from 0 to 1 when intervals are taken away: ends with their names.
+fn uncovered(cuts: &mut [[Cut; 2]], ends: [Name; 2], name: impl Fn(u32) -> Name, mut visit: impl FnMut([(f64, Name); 2])) {
+    cuts.sort_unstable_by(|a, b| a[0].at.total_cmp(&b[0].at));
+    let mut from = (0.0, ends[0]);
+    for [start, end] in cuts.iter() {
+        if let Some(facet) = start.facet
+            && start.at > from.0
+        {
+            visit([from, (start.at, name(facet))]);
+        }
+        let Some(facet) = end.facet else { return };
+        if end.at > from.0 {
+            from = (end.at, name(facet));
+        }
+    }
+    visit([from, (1.0, ends[1])]);
+}
+
+/// A place where an edge of one of two polytopes pierces a facet of the other: on facets of the first and of the second.
+#[derive(Clone, Copy)]
+struct Pierced {
+    facets: [u32; 2],
+    name: Name,
+    at: Point,
+}
+
+/// Working memory.
+#[derive(Default)]
+struct Scratch {
+    beyond: Vec<Mask>,
+    /// Of every edge of a polytope, what others cover, and whether one covers all of it.
+    cuts: Vec<Vec<[Cut; 2]>>,
+    is_gone: Vec<bool>,
+    found: Vec<Pierced>,
+    line: Vec<[Cut; 2]>,
+    /// The polytopes that a polytope meets, those first that covered a whole line last.
+    recent: Vec<u32>,
+    out: Pieces,
+}
+
+/// What is needed to find pieces.
+struct Arrangement<'a> {
+    polytopes: &'a Polytopes,
+    met: &'a [Vec<u32>],
+    hidden: &'a [Mask],
+}
+
+impl Arrangement<'_> {
+    /// Whether a facet, numbered within its polytope, may be seen.
+    #[inline]
+    fn is_seen(&self, index: u32, facet: u16) -> bool {
+        !self.hidden[index as usize].has(usize::from(facet))
+    }
+
+    /// Pieces of a polytope's edges, and of the lines where it meets later ones.
+    fn of(&self, index: u32, scratch: &mut Scratch) {
+        let edges = &self.polytopes.form(index).edges;
+        scratch.cuts.resize_with(edges.len().max(scratch.cuts.len()), Vec::new);
+        scratch.cuts.iter_mut().for_each(Vec::clear);
+        scratch.is_gone.clear();
+        scratch.is_gone.extend(edges.iter().map(|edge| !edge.facets.iter().any(|&facet| self.is_seen(index, facet))));
+        scratch.recent.clear();
+        scratch.recent.extend_from_slice(&self.met[index as usize]);
+        for &other in &self.met[index as usize] {
+            scratch.found.clear();
+            self.pierce(index, other, true, other > index, scratch);
+            if other > index {
+                self.pierce(other, index, false, true, scratch);
+                self.lines(other, scratch);
+            }
+        }
+        self.edges(index, scratch);
+    }
+
+    /// Finds where the edges of one polytope pierce the facets of another; its own cuts are kept, and places where lines of both end.
+    fn pierce(&self, index: u32, other: u32, is_first: bool, with_lines: bool, scratch: &mut Scratch) {
+        let (form, corners) = (self.polytopes.form(index), &self.polytopes.of(index).corners);
+        let by = self.polytopes.of(other);
+        scratch.beyond.clear();
+        scratch.beyond.extend(corners.iter().map(|corner| by.beyond(corner)));
+        for (number, edge) in form.edges.iter().enumerate() {
+            let [p, q] = edge.corners.map(usize::from);
+            let beyond = [&scratch.beyond[p], &scratch.beyond[q]];
+            if beyond[0].meets(beyond[1]) || !edge.facets.iter().any(|&facet| self.is_seen(index, facet)) {
+                continue;
+            }
+            let Some(cuts) = covered(self.polytopes, other, [&corners[p], &corners[q]], beyond) else { continue };
+            if is_first {
+                scratch.is_gone[number] |= cuts.iter().all(|cut| cut.facet.is_none());
+                scratch.cuts[number].push(cuts);
+            }
+            if !with_lines {
+                continue;
+            }
+            for (at, theirs) in cuts.iter().filter_map(|cut| cut.facet.map(|facet| (cut.at, facet))) {
+                if self.hidden[other as usize].has(owner(theirs).1) {
+                    continue;
+                }
+                let name = pierced(edge_number(index, number), theirs);
+                let at = between(&corners[p], &corners[q], at);
+                for &facet in edge.facets.iter().filter(|&&facet| self.is_seen(index, facet)) {
+                    let own = facet_number(index, usize::from(facet));
+                    scratch.found.push(Pierced { facets: if is_first { [own, theirs] } else { [theirs, own] }, name, at });
+                }
+            }
+        }
+    }
+
+    /// What other polytopes leave of a polytope's own edges.
+    fn edges(&self, index: u32, scratch: &mut Scratch) {
+        let (form, corners) = (self.polytopes.form(index), &self.polytopes.of(index).corners);
+        let Scratch { cuts, is_gone, out, .. } = scratch;
+        for (number, edge) in form.edges.iter().enumerate().filter(|&(number, _)| !is_gone[number]) {
+            let [p, q] = edge.corners.map(usize::from);
+            let name = |facet| pierced(edge_number(index, number), facet);
+            let facets = edge.facets.map(|facet| facet_number(index, usize::from(facet)));
+            uncovered(&mut cuts[number], edge.corners.map(|at| corner(edge_number(index, usize::from(at)))), name, |ends| {
+                out.add(facets, ends, |at| between(&corners[p], &corners[q], at));
+            });
+        }
+    }
+
+    /// What other polytopes leave of the lines where two meet.
+    fn lines(&self, other: u32, scratch: &mut Scratch) {
+        let Scratch { found, line, recent, out, .. } = scratch;
+        found.sort_unstable_by_key(|pierced| (pierced.facets, pierced.name));
+        // Two facets meet in one line, with two ends; where rounding says otherwise, the boundary is not closed.
+        for pair in found.chunk_by(|a, b| a.facets == b.facets).filter(|pair| pair.len() == 2) {
+            let facets = pair[0].facets;
+            let [own, theirs] = facets.map(|facet| normal(self.polytopes.plane(facet)));
+            let along = cross(&theirs, &own);
+            let is_forward = dot(&along, &subtract(&pair[1].at, &pair[0].at)) > 0.0;
+            let (p, q) = if is_forward { (&pair[0], &pair[1]) } else { (&pair[1], &pair[0]) };
+            line.clear();
+            let mut is_gone = false;
+            for place in 0..recent.len() {
+                let third = recent[place];
+                if third == other || !self.polytopes.of(third).may_meet(&p.at, &q.at) {
+                    continue;
+                }
+                let beyond = [&p.at, &q.at].map(|x| self.polytopes.of(third).beyond(x));
+                if beyond[0].meets(&beyond[1]) {
+                    continue;
+                }
+                if beyond.iter().all(Mask::is_empty) {
+                    is_gone = true;
+                    recent[..=place].rotate_right(1);
+                    break;
+                }
+                line.extend(covered(self.polytopes, third, [&p.at, &q.at], [&beyond[0], &beyond[1]]));
+            }
+            if !is_gone {
+                let name = |facet| meeting([facets[0], facets[1], facet]);
+                uncovered(line, [p.name, q.name], name, |ends| out.add(facets, ends, |at| between(&p.at, &q.at, at)));
+            }
+        }
+    }
+}
+
+impl Pieces {
+    /// Adds a piece, with the first facet to its left and the second to its right.
+    fn add(&mut self, facets: [u32; 2], ends: [(f64, Name); 2], place: impl Fn(f64) -> Point) {
+        let [from, to] = ends.map(|(_, name)| name);
+        self.places.extend(ends.map(|(at, name)| (name, place(at))));
+        self.pieces.extend([Piece { facet: facets[0], ends: [from, to] }, Piece { facet: facets[1], ends: [to, from] }]);
+    }
+}
