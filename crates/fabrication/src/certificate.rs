@@ -197,7 +197,7 @@ pub struct Certificate {
     /// Area of the written mesh.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub mesh_area_mm2: Option<f64>,
-    /// Edge of the lattice's cubes.
+    /// Edge of the lattice's cubes, where there was a lattice: points and segments of which few are near to each other are thickened without.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub lattice_pitch_mm: Option<f64>,
     /// Version of the kernel that made it.
@@ -704,7 +704,7 @@ pub(crate) fn of_dilation(attractor: &Attractor, dilation: &Dilation, tolerance:
         bbox_mm: corners(&dilation.bounds),
         volume_mm3: Some([exact.low, exact.high]),
         area_mm2: Some([exact_area.low, exact_area.high]),
-        lattice_pitch_mm: Some(dilation.pitch_mm),
+        lattice_pitch_mm: dilation.pitch_mm,
         topology_exact: if dilation.topology_exact { Checked::Found(true) } else { Checked::NotChecked },
         ..counted
     }

@@ -27,7 +27,7 @@ pub struct Plan {
     pub memory_bytes: f64,
     /// Bytes of a binary STL file with so many `triangles`.
     pub output_bytes: f64,
-    /// Edge of the lattice's cubes.
+    /// Edge of the lattice's cubes. `null` where points and segments are thickened without a lattice, and where nothing is thickened.
     pub lattice_pitch_mm: Option<f64>,
     /// Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan
     /// takes as long for, are not in it. `null` where they are not predicted: comparisons, sections, and what is searched for besides (`stability`, `thickness`, `oriented_box`, the other surface of
@@ -233,7 +233,7 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         counted_triangles: prediction.counted_triangles,
         memory_bytes: held_bytes(&prediction, simplify),
         output_bytes: stl_bytes(prediction.triangles),
-        lattice_pitch_mm: Some(prediction.pitch_mm),
+        lattice_pitch_mm: prediction.pitch_mm,
         cpu_seconds: (!searches_more(job)).then(|| effort::of_dilation(&prediction, simplify)),
         smallest_feature_mm: match job.params.wall {
             // The wall's bounds are those of a dilation by its thickness.

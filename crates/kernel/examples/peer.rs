@@ -85,7 +85,8 @@ fn main() -> Outcome<()> {
     }
     let dilation = last.ok_or("no run")?;
     write(&dilation, output, scale)?;
-    let (inner, outer, pitch) = (dilation.inner_mm / scale, dilation.outer_mm / scale, dilation.pitch_mm / scale);
+    let (inner, outer) = (dilation.inner_mm / scale, dilation.outer_mm / scale);
+    let pitch = dilation.pitch_mm.map_or("null".to_owned(), |pitch| (pitch / scale).to_string());
     writeln!(
         std::io::stdout(),
         "{{\"wall\": {wall:?}, \"cpu\": {cpu:?}, \"rss_mb\": {}, \"claimed_inner\": {inner}, \"claimed_outer\": {outer}, \"pitch\": {pitch}, \

@@ -49,7 +49,7 @@ impl Assembly<'_, '_> {
         let core = self.pass.core(node);
         let idle = self.idle.lock().map(|mut idle| idle.pop()).unwrap_or_default();
         let mut simplifier = idle.unwrap_or_else(|| Simplifier::new(self.pass.rule, self.pass.setting));
-        simplifier.run(self.pass.setting, &OF_LATTICE, &core, &kept, &mut surface);
+        simplifier.run(self.pass.setting, &OF_LATTICE, &core, &kept, &mut surface, self.pass.budget)?;
         if let Ok(mut idle) = self.idle.lock() {
             idle.push(simplifier);
         }

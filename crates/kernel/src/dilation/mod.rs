@@ -13,6 +13,8 @@
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
 //! Its cubes are larger than that asks where one site serves all that is filled. Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
 //!
+//! Points and segments of which few are near to each other need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`).
+//!
 //! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`. Triangles are then saved within the same bounds (`simplify`).
@@ -61,9 +63,9 @@ pub struct Dilation {
     pub inner_mm: f64,
     /// The solid is inside D(r + outer).
     pub outer_mm: f64,
-    /// a.
-    pub pitch_mm: f64,
-    /// Leaf cells met, each once in every block of the lattice that needed it.
+    /// a; none where points and segments were thickened without a lattice (see `arrangement`).
+    pub pitch_mm: Option<f64>,
+    /// Leaf cells met, each once in every block of the lattice that needed it, or once where there is no lattice.
     pub leaf_cells: u64,
     /// Pairs of triangles that meet elsewhere than where they are joined.
     pub crossings: u64,
@@ -71,10 +73,10 @@ pub struct Dilation {
     pub bounds: AxisBox,
     /// The least radius: the one asked for, unless parts have their own.
     pub least_radius_mm: f64,
-    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain. Not counted where points stand for
-    /// cells: critical points of theirs are not those of the attractor.
+    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain; without a lattice, sets of sites whose dilations may or may not
+    /// have a common point. Not counted where points stand for cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
-    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`): of points, wires and polygons, where nothing was uncertain
+    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`): of points, wires and polygons, where nothing was uncertain
     /// and no triangles cross.
     pub topology_exact: bool,
 }
@@ -194,8 +196,8 @@ pub struct Prediction {
     pub looked_at_bytes: f64,
     /// The result is nowhere thinner: 2 (r - i), with the least radius r and the most that the inner bound i may be.
     pub least_thickness_mm: f64,
-    /// a, in mm.
-    pub pitch_mm: f64,
+    /// a, in mm, where there is a lattice.
+    pub pitch_mm: Option<f64>,
 }
 
 /// Predicts what [`dilate`] will make, or without `simplify` [`dilate_unsimplified`], from a sample of the lattice.

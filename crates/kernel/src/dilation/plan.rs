@@ -198,7 +198,7 @@ fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: 
 }
 
 /// The cube of space to refine, from block 0 on: blocks along its side, a power of two, and the roots as its candidates.
-struct Space {
+pub(super) struct Space {
     blocks: i64,
     candidates: Candidates,
 }
@@ -278,7 +278,7 @@ impl<'a> Plan<'a> {
         let extra = carried(extent(&bounds, 3.0 * radius)) + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
         let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
         // The inner bound rounds down: see `Setting::least`.
-        let pitch = Self::pitch(&rule, radius, aimed - extra - 4e-12 * radius);
+        let pitch = Self::pitch_for(&rule, radius, aimed - extra - 4e-12 * radius);
         let least = least(radius, pitch);
         let pitch = pitch.min(COARSEST * balls.least).min(QUICKEST * radius);
         let close = in_space_between(radius, aimed - extra - rule.outer_reserve(), rule.largest_dense());
@@ -292,11 +292,16 @@ impl<'a> Plan<'a> {
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
-    fn pitch(rule: &SiteRule<'_>, radius: f64, tolerance: f64) -> f64 {
+    fn pitch_for(rule: &SiteRule<'_>, radius: f64, tolerance: f64) -> f64 {
         (tolerance.max(0.0) * (2.0 * radius - tolerance) * rule.lattice_share()).sqrt() / ENCLOSING
     }
 
-    fn setting(&self, pitch: f64, budget: &Budget) -> Setting {
+    #[cfg(test)]
+    pub(super) fn pitch(&self) -> f64 {
+        self.pitch
+    }
+
+    pub(super) fn setting(&self, pitch: f64, budget: &Budget) -> Setting {
         // The roots are there anyway; what grows beyond them may take a fair share of the memory.
         let roots = self.rule.attractor().roots().len();
         let cells = (budget.limits.memory_bytes / (8 * BYTES_PER_CELL)).clamp(50_000, 4_000_000) as usize + 2 * roots;
@@ -345,7 +350,7 @@ impl<'a> Plan<'a> {
                 simplifying_bytes: 0.0,
                 looked_at_bytes: 0.0,
                 least_thickness_mm,
-                pitch_mm: self.pitch,
+                pitch_mm: None,
             });
         }
         let pass = self.pass(&setting, &grading, Task::Whole, &unlimited, space.blocks);
@@ -359,24 +364,28 @@ impl<'a> Plan<'a> {
             simplifying_bytes: expected.simplifying,
             looked_at_bytes: expected.looked_at,
             least_thickness_mm,
-            pitch_mm: self.pitch,
+            pitch_mm: Some(self.pitch),
         })
     }
 
-    /// The dilation. Where the distance may have critical points with values that the lattice does not tell from r, it is
-    /// refined until it does.
+    /// The dilation.
     pub(super) fn run(&self, budget: &Budget) -> Result<Dilation, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
-        if let Some(dilation) = self.arranged(&setting, &space, budget)? {
-            return Ok(dilation);
+        match self.arranged(&setting, &space, budget)? {
+            Some(dilation) => Ok(dilation),
+            None => self.on_lattice(&setting, &space, budget),
         }
+    }
+
+    /// The dilation on a lattice. Where the distance may have critical points with values that it does not tell from r, it is refined until it does.
+    pub(super) fn on_lattice(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Dilation, DilationError> {
         let mut grading = Grading::default();
-        let made = self.surfaces(&setting, &space, &grading, Task::Whole, budget)?;
+        let made = self.surfaces(setting, space, &grading, Task::Whole, budget)?;
         let allowed = MOST_REFINED + made.iter().map(|surface| surface.triangles.len()).sum::<usize>() / 8;
         let (mut refined, mut uncertain) = (0, BTreeSet::new());
         let mut blocks = Blocks::default();
-        let mut critical = add(&setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
+        let mut critical = add(setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
         while !critical.is_empty() {
             let (mut finer, mut new) = (grading.clone(), Vec::new());
             critical.iter().for_each(|&cube| finer.subdivide(cube, &mut new));
@@ -386,8 +395,8 @@ impl<'a> Plan<'a> {
             }
             grading = finer;
             let task = Task::Changed(&Changed::new(&new), &blocks);
-            let made = self.surfaces(&setting, &space, &grading, task, budget)?;
-            critical = add(&setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
+            let made = self.surfaces(setting, space, &grading, task, budget)?;
+            critical = add(setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
             let total: u64 =
                 blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
             if total > budget.limits.triangles {
@@ -395,23 +404,29 @@ impl<'a> Plan<'a> {
             }
         }
         let uncertain = uncertain.len() + critical.len();
-        let surface = self.assemble(&setting, &space, &grading, blocks, budget)?;
-        self.finish(&setting, &space, surface, uncertain as u64, budget)
+        let surface = self.assemble(setting, space, &grading, blocks, budget)?;
+        self.finish(setting, space, surface, uncertain as u64, Some(setting.lattice.pitch), budget)
     }
 
     /// The dilation by the union of polytopes around points and segments, where that serves better than a lattice.
-    fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+    pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let Some(arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
+        let allowed = budget.limits.triangles;
+        let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed };
+        // What is expected is known to a factor of 2.
+        if arrangement.triangles > 2.0 * allowed as f64 {
+            return Err(too_many());
+        }
         let Some(Arranged { mut surface, uncertain }) = arrangement.run(budget)? else { return Ok(None) };
         drop(arrangement);
-        if surface.triangles.len() as u64 > budget.limits.triangles {
-            return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+        if surface.triangles.len() as u64 > allowed {
+            return Err(too_many());
         }
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
-        Simplifier::new(&self.rule, setting).run(setting, &OF_POLYTOPES, &core, &space.candidates, &mut surface);
-        self.finish(setting, space, surface, uncertain, budget).map(Some)
+        Simplifier::new(&self.rule, setting).run(setting, &OF_POLYTOPES, &core, &space.candidates, &mut surface, budget)?;
+        self.finish(setting, space, surface, uncertain, None, budget).map(Some)
     }
 
     /// Removes what is no more than rounding, mends what rounding breaks, and proves what is left.
@@ -421,6 +436,7 @@ impl<'a> Plan<'a> {
         space: &Space,
         mut surface: BlockSurface,
         uncertain: u64,
+        pitch_mm: Option<f64>,
         budget: &Budget,
     ) -> Result<Dilation, DilationError> {
         let is_proven = !setting.dense && uncertain == 0;
@@ -428,7 +444,7 @@ impl<'a> Plan<'a> {
         let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
         budget.report("dilate", 1.0, mended.triangles.len() as u64);
         surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
-        self.certify(setting, surface, mended.crossings, uncertain, budget)
+        self.certify(setting, surface, mended.crossings, uncertain, pitch_mm, budget)
     }
 
     fn surfaces(
@@ -470,7 +486,7 @@ impl<'a> Plan<'a> {
     }
 
     /// The space of a lattice.
-    fn space(&self, setting: &Setting) -> Space {
+    pub(super) fn space(&self, setting: &Setting) -> Space {
         let attractor = self.rule.attractor();
         let size = (0..3)
             .map(|axis| self.bounds.high[axis].high + setting.reach + 1.5 * setting.lattice.pitch - setting.lattice.origin[axis])
@@ -498,6 +514,7 @@ impl<'a> Plan<'a> {
         surface: BlockSurface,
         crossings: u64,
         uncertain: u64,
+        pitch_mm: Option<f64>,
         budget: &Budget,
     ) -> Result<Dilation, DilationError> {
         let site = surface.site_error;
@@ -524,7 +541,7 @@ impl<'a> Plan<'a> {
             // What is close to a site in space reaches as far as is aimed at.
             outer_mm: self.balls.outer(outer).max(if setting.dense { self.aimed } else { 0.0 }),
             least_radius_mm: self.balls.least,
-            pitch_mm: setting.lattice.pitch,
+            pitch_mm,
             leaf_cells,
             bounds: self.bounds.grown(self.radius),
             uncertain,

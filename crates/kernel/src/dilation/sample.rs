@@ -163,13 +163,13 @@ impl Pass<'_> {
         }
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let core = self.core(node);
-        Simplifier::new(self.rule, cleaning).run(cleaning, &OF_LATTICE, &core, candidates, &mut surface);
+        Simplifier::new(self.rule, cleaning).run(cleaning, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
         let triangles = surface.triangles.len() as u64;
         let (mut simplifying, mut tried) = (0, 0);
         if simplify {
             surface.settled.clear();
             let mut simplifier = Simplifier::new(self.rule, self.setting);
-            simplifier.run(self.setting, &OF_LATTICE, &core, candidates, &mut surface);
+            simplifier.run(self.setting, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
             (simplifying, tried) = (simplifier.bytes(), triangles);
         }
         Ok(Made { made, triangles, leaves, simplifying, tried })

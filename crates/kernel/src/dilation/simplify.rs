@@ -19,6 +19,7 @@ use super::surface::BlockSurface;
 use super::tree::{Candidates, Tree, in_space};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
+use crate::budget::{Budget, Stopped};
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::mend::{LEAST_HEIGHT, MOST_AROUND, Mender};
 
@@ -98,7 +99,18 @@ impl<'a> Simplifier<'a> {
 
     /// Simplifies a node's surface. Vertices that are `settled` are tried again only when something around them changes; all that could be
     /// tried become so.
-    pub(super) fn run(&mut self, setting: &Setting, course: &Course, core: &Core, candidates: &Candidates, surface: &mut BlockSurface) {
+    ///
+    /// # Errors
+    /// [`Stopped`]; the surface is lost then.
+    pub(super) fn run(
+        &mut self,
+        setting: &Setting,
+        course: &Course,
+        core: &Core,
+        candidates: &Candidates,
+        surface: &mut BlockSurface,
+        budget: &Budget,
+    ) -> Result<(), Stopped> {
         let starts = self.tree.reset(candidates);
         let edge = 2.0 * setting.lattice.pitch;
         let size = (0..3).map(|axis| core.high[axis] - core.low[axis]).fold(0.0, f64::max);
@@ -114,7 +126,7 @@ impl<'a> Simplifier<'a> {
         if self.clean_only {
             self.remove_slivers(setting, &mut mesh, &inside);
             self.write(&mut mesh, &inside, surface);
-            return;
+            return Ok(());
         }
         self.mender.index(&mesh);
         // A settled vertex waits until something changes; `fresh` says that something did since its last trial.
@@ -132,6 +144,9 @@ impl<'a> Simplifier<'a> {
                 if !inside[vertex as usize] || surface.settled[vertex as usize] || !mesh.is_used(vertex) {
                     continue;
                 }
+                if vertex % 256 == 0 {
+                    budget.cancel.check()?;
+                }
                 let is_fresh = std::mem::take(&mut fresh[vertex as usize]);
                 if !is_fresh && self.due[vertex as usize] > upper {
                     continue;
@@ -148,6 +163,7 @@ impl<'a> Simplifier<'a> {
             lower = upper;
         }
         self.write(&mut mesh, &inside, surface);
+        Ok(())
     }
 
     /// Removes vertices of the slivers that could not be turned: rounding to single precision may fold them over their neighbours, and these are the

@@ -113,7 +113,7 @@ pub fn close(
         inner_mm: swollen.inner_mm + around.outer_mm,
         outer_mm: swollen.outer_mm + around.inner_mm,
         least_radius_mm: swollen.least_radius_mm - ball.mm(),
-        pitch_mm: swollen.pitch_mm.min(around.pitch_mm),
+        pitch_mm: swollen.pitch_mm.into_iter().chain(around.pitch_mm).reduce(f64::min),
         leaf_cells: swollen.leaf_cells + around.leaf_cells,
         crossings: around.crossings,
         // A closing stays within the convex hull.

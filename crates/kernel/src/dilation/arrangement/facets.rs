@@ -1,6 +1,6 @@
 //! From the edges of a union of polytopes to its boundary: the pieces around every facet are joined to loops, and what these bound is cut into triangles.
 
-use super::pieces::{Name, Piece, Pieces, is_corner};
+use super::pieces::{Name, Piece, Pieces};
 use super::polytopes::{Polytopes, frame, normal};
 use super::triangulate::{Planar, triangulate};
 use crate::attractor::cell::{Point, dot};
@@ -12,8 +12,6 @@ use rayon::prelude::*;
 #[derive(Debug, Default)]
 pub(super) struct Boundary {
     pub(super) points: Vec<Point>,
-    /// Which points are corners of polytopes.
-    pub(super) are_corners: Vec<bool>,
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
@@ -31,7 +29,7 @@ struct Edge {
 pub(super) fn boundary(polytopes: &Polytopes, parts: &[Pieces], budget: &Budget) -> Result<Option<Boundary>, Stopped> {
     let count = parts.iter().map(|part| part.pieces.len()).sum();
     let mut numbers: NameMap<Name, u32> = NameMap::default();
-    let (mut points, mut are_corners) = (Vec::<Point>::with_capacity(count / 3), Vec::with_capacity(count / 3));
+    let mut points: Vec<Point> = Vec::with_capacity(count / 3);
     let mut edges: Vec<Edge> = Vec::with_capacity(count);
     for (index, part) in parts.iter().enumerate() {
         if index % 1024 == 0 {
@@ -40,7 +38,6 @@ pub(super) fn boundary(polytopes: &Polytopes, parts: &[Pieces], budget: &Budget)
         for (name, place) in &part.places {
             numbers.entry(*name).or_insert_with(|| {
                 points.push(*place);
-                are_corners.push(is_corner(*name));
                 points.len() as u32 - 1
             });
         }
@@ -64,7 +61,7 @@ pub(super) fn boundary(polytopes: &Polytopes, parts: &[Pieces], budget: &Budget)
         return Ok(None);
     }
     let triangles = cut.into_iter().flatten().flatten().collect();
-    Ok(Some(Boundary { points, are_corners, triangles }))
+    Ok(Some(Boundary { points, triangles }))
 }
 
 /// Joins a facet's edges, which are ordered by their first ends, to loops; whether they close, and meet in no vertex twice.

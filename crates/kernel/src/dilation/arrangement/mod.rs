@@ -8,6 +8,8 @@ mod form;
 mod nerve;
 mod pieces;
 mod polytopes;
+#[cfg(test)]
+mod tests;
 mod triangulate;
 
 use super::plan::Setting;
@@ -48,7 +50,6 @@ pub(super) struct Arrangement<'a> {
 
 /// The boundary of a union of polytopes.
 pub(super) struct Arranged {
-    /// Vertices that are corners of polytopes are settled: there is nothing to be saved.
     pub(super) surface: BlockSurface,
     /// Sets of sites of which it is not proven that their polytopes have a common point exactly where their dilations have.
     pub(super) uncertain: u64,
@@ -59,7 +60,12 @@ impl<'a> Arrangement<'a> {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn new(setting: &'a Setting, rule: &SiteRule<'_>, candidates: &Candidates, budget: &Budget) -> Result<Option<Self>, Stopped> {
+    pub(super) fn new(
+        setting: &'a Setting,
+        rule: &SiteRule<'_>,
+        candidates: &Candidates,
+        budget: &Budget,
+    ) -> Result<Option<Self>, Stopped> {
         if setting.dense || setting.clean_only || !rule.attractor().solids().is_empty() {
             return Ok(None);
         }
@@ -69,8 +75,7 @@ impl<'a> Arrangement<'a> {
         let near = pieces::near(&boxes, MOST_NEAR.saturating_mul(boxes.len()), budget)?;
         let Some(mut arrangement) = near.map(|near| Self { setting, sites, near, triangles: 0.0 }) else { return Ok(None) };
         arrangement.triangles = arrangement.expected_triangles();
-        let triangles = arrangement.triangles;
-        let fits = triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64 && triangles < budget.limits.triangles as f64;
+        let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
     }
 
@@ -227,12 +232,7 @@ impl Engine<'_> {
             changed = self.refine(&doubts);
         }
         let Some(boundary) = facets::boundary(&self.polytopes, &neighbours.pieces, budget)? else { return Ok(None) };
-        let surface = BlockSurface {
-            vertices: boundary.points,
-            triangles: boundary.triangles,
-            settled: boundary.are_corners,
-            ..BlockSurface::default()
-        };
+        let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
         Ok(Some(Arranged { surface, uncertain: doubts.len() as u64 }))
     }
 

@@ -8,10 +8,10 @@
 //! ellipsoids (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). A common point of the dilations by s, which lie in both
 //! kinds of bodies, settles most sets, and none of those by the band's outer end others.
 
-use super::pieces::Lists;
-use super::polytopes::{Polytopes, height, normal};
 use super::Doubt;
+use super::pieces::Lists;
 use super::polytopes::Polytope;
+use super::polytopes::{Polytopes, height, normal};
 use crate::attractor::cell::{Point, between, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
@@ -30,14 +30,20 @@ const MOST_BODIES: usize = 4;
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn doubts(setting: &Setting, polytopes: &Polytopes, near: &Lists, stale: &[bool], budget: &Budget) -> Result<Vec<Doubt>, Stopped> {
+pub(super) fn doubts(
+    setting: &Setting,
+    polytopes: &Polytopes,
+    near: &Lists,
+    stale: &[bool],
+    budget: &Budget,
+) -> Result<Vec<Doubt>, Stopped> {
     let nerve = Nerve { setting, polytopes };
     let of = |first: u32| {
         budget.cancel.check()?;
         let mut found = Vec::new();
         if stale[first as usize] {
             let later: Vec<u32> = near.of(first).iter().copied().filter(|&other| other > first).collect();
-            nerve.extend(&mut vec![first], &later, &mut found);
+            nerve.extend(&mut vec![first], &later, &mut found, budget)?;
         }
         Ok(found)
     };
@@ -60,7 +66,8 @@ pub(super) enum Common {
 
 impl Nerve<'_> {
     /// Looks at the simplex with each of some sites added, and at what holds it.
-    fn extend(&self, simplex: &mut Vec<u32>, later: &[u32], found: &mut Vec<Doubt>) {
+    fn extend(&self, simplex: &mut Vec<u32>, later: &[u32], found: &mut Vec<Doubt>, budget: &Budget) -> Result<(), Stopped> {
+        budget.cancel.check()?;
         for (place, &next) in later.iter().enumerate() {
             simplex.push(next);
             let (common, doubt) = self.common(simplex);
@@ -68,10 +75,11 @@ impl Nerve<'_> {
                 found.push(Doubt { sites: simplex.clone(), wanted: common });
             }
             if common != Common::None && simplex.len() < MOST_BODIES {
-                self.extend(simplex, &later[place + 1..], found);
+                self.extend(simplex, &later[place + 1..], found, budget)?;
             }
             simplex.pop();
         }
+        Ok(())
     }
 
     /// Whether the dilations have a common point, and whether it is in doubt that the polytopes have one exactly then.
@@ -151,7 +159,9 @@ fn least_value([low, high]: [Point; 2], function: impl Fn(&Point) -> (f64, Point
         let (value, slope) = function(&x);
         let image = shape.map(|row| dot(&row, &slope));
         let reach = dot(&slope, &image).max(0.0).sqrt();
-        bounds = [bounds[0].max(value - reach), bounds[1].min(value)];
+        // What was cut off is no better than the best: the least value is the best one, or in the ellipsoid.
+        bounds[1] = bounds[1].min(value);
+        bounds[0] = bounds[0].max(value - reach).min(bounds[1]);
         if enough(bounds) || reach <= f64::EPSILON * value.abs() {
             break;
         }
@@ -166,9 +176,7 @@ fn least_value([low, high]: [Point; 2], function: impl Fn(&Point) -> (f64, Point
         for axis in 0..3 {
             x[axis] -= step * image[axis] / reach;
         }
-        shape = std::array::from_fn(|p| {
-            std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach)))
-        });
+        shape = std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
     }
     bounds
 }
@@ -177,7 +185,9 @@ impl Polytope {
     /// The box of its site.
     fn site_box(&self) -> [Point; 2] {
         let ends = self.ends();
-        let end = |least: bool| std::array::from_fn(|axis| if least { ends[0][axis].min(ends[1][axis]) } else { ends[0][axis].max(ends[1][axis]) });
+        let end = |least: bool| {
+            std::array::from_fn(|axis| if least { ends[0][axis].min(ends[1][axis]) } else { ends[0][axis].max(ends[1][axis]) })
+        };
         [end(true), end(false)]
     }
 }

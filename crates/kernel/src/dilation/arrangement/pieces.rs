@@ -19,11 +19,6 @@ fn corner(corner: u32) -> Name {
     1 << 96 | Name::from(corner)
 }
 
-/// Whether a name is that of a corner.
-pub(super) fn is_corner(name: Name) -> bool {
-    name >> 96 == 1
-}
-
 /// Where an edge pierces a facet.
 fn pierced(edge: u32, facet: u32) -> Name {
     2 << 96 | Name::from(edge) << 32 | Name::from(facet)

@@ -69,7 +69,12 @@ pub(super) fn triangulate(planar: &mut Planar, flat: impl Fn(u32) -> Place, tria
 }
 
 /// The shortest way from a loop to a hole in it that crosses neither, nor another hole.
-fn bridge(own: &[Vertex], hole: &[Vertex], others: &[(f64, Vec<Vertex>)], bridges: &mut Vec<(f64, usize, usize)>) -> Option<(usize, usize)> {
+fn bridge(
+    own: &[Vertex],
+    hole: &[Vertex],
+    others: &[(f64, Vec<Vertex>)],
+    bridges: &mut Vec<(f64, usize, usize)>,
+) -> Option<(usize, usize)> {
     bridges.clear();
     for (k, p) in own.iter().enumerate() {
         bridges.extend(hole.iter().enumerate().map(|(m, q)| (distance_squared(&p.1, &q.1), k, m)));
@@ -86,7 +91,10 @@ fn bridge(own: &[Vertex], hole: &[Vertex], others: &[(f64, Vec<Vertex>)], bridge
         let is_crossed = |vertices: &[Vertex]| (0..vertices.len()).any(|at| crosses(&vertices[at], &vertices[(at + 1) % vertices.len()]));
         // A vertex that other bridges made is there twice: the way must begin in the corner that it has here.
         let (before, after) = (&own[(k + own.len() - 1) % own.len()].1, &own[(k + 1) % own.len()].1);
-        is_within_corner(before, &p.1, after, &q.1) && !is_crossed(own) && !is_crossed(hole) && !others.iter().any(|(_, other)| is_crossed(other))
+        is_within_corner(before, &p.1, after, &q.1)
+            && !is_crossed(own)
+            && !is_crossed(hole)
+            && !others.iter().any(|(_, other)| is_crossed(other))
     };
     bridges.iter().find(is_free).map(|&(_, k, m)| (k, m))
 }
@@ -143,7 +151,17 @@ mod tests {
     fn fills(loops: &[Vec<Place>]) -> bool {
         let places: Vec<Place> = loops.iter().flatten().copied().collect();
         let (mut planar, mut next) = (Planar::default(), 0);
-        planar.loops = loops.iter().map(|own| own.iter().map(|_| { next += 1; next - 1 }).collect()).collect();
+        planar.loops = loops
+            .iter()
+            .map(|own| {
+                own.iter()
+                    .map(|_| {
+                        next += 1;
+                        next - 1
+                    })
+                    .collect()
+            })
+            .collect();
         let mut triangles = Vec::new();
         let loops = planar.loops.clone();
         if !triangulate(&mut planar, |vertex| places[vertex as usize], &mut triangles) {
