@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn forms_lie_between_the_balls_and_hold_to_eulers_formula() {
-        for (most, facets) in [(1.9, 8), (1.22, 24), (1.1, 60), (1.05, 110), (1.02, 320), (1.016, 512)] {
+        for (most, facets) in [(1.9, 8), (1.22, 24), (1.1, 60), (1.05, 110), (1.02, 320)] {
             let Some(form) = Form::within(most) else { panic!("{most}") };
             assert!(form.reach <= most * (1.0 + 1e-6) && form.normals.len() <= facets, "{most}: {} facets", form.normals.len());
             assert!(form.shortest > 1e-3, "{most}: {}", form.shortest);

@@ -15,18 +15,20 @@ mod triangulate;
 use super::plan::Setting;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
-use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points};
+use crate::attractor::cell::{Cell, ControlPoint, Site, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
-use crate::solid::box_tree::Box32;
 use form::Form;
 use nerve::Common;
 use pieces::{Lists, Neighbours};
 use polytopes::{MOST_POLYTOPES, Polytope, Polytopes, Shell};
 
-/// The mean of the third powers of the numbers of neighbours, at most: the nerve costs that much. Where sites have more neighbours, most of their polytopes' facets are hidden, and the lattice, which
-/// does not tell sites apart, costs less.
-const MOST_NEAR: usize = 2_500;
+/// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at all
+/// sets. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
+const MOST_NEAR: [usize; 2] = [5_000, 200];
+/// Doubts that polytopes may leave, as a share of the sites, and in any case: more of them are no matter of a few places, and finer polytopes everywhere cost more than a lattice.
+const MOST_DOUBTS: f64 = 0.5;
+const FEW_DOUBTS: f64 = 16.0;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
 /// Levels at most.
@@ -71,8 +73,7 @@ impl<'a> Arrangement<'a> {
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
-        let boxes: Vec<Box32> = sites.list.iter().map(|site| reached(setting, site)).collect();
-        let near = pieces::near(&boxes, MOST_NEAR.saturating_mul(boxes.len()), budget)?;
+        let near = pieces::near(setting, &sites.list, MOST_NEAR, budget)?;
         let Some(mut arrangement) = near.map(|near| Self { setting, sites, near, triangles: 0.0 }) else { return Ok(None) };
         arrangement.triangles = arrangement.expected_triangles();
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
@@ -105,10 +106,14 @@ impl<'a> Arrangement<'a> {
     /// [`Stopped`].
     pub(super) fn run(&self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
         for trial in 0..TRIALS {
-            if let Some(mut arranged) = self.engine(trial).run(budget)? {
-                arranged.surface.leaves = self.sites.leaves;
-                arranged.surface.site_error = self.sites.error;
-                return Ok(Some(arranged));
+            match self.engine(trial).run(budget)? {
+                Run::Done(mut arranged) => {
+                    arranged.surface.leaves = self.sites.leaves;
+                    arranged.surface.site_error = self.sites.error;
+                    return Ok(Some(*arranged));
+                }
+                Run::Open => {}
+                Run::Doubtful => break,
             }
         }
         Ok(None)
@@ -167,17 +172,6 @@ impl Sites {
     }
 }
 
-/// The box around a site that points of the band may be in.
-fn reached(setting: &Setting, site: &Weighted) -> Box32 {
-    let ends: &[Point] = match &site.site {
-        Site::Point(a) => std::slice::from_ref(a),
-        Site::Segment(ends) => ends,
-        Site::Triangle(corners) => corners,
-    };
-    let reach = site.in_space(setting.outer) + setting.slack;
-    Box32::of(&ends.iter().flat_map(|end| [-reach, reach].map(|by| end.map(|x| x + by))).collect::<Vec<Point>>())
-}
-
 /// Sites whose polytopes were not shown to have a common point exactly where the dilations have, and whether these have.
 #[derive(Clone, Debug)]
 struct Doubt {
@@ -209,6 +203,15 @@ impl State {
     }
 }
 
+/// What a trial came to.
+enum Run {
+    Done(Box<Arranged>),
+    /// The boundary is not closed.
+    Open,
+    /// The topology is in doubt at too many places.
+    Doubtful,
+}
+
 struct Engine<'a> {
     setting: &'a Setting,
     sites: &'a [Weighted],
@@ -219,9 +222,9 @@ struct Engine<'a> {
 }
 
 impl Engine<'_> {
-    fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+    fn run(&mut self, budget: &Budget) -> Result<Run, Stopped> {
         if !self.begin() {
-            return Ok(None);
+            return Ok(Run::Open);
         }
         let (mut neighbours, mut doubts) = (Neighbours::default(), Vec::<Doubt>::new());
         let mut changed = vec![true; self.sites.len()];
@@ -229,11 +232,14 @@ impl Engine<'_> {
             let stale = neighbours.update(&self.polytopes, self.near, &changed, budget)?;
             doubts.retain(|doubt| !stale[doubt.sites[0] as usize]);
             doubts.extend(nerve::doubts(self.setting, &self.polytopes, self.near, &stale, budget)?);
+            if doubts.len() as f64 > (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) {
+                return Ok(Run::Doubtful);
+            }
             changed = self.refine(&doubts);
         }
-        let Some(boundary) = facets::boundary(&self.polytopes, &neighbours.pieces, budget)? else { return Ok(None) };
+        let Some(boundary) = facets::boundary(&self.polytopes, &neighbours.pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
-        Ok(Some(Arranged { surface, uncertain: doubts.len() as u64 }))
+        Ok(Run::Done(Box::new(Arranged { surface, uncertain: doubts.len() as u64 })))
     }
 
     /// Makes the first polytopes; whether there are such.

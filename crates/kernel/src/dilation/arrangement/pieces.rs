@@ -5,8 +5,10 @@
 //! line it is found on, and ends with one name are one vertex. So the union's boundary is closed if every comparison of heights has one outcome only, which is checked by what comes out: see `facets`.
 
 use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
-use crate::attractor::cell::{Point, between, cross, dot, subtract};
+use crate::attractor::cell::{Point, Site, between, cross, dot, subtract};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::plan::Setting;
+use crate::dilation::tree::Weighted;
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -55,32 +57,105 @@ impl Lists {
     }
 }
 
-/// Of every site, those that a point may be near to as well: their boxes meet. `None` where the third powers of their numbers sum up to more than `most`.
+/// Of every site, those that a point of the band may be near to as well. `None` where that is too much for an arrangement: the squares of the numbers of neighbours, or the sets of up to four sites
+/// that are near to each other, are more than `most` on average. Where there are few sites, more are allowed.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn near(boxes: &[Box32], most: usize, budget: &Budget) -> Result<Option<Lists>, Stopped> {
+pub(super) fn near(setting: &Setting, sites: &[Weighted], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
+    let reach = |site: &Weighted| site.in_space(setting.outer) + setting.slack;
+    let boxes: Vec<Box32> = sites
+        .iter()
+        .map(|site| {
+            let reach = reach(site);
+            Box32::of(&ends(&site.site).iter().flat_map(|end| [-reach, reach].map(|by| end.map(|x| x + by))).collect::<Vec<Point>>())
+        })
+        .collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
+    let [squares, sets] = most.map(|most| most.saturating_mul(sites.len() + FEW));
     let total = AtomicUsize::new(0);
     let of = |index: u32| {
         budget.cancel.check()?;
         let (own, mut found) = (&boxes[index as usize], Vec::new());
-        if total.load(Ordering::Relaxed) > most {
+        if total.load(Ordering::Relaxed) > squares {
             return Ok(found);
         }
+        let site = &sites[index as usize];
         tree.query(own, 0, |leaf| {
-            let items = tree.items(leaf).iter().zip(tree.boxes(leaf));
-            found.extend(items.filter(|&(&item, other)| item != index && own.meets(other)).map(|(&item, _)| item));
-            found.len().pow(3) <= most
+            for (&item, other) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
+                let theirs = &sites[item as usize];
+                if item != index && own.meets(other) && !are_apart(&site.site, &theirs.site, reach(site) + reach(theirs)) {
+                    found.push(item);
+                }
+            }
+            found.len() * found.len() <= squares
         });
-        total.fetch_add(found.len().pow(3), Ordering::Relaxed);
+        total.fetch_add(found.len() * found.len(), Ordering::Relaxed);
         found.sort_unstable();
         Ok(found)
     };
-    let lists = (0..boxes.len() as u32).into_par_iter().map(of).collect::<Result<_, Stopped>>()?;
-    Ok((total.into_inner() <= most).then_some(Lists(lists)))
+    let lists = Lists((0..boxes.len() as u32).into_par_iter().map(of).collect::<Result<_, Stopped>>()?);
+    if total.into_inner() > squares {
+        return Ok(None);
+    }
+    let total = AtomicUsize::new(0);
+    (0..boxes.len() as u32).into_par_iter().try_for_each(|index| {
+        budget.cancel.check()?;
+        let later: Vec<u32> = lists.of(index).iter().copied().filter(|&other| other > index).collect();
+        let mut count = 0;
+        for &second in &later {
+            let common =
+                |of: &[u32]| of.iter().copied().filter(|other| *other > second && lists.of(second).binary_search(other).is_ok()).collect();
+            let thirds: Vec<u32> = common(&later);
+            count += 1 + thirds.len();
+            for (place, &third) in thirds.iter().enumerate() {
+                count += thirds[place + 1..].iter().filter(|fourth| lists.of(third).binary_search(fourth).is_ok()).count();
+            }
+            if total.load(Ordering::Relaxed) + count > sets {
+                break;
+            }
+        }
+        total.fetch_add(count, Ordering::Relaxed);
+        Ok(())
+    })?;
+    Ok((total.into_inner() <= sets).then_some(lists))
 }
+
+/// The corners of a site.
+fn ends(site: &Site) -> &[Point] {
+    match site {
+        Site::Point(a) => std::slice::from_ref(a),
+        Site::Segment(ends) => ends,
+        Site::Triangle(corners) => corners,
+    }
+}
+
+/// Whether a plane shows that sites are farther from each other than a distance. Alternating projections converge to a closest pair, and the plane across it parts them best.
+fn are_apart(one: &Site, other: &Site, distance: f64) -> bool {
+    let mut x = ends(one)[0];
+    for _ in 0..MOST_PROJECTIONS {
+        let y = other.closest(&x);
+        x = one.closest(&y);
+        let across = subtract(&x, &y);
+        let least = |site: &Site, w: &Point| ends(site).iter().map(|end| dot(end, w)).fold(f64::INFINITY, f64::min);
+        let gap = least(one, &across) + least(other, &across.map(|part| -part));
+        let length = dot(&across, &across).sqrt();
+        if gap > distance * length {
+            return true;
+        }
+        if length <= distance {
+            return false;
+        }
+    }
+    false
+}
+
+/// See [`are_apart`].
+const MOST_PROJECTIONS: usize = 8;
+
+/// So many sites more are counted for the averages: where there are few, it does not matter.
+const FEW: usize = 40;
 
 /// What is known of the polytopes' neighbours, and of their parts in the union's edges. It stays where polytopes near are what they were.
 #[derive(Debug, Default)]

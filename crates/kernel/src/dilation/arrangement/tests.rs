@@ -35,10 +35,14 @@ fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
     Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
 }
 
-fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
     let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
     let setting = plan.setting(plan.pitch(), &budget);
-    plan.arranged(&setting, &plan.space(&setting), &budget).unwrap().expect("there are few sites near each other")
+    plan.arranged(&setting, &plan.space(&setting), &budget).unwrap()
+}
+
+fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+    arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
 }
 
 fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
@@ -85,7 +89,7 @@ fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, s
 #[test]
 fn unions_keep_their_bounds_and_agree_with_the_lattice() {
     let mut random = Random(7);
-    let (mut compared, mut uncertain) = (0, 0);
+    let (mut left, mut compared, mut uncertain) = (0, 0, 0);
     for round in 0..60 {
         let (size, count) = (30.0, 4 + round % 24);
         let segments: Vec<[DVec3; 2]> = match round % 4 {
@@ -119,7 +123,10 @@ fn unions_keep_their_bounds_and_agree_with_the_lattice() {
         let shape = if round % 4 == 0 { points(&segments.iter().map(|[a, _]| *a).collect::<Vec<_>>()) } else { wires(&segments) };
         let (radius, tolerance) = ([1.0, 1.9, 2.3][round % 3], [0.1, 0.03][round / 4 % 2]);
         let radius = if round % 4 == 2 { 1.3 } else { radius };
-        let dilation = arranged(&shape, radius, tolerance);
+        let Some(dilation) = arranged_unless_left(&shape, radius, tolerance) else {
+            left += 1;
+            continue;
+        };
         assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
         keeps_its_bounds(&dilation, &segments, radius, size, &mut random);
         let other = on_lattice(&shape, radius, tolerance);
@@ -129,7 +136,7 @@ fn unions_keep_their_bounds_and_agree_with_the_lattice() {
             assert_eq!(topology(&dilation), topology(&other), "{round}");
         }
     }
-    assert!(compared > 45 && uncertain < 6, "{compared} compared, {uncertain} uncertain");
+    assert!(compared > 45 && uncertain < 6 && left < 6, "{compared} compared, {uncertain} uncertain, {left} left to the lattice");
 }
 
 /// Handles of a net of wires: edges less vertices, and one.
