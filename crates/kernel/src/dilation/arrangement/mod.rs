@@ -75,7 +75,7 @@ impl<'a> Arrangement<'a> {
         let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
         let near = pieces::near(setting, &sites.list, MOST_NEAR, budget)?;
         let Some(mut arrangement) = near.map(|near| Self { setting, sites, near, triangles: 0.0 }) else { return Ok(None) };
-        arrangement.triangles = arrangement.expected_triangles();
+        arrangement.triangles = arrangement.expected_triangles(budget)?;
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
     }
@@ -88,16 +88,19 @@ impl<'a> Arrangement<'a> {
     /// About how many triangles will be made, from a sample of the polytopes; infinitely many where there is no polytope.
     ///
     /// As all vertices have three edges, there are twice as many triangles as vertices, and pieces three times as many: an edge has one on both its facets.
-    fn expected_triangles(&self) -> f64 {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn expected_triangles(&self, budget: &Budget) -> Result<f64, Stopped> {
         let mut engine = self.engine(0);
-        if !engine.begin() {
-            return f64::INFINITY;
+        if !engine.begin(budget)? {
+            return Ok(f64::INFINITY);
         }
         let count = self.sites.list.len();
         let step = count.div_ceil(SAMPLE).max(1);
         let sample: Vec<u32> = (0..count as u32).step_by(step).collect();
         let pieces = pieces::count(&engine.polytopes, &self.near, &sample);
-        pieces as f64 / 1.5 * count as f64 / sample.len() as f64
+        Ok(pieces as f64 / 1.5 * count as f64 / sample.len() as f64)
     }
 
     /// The boundary of the union of polytopes; `None` where none could be found.
@@ -126,8 +129,8 @@ impl<'a> Arrangement<'a> {
     }
 }
 
-/// Triangles of a polytope at least.
-const LEAST_TRIANGLES: f64 = 12.0;
+/// Triangles of a polytope that nothing is near to: with more sites than memory has room for that many, polytopes are not even begun.
+const LEAST_TRIANGLES: f64 = 48.0;
 
 /// All sites of an attractor.
 #[derive(Default)]
@@ -223,7 +226,7 @@ struct Engine<'a> {
 
 impl Engine<'_> {
     fn run(&mut self, budget: &Budget) -> Result<Run, Stopped> {
-        if !self.begin() {
+        if !self.begin(budget)? {
             return Ok(Run::Open);
         }
         let (mut neighbours, mut doubts) = (Neighbours::default(), Vec::<Doubt>::new());
@@ -243,13 +246,13 @@ impl Engine<'_> {
     }
 
     /// Makes the first polytopes; whether there are such.
-    fn begin(&mut self) -> bool {
-        (0..self.sites.len()).all(|index| {
-            let polytope = self.polytope(index, State::default());
-            let is_there = polytope.is_some();
-            self.polytopes.all.extend(polytope);
-            is_there
-        })
+    fn begin(&mut self, budget: &Budget) -> Result<bool, Stopped> {
+        for index in 0..self.sites.len() {
+            budget.cancel.check()?;
+            let Some(polytope) = self.polytope(index, State::default()) else { return Ok(false) };
+            self.polytopes.all.push(polytope);
+        }
+        Ok(true)
     }
 
     /// The band of a site's polytope.
