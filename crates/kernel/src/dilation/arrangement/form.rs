@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Facets at most: as many as a [`super::polytopes::Mask`] has bits.
 pub(super) const MOST_FACETS: usize = 512;
 
-/// A simple polytope around the unit ball, whose facets touch it, and symmetric about the plane across its axis, z. Facets along the axis form its belt; so the sum with a
-/// segment along the axis has the same facets, edges and vertices.
+/// A simple polytope around the unit ball, whose facets touch it, and symmetric about the plane across its axis, z, unless it is cut. Facets along the axis form its belt, and come first; so the
+/// sum with a segment along the axis has the same facets, edges and vertices.
 #[derive(Debug)]
 pub(super) struct Form {
     /// Unit normals of the facets.
@@ -20,6 +20,10 @@ pub(super) struct Form {
     pub(super) reach: f64,
     /// The length of the shortest edge.
     pub(super) shortest: f64,
+    /// How far the belt's edges are from the axis.
+    pub(super) girth: f64,
+    /// The facets across the axis, at the ends where it is cut.
+    pub(super) flats: [Option<u16>; 2],
 }
 
 /// A vertex.
@@ -92,18 +96,7 @@ impl Form {
                 }
             }
         }
-        let mut edges = Vec::new();
-        for (p, one) in corners.iter().enumerate() {
-            for (q, other) in corners.iter().enumerate().skip(p + 1) {
-                let mut common = one.facets.iter().copied().filter(|facet| other.facets.contains(facet));
-                let (Some(first), Some(second)) = (common.next(), common.next()) else { continue };
-                let along = subtract(&places[q], &places[p]);
-                let left = cross(&normals[usize::from(first)], &along);
-                // The facet lies to the left of its edges.
-                let facets = if dot(&left, &normals[usize::from(second)]) < 0.0 { [first, second] } else { [second, first] };
-                edges.push(Edge { corners: [p as u16, q as u16], facets });
-            }
-        }
+        let edges = edges(&normals, &corners, &places);
         // Euler's formula, for a simple polytope: nothing is missing.
         if 2 * edges.len() != 3 * corners.len() || corners.len() + count != edges.len() + 2 {
             return None;
@@ -111,8 +104,54 @@ impl Form {
         let reach = places.iter().map(|place| dot(place, place).sqrt()).fold(0.0, f64::max) * (1.0 + ROUNDING);
         let length = |edge: &Edge| distance_squared(&places[usize::from(edge.corners[0])], &places[usize::from(edge.corners[1])]).sqrt();
         let shortest = edges.iter().map(length).fold(f64::INFINITY, f64::min);
-        Some(Self { normals, ends, corners, edges, reach, shortest })
+        let girth = (PI / belt_of(&normals) as f64).cos().recip() * (1.0 + ROUNDING);
+        Some(Self { normals, ends, corners, edges, reach, shortest, girth, flats: [None; 2] })
     }
+
+    /// The same with a facet across the axis in the place of all rows at some ends.
+    pub(super) fn cut(&self, at: [bool; 2]) -> Self {
+        let belt = belt_of(&self.normals);
+        let is_kept = |&facet: &usize| facet < belt || !at[self.ends[facet]];
+        let kept: Vec<usize> = (0..self.normals.len()).filter(is_kept).collect();
+        let (mut normals, mut ends): (Vec<Point>, Vec<usize>) = kept.iter().map(|&facet| (self.normals[facet], self.ends[facet])).unzip();
+        let renamed = |facet: u16| kept.binary_search(&usize::from(facet)).map_or(u16::MAX, |place| place as u16);
+        let stays = self.corners.iter().filter(|corner| !at[corner.end]);
+        let mut corners: Vec<Corner> = stays.map(|corner| Corner { facets: corner.facets.map(renamed), end: corner.end }).collect();
+        let mut flats = [None; 2];
+        for end in (0..2).filter(|&end| at[end]) {
+            let flat = normals.len() as u16;
+            flats[end] = Some(flat);
+            normals.push([0.0, 0.0, if end == 1 { 1.0 } else { -1.0 }]);
+            ends.push(end);
+            corners.extend((0..belt).map(|place| Corner { facets: [place as u16, ((place + 1) % belt) as u16, flat], end }));
+        }
+        let place = |corner: &Corner| meeting(corner.facets.map(|facet| &normals[usize::from(facet)]), [1.0; 3]).unwrap_or_default();
+        let places: Vec<Point> = corners.iter().map(place).collect();
+        let edges = edges(&normals, &corners, &places);
+        Self { normals, ends, corners, edges, reach: self.reach, shortest: self.shortest, girth: self.girth, flats }
+    }
+}
+
+/// How many facets are in the belt: they come first.
+fn belt_of(normals: &[Point]) -> usize {
+    normals.iter().take_while(|normal| normal[2] == 0.0).count()
+}
+
+/// The edges of a simple polytope: they join corners that have two facets in common.
+fn edges(normals: &[Point], corners: &[Corner], places: &[Point]) -> Vec<Edge> {
+    let mut edges = Vec::new();
+    for (p, one) in corners.iter().enumerate() {
+        for (q, other) in corners.iter().enumerate().skip(p + 1) {
+            let mut common = one.facets.iter().copied().filter(|facet| other.facets.contains(facet));
+            let (Some(first), Some(second)) = (common.next(), common.next()) else { continue };
+            let along = subtract(&places[q], &places[p]);
+            let left = cross(&normals[usize::from(first)], &along);
+            // The facet lies to the left of its edges.
+            let facets = if dot(&left, &normals[usize::from(second)]) < 0.0 { [first, second] } else { [second, first] };
+            edges.push(Edge { corners: [p as u16, q as u16], facets });
+        }
+    }
+    edges
 }
 
 /// Normals in rows around the axis, and the ends they are at.
@@ -157,10 +196,14 @@ mod tests {
             assert!(form.reach <= most * (1.0 + 1e-6) && form.normals.len() <= facets, "{most}: {} facets", form.normals.len());
             assert!(form.shortest > 1e-3, "{most}: {}", form.shortest);
             // The belt's edges run along the axis, all others stay at their end.
-            for edge in &form.edges {
-                let ends = edge.corners.map(|corner| form.corners[usize::from(corner)].end);
-                let is_belt = edge.facets.iter().all(|&facet| form.normals[usize::from(facet)][2] == 0.0);
-                assert_eq!(ends[0] != ends[1], is_belt);
+            for form in [form.cut([true, false]), form.cut([false, true]), form.cut([true; 2]), form] {
+                assert_eq!(2 * form.edges.len(), 3 * form.corners.len());
+                assert_eq!(form.corners.len() + form.normals.len(), form.edges.len() + 2);
+                for edge in &form.edges {
+                    let ends = edge.corners.map(|corner| form.corners[usize::from(corner)].end);
+                    let is_belt = edge.facets.iter().all(|&facet| form.normals[usize::from(facet)][2] == 0.0);
+                    assert_eq!(ends[0] != ends[1], is_belt);
+                }
             }
         }
         assert!(Form::within(1.001).is_none());

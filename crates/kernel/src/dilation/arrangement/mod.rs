@@ -1,10 +1,12 @@
 //! Thickening of points and segments by the union of a polytope around each: where few sites are near to each other, the boundary is found facet by facet, without a lattice.
 //!
-//! With s < r < outer the ends of the band, site S_i has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). Its
-//! boundary consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where `nerve` shows it; where that is in doubt, polytopes are changed until it does.
+//! With s < r < outer the ends of the band, site S_i has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
+//! where all of them are cut across the end of a segment that meets others, see `joints`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
+//! `nerve` shows it; where that is in doubt, polytopes are changed until it does.
 
 mod facets;
 mod form;
+mod joints;
 mod nerve;
 mod pieces;
 mod polytopes;
@@ -21,7 +23,7 @@ use crate::budget::{Budget, Stopped};
 use form::Form;
 use nerve::Common;
 use pieces::{Lists, Neighbours};
-use polytopes::{MOST_POLYTOPES, Polytope, Polytopes, Shell};
+use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at all
 /// sets. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
@@ -125,7 +127,7 @@ impl<'a> Arrangement<'a> {
     fn engine(&self, trial: u64) -> Engine<'_> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
-        Engine { setting: self.setting, sites, near: &self.near, polytopes: Polytopes::default(), states, trial }
+        Engine { setting: self.setting, sites, near: &self.near, polytopes: Polytopes::default(), states, beyond: Vec::new(), trial }
     }
 }
 
@@ -200,9 +202,9 @@ struct State {
 }
 
 impl State {
-    /// The index of its form.
-    fn form(self) -> usize {
-        2 * self.level as usize + usize::from(self.side != Side::Both)
+    /// The index of its form, cut at some ends.
+    fn form(self, cut: [bool; 2]) -> usize {
+        4 * (2 * self.level as usize + usize::from(self.side != Side::Both)) + usize::from(cut[0]) + 2 * usize::from(cut[1])
     }
 }
 
@@ -221,6 +223,8 @@ struct Engine<'a> {
     near: &'a Lists,
     polytopes: Polytopes,
     states: Vec<State>,
+    /// How far beyond its ends a site's dilation is cut, where it is.
+    beyond: Vec<[Option<f64>; 2]>,
     trial: u64,
 }
 
@@ -247,6 +251,9 @@ impl Engine<'_> {
 
     /// Makes the first polytopes; whether there are such.
     fn begin(&mut self, budget: &Budget) -> Result<bool, Stopped> {
+        let Some(form) = self.form(State::default(), [false; 2]) else { return Ok(false) };
+        let (shape, shell) = (&self.polytopes.forms[form], |site: &Weighted| self.shell(site, State::default()));
+        self.beyond = shape.as_ref().map(|shape| joints::cuts(self.sites, shape, shell, self.trial)).unwrap_or_default();
         for index in 0..self.sites.len() {
             budget.cancel.check()?;
             let Some(polytope) = self.polytope(index, State::default()) else { return Ok(false) };
@@ -264,21 +271,32 @@ impl Engine<'_> {
         Shell { inner: inner + slack, outer: outer - slack }
     }
 
-    /// A site's polytope in a state; none where no form is fine enough.
-    fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
-        let number = state.form();
-        if number >= self.polytopes.forms.len() {
-            self.polytopes.forms.resize_with(number + 1, || None);
+    /// The index of the form for a state; none where none is fine enough.
+    fn form(&mut self, state: State, cut: [bool; 2]) -> Option<usize> {
+        let [own, whole] = [cut, [false; 2]].map(|cut| state.form(cut));
+        if own >= self.polytopes.forms.len() {
+            self.polytopes.forms.resize_with(own + 1, || None);
         }
-        if self.polytopes.forms[number].is_none() {
+        if self.polytopes.forms[whole].is_none() {
             let sides: &[Side] = if state.side == Side::Both { &[Side::Both] } else { &[Side::Within, Side::Around] };
             let shells = self.sites.iter().flat_map(|site| sides.iter().map(|&side| self.shell(site, State { side, ..state })));
-            let form = Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min));
-            self.polytopes.forms[number] = form;
+            self.polytopes.forms[whole] = Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min));
         }
+        if self.polytopes.forms[own].is_none() {
+            self.polytopes.forms[own] = self.polytopes.forms[whole].as_ref().map(|form| form.cut(cut));
+        }
+        self.polytopes.forms[own].is_some().then_some(own)
+    }
+
+    /// A site's polytope in a state; none where no form is fine enough.
+    fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
+        let (site, beyond) = (self.sites[index], self.beyond[index]);
+        let number = self.form(state, beyond.map(|beyond| beyond.is_some()))?;
         let seed = (self.trial << 8 | number as u64) << 32 | index as u64;
+        let most = self.shell(&site, State::default()).outer;
+        let cut = Cut { beyond: beyond.map(Option::unwrap_or_default), most };
         let form = self.polytopes.forms[number].as_ref()?;
-        Polytope::new(self.sites[index], form, number, self.shell(&self.sites[index], state), seed)
+        Polytope::new(site, form, number, self.shell(&site, state), cut, seed)
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

@@ -1,11 +1,12 @@
 //! Whether a union of polytopes has the topology of the dilation, by their nerves.
 //!
 //! The union of convex bodies has the homotopy type of their nerve, the simplices of which are the sets of bodies with a common point (Leray, 1945; Borsuk, "On the imbedding of systems of compacta in
-//! simplicial complexes", Fund. Math. 35, 1948). Let P_i be the polytope of site S_i and D_i its dilation by r. If sets of polytopes have a common point exactly where the sets of these sites'
-//! dilations have, both unions have as many components, handles and voids. In space sets of up to four tell (Helly, 1923).
+//! simplicial complexes", Fund. Math. 35, 1948). Let P_i be the polytope of site S_i and D_i its dilation by r, cut as `joints` says. If sets of polytopes have a common point exactly where these sites'
+//! D_i have, both unions have as many components, handles and voids. In space sets of up to four tell (Helly, 1923).
 //!
-//! How far a point is from the farthest of some sites is a convex function, and so is how high it is above the highest plane of some polytopes. Their minima are enclosed between bounds by the method of
-//! ellipsoids (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). A common point of the dilations by s, which lie in both
+//! How far a point is from the farthest of some sites is a convex function, and so is how high it is above the highest plane of some polytopes. Where dilations are cut, r and the height above the
+//! plane is a distance, too: the greatest is at most r in the same places, at least s where a ball by s is deeper below the plane than r - s, and at most the band's outer end in all of those of polytopes.
+//! Their minima are enclosed between bounds by the method of ellipsoids (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). A common point of the dilations by s, which lie in both
 //! kinds of bodies, settles most sets, and none of those by the band's outer end others.
 
 use super::Doubt;
@@ -102,22 +103,33 @@ impl Nerve<'_> {
         if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
             return (Common::None, false);
         }
-        // Steps towards the farthest site end where the farthest is nearest.
+        let highest = |x: &Point| {
+            let planes = bodies().flat_map(|body| body.cuts.iter().flatten());
+            planes.map(|plane| (height(plane, x), plane)).max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        // Steps towards the farthest site end where the farthest is nearest; where that is cut off, the way leads to the plane.
         let mut x = between(&within[0], &within[1], 0.5);
         for step in 0..STEPS {
             let far = bodies().map(|body| (body.site.distance_squared(&x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
             let Some((square, body)) = far else { return (Common::Unknown, true) };
-            if square.sqrt() + slack < least {
-                return (Common::Some, false);
+            if square.sqrt() + slack >= least {
+                x = between(&x, &body.site.closest(&x), 1.0 / (step + 2) as f64);
+                continue;
             }
-            x = between(&x, &body.site.closest(&x), 1.0 / (step + 2) as f64);
+            let Some((height, plane)) = highest(&x).filter(|(height, _)| *height > -slack) else { return (Common::Some, false) };
+            let normal = normal(plane);
+            x = std::array::from_fn(|axis| x[axis] - (height + 4.0 * slack) * normal[axis]);
         }
         let distance = |x: &Point| -> (f64, Point) {
             let far = bodies().map(|body| (body.site.distance_squared(x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
-            far.map_or((0.0, [0.0; 3]), |(square, body)| {
+            let (distance, slope) = far.map_or((0.0, [0.0; 3]), |(square, body)| {
                 let distance = square.sqrt();
                 (distance, subtract(x, &body.site.closest(x)).map(|part| part / distance.max(f64::MIN_POSITIVE)))
-            })
+            });
+            match highest(x).map(|(height, plane)| (reach + height, plane)) {
+                Some((beyond, plane)) if beyond > distance => (beyond, normal(plane)),
+                _ => (distance, slope),
+            }
         };
         let side = |bounds: [f64; 2], of: f64| {
             if bounds[1] < of - slack {

@@ -95,6 +95,8 @@ pub(super) struct Polytope {
     /// Its form, as an index of [`Polytopes::forms`].
     pub(super) form: usize,
     pub(super) planes: Box<[Plane]>,
+    /// Those that its dilation is cut by, too: see `joints`.
+    pub(super) cuts: [Option<Plane>; 2],
     pub(super) corners: Box<[Point]>,
     /// Its box.
     low: Point,
@@ -123,6 +125,22 @@ impl Shell {
     }
 }
 
+/// How far beyond its ends a polytope is cut, and how far its corners there may be from them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cut {
+    pub(super) beyond: [f64; 2],
+    pub(super) most: f64,
+}
+
+/// The ends of a site in an order that does not depend on how it is stated; both the same for a point.
+pub(super) fn ordered(site: &Site) -> [Point; 2] {
+    match *site {
+        Site::Segment([a, b]) if b.partial_cmp(&a) == Some(Ordering::Less) => [b, a],
+        Site::Segment(ends) => ends,
+        Site::Point(a) | Site::Triangle([a, ..]) => [a, a],
+    }
+}
+
 /// The share of the room between the balls that is left to shift facets.
 const SHIFT: f64 = 0.08;
 /// The share of it by which facets of one polytope differ; all of them have the rest.
@@ -134,19 +152,23 @@ impl Polytope {
     /// The polytope of a point or a segment, with a form that lies in its shell; none where facets are too small to be shifted.
     ///
     /// Facets are shifted outwards by numbers that look random, so that no four planes meet in a point but by chance: each polytope as a whole, so that facets
-    /// of neighbours which would coincide lie one above the other, and its facets against each other a little.
-    pub(super) fn new(site: Weighted, shape: &Form, form: usize, shell: Shell, seed: u64) -> Option<Self> {
-        let ends = match site.site {
-            Site::Segment([a, b]) if b.partial_cmp(&a) == Some(Ordering::Less) => [b, a],
-            Site::Segment(ends) => ends,
-            Site::Point(a) | Site::Triangle([a, ..]) => [a, a],
-        };
+    /// of neighbours which would coincide lie one above the other, and its facets against each other a little. Those where it is cut are as far beyond its ends as is said, and no
+    /// corner is farther than `most`.
+    pub(super) fn new(site: Weighted, shape: &Form, form: usize, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
+        let ends = ordered(&site.site);
         let frame = frame(&subtract(&ends[1], &ends[0]));
-        let room = (shell.outer / shape.reach - shell.inner).max(0.0);
+        let flat = |facet: usize| (0..2).find(|&end| shape.flats[end].map(usize::from) == Some(facet));
+        let mut room = (shell.outer / shape.reach - shell.inner).max(0.0);
+        for end in (0..2).filter(|&end| shape.flats[end].is_some()) {
+            room = room.min((cut.most.powi(2) - cut.beyond[end].powi(2)).max(0.0).sqrt() / shape.girth - shell.inner);
+        }
+        if room < 0.0 {
+            return None;
+        }
         let share = |index: u64| (number(seed.wrapping_mul(1024).wrapping_add(index)) >> 11) as f64 / (1_u64 << 53) as f64;
         let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(0);
         let own = (OWN_SHIFT * room).min(LEAST_EDGE * shape.shortest * shell.inner);
-        let offset = |facet: usize| all + own * share(1 + facet as u64);
+        let offset = |facet: usize| flat(facet).map_or_else(|| all + own * share(1 + facet as u64), |end| cut.beyond[end]);
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
         let plane = |(facet, (normal, &end)): (usize, (&Point, &usize))| {
             let normal = turned(normal);
@@ -165,15 +187,13 @@ impl Polytope {
         });
         let low = std::array::from_fn(|axis| corners.iter().map(|corner: &Point| corner[axis]).fold(f64::INFINITY, f64::min));
         let high = std::array::from_fn(|axis| corners.iter().map(|corner: &Point| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
-        keeps_form.then_some(Self { site, form, planes, corners, low, high })
+        let cuts = shape.flats.map(|flat| flat.map(|facet| planes[usize::from(facet)]));
+        keeps_form.then_some(Self { site, form, planes, cuts, corners, low, high })
     }
 
     /// The ends of its site, both the same for a point.
     pub(super) fn ends(&self) -> [Point; 2] {
-        match self.site.site {
-            Site::Segment(ends) => ends,
-            Site::Point(a) | Site::Triangle([a, ..]) => [a, a],
-        }
+        ordered(&self.site.site)
     }
 
     /// Whether its box meets that of two points.

@@ -1,0 +1,171 @@
+//! Where segments meet end to end, their dilations are cut: what balls around the common end add lies in that of one of them, or of all together.
+//!
+//! Let site S_i have the end B and the unit vector u_i along it, out of B. Its dilations may be cut by the half-space H_i: (x - B) . u_i <= c_i, c_i > 0, if
+//!
+//! * (one keeps) another site that ends at B, with no smaller a radius, is not cut there, or
+//! * (none does) all sites that end at B have one radius, are cut there, and c_i > m r, with m the length of some vector w in the hull of the u_j.
+//!
+//! Then D_t(S) is the union of the D_t(S_i) in H_i, for all t up to r. For let S_i be nearest to x in D_t(S), and x not in H_i. Then B is its closest point. All other sites that end at B are no nearer, and those with no
+//! smaller a radius no farther: B is their closest point, too, so that x is beyond the other end of none of them. Where one keeps, x is in what is left of its dilation. Where none does and x is in no H_j,
+//! (x - B) . u_j > m r for all of them, and for w; but (x - B) . w <= |x - B| m <= m r.
+//!
+//! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
+
+use super::form::Form;
+use super::polytopes::{Shell, ordered};
+use crate::attractor::cell::{Point, between, dot, subtract};
+use crate::dilation::tree::Weighted;
+use crate::split_mix::number;
+
+/// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
+const SHIFT: f64 = 0.04;
+/// Steps towards the shortest vector of a hull.
+const STEPS: usize = 32;
+/// The share of the room for shifts that cuts leave to facets.
+const LEAST_ROOM: f64 = 0.5;
+
+/// An end of a site.
+struct End {
+    at: Point,
+    site: u32,
+    /// Which of the two, in their order; both of a point.
+    end: Option<usize>,
+}
+
+/// How far beyond its ends, in their order, every site may be cut; none where it is not. `form` is that of the polytopes that will be cut.
+pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) -> Shell, trial: u64) -> Vec<[Option<f64>; 2]> {
+    let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
+    for (site, weighted) in (0..).zip(sites) {
+        // Zeros have two signs.
+        let [first, second] = ordered(&weighted.site).map(|at| at.map(|x| x + 0.0));
+        if first == second {
+            ends.push(End { at: first, site, end: None });
+        } else {
+            ends.extend([first, second].into_iter().enumerate().map(|(end, at)| End { at, site, end: Some(end) }));
+        }
+    }
+    let order = |a: &End, b: &End| {
+        let axes = (0..3).map(|axis| a.at[axis].total_cmp(&b.at[axis]));
+        axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then).then(a.site.cmp(&b.site))
+    };
+    ends.sort_unstable_by(order);
+    let mut cuts = vec![[None; 2]; sites.len()];
+    let mut outwards = Vec::new();
+    for joint in ends.chunk_by(|a, b| a.at == b.at).filter(|joint| joint.len() > 1) {
+        let deficit = |end: &End| sites[end.site as usize].deficit;
+        let least = joint.iter().map(deficit).fold(f64::INFINITY, f64::min);
+        let shell = shell(&sites[joint[0].site as usize]);
+        let length = if joint.iter().all(|end| end.end.is_some() && deficit(end) == least) {
+            outwards.clear();
+            outwards.extend(joint.iter().map(|end| outward(sites, end)));
+            shortest(&outwards)
+        } else {
+            f64::INFINITY
+        };
+        let band = shell.outer - shell.inner;
+        let room = shell.outer / form.reach - shell.inner;
+        let most = (shell.outer.powi(2) - (form.girth * (shell.inner + LEAST_ROOM * room)).powi(2)).max(0.0).sqrt();
+        // All radii in question are below the outer one.
+        let common = length * shell.outer + SHIFT * band;
+        let keeper = joint.iter().filter(|end| deficit(end) == least).min_by_key(|end| (end.end.is_some(), end.site)).map(|end| end.site);
+        for end in joint {
+            let Some(own) = end.end else { continue };
+            let shift = SHIFT * band * (0.5 + 0.5 * share(trial, end.site, own));
+            if common < most {
+                cuts[end.site as usize][own] = Some(length * shell.outer + shift);
+            } else if Some(end.site) != keeper {
+                cuts[end.site as usize][own] = Some(shift);
+            }
+        }
+    }
+    cuts
+}
+
+/// The unit vector along a segment, out of one of its ends.
+fn outward(sites: &[Weighted], end: &End) -> Point {
+    let ends = ordered(&sites[end.site as usize].site);
+    let own = end.end.unwrap_or_default();
+    let along = subtract(&ends[own], &ends[1 - own]);
+    let length = dot(&along, &along).sqrt();
+    along.map(|part| part / length)
+}
+
+/// The length of a vector in the hull of some, nearly the shortest: each step goes to the shortest on the way to the lowest of them (Gilbert, 1966).
+fn shortest(vectors: &[Point]) -> f64 {
+    let mut x = vectors[0];
+    for _ in 0..STEPS {
+        let lowest = vectors.iter().min_by(|a, b| dot(a, &x).total_cmp(&dot(b, &x)));
+        let Some(lowest) = lowest else { break };
+        let way = subtract(lowest, &x);
+        let square = dot(&way, &way);
+        if square == 0.0 {
+            break;
+        }
+        x = between(&x, lowest, (-dot(&x, &way) / square).clamp(0.0, 1.0));
+    }
+    dot(&x, &x).sqrt()
+}
+
+/// A number in [0, 1) that looks random.
+fn share(trial: u64, site: u32, end: usize) -> f64 {
+    let seed = (trial << 33 | u64::from(site) << 1 | end as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    (number(!seed) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attractor::cell::{Site, distance_squared};
+    use crate::split_mix::Random;
+
+    /// Balls around what joints bring together are covered by what is left of each segment's own.
+    #[test]
+    fn what_is_cut_off_is_in_others() {
+        let mut random = Random(11);
+        let (shell, mut one_keeps, mut none_does) = (Shell { inner: 0.9, outer: 1.1 }, 0, 0);
+        let form = Form::within(shell.reach()).expect("coarse enough");
+        for round in 0..400 {
+            let mut unit = || (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+            let mut vector = || -> Point { std::array::from_fn(|_| unit()) };
+            let (count, straight) = (2 + round % 5, vector());
+            let sites: Vec<Weighted> = (0..count)
+                .map(|k| {
+                    let bend = [1.0, 0.3, 0.05][round % 3];
+                    let way = match round % 4 {
+                        0 => vector(),
+                        // Nearly straight on, and across each other.
+                        1 => between(&straight.map(|x| if k % 2 == 0 { x } else { -x }), &vector(), bend),
+                        2 => std::array::from_fn(|axis| if axis == k / 2 % 3 { [3.0, -3.0][k % 2] } else { 0.0 }),
+                        _ => vector().map(|x| 0.3 * x),
+                    };
+                    let (centre, deficit) = ([5.0, -7.0, 2.0], if round % 7 == 6 { 0.2 * k as f64 } else { 0.0 });
+                    let end = std::array::from_fn(|axis| centre[axis] + way[axis]);
+                    Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }
+                })
+                .collect();
+            let cuts = cuts(&sites, &form, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) }, 3);
+            let centre = [5.0, -7.0, 2.0];
+            let joint = |k: usize| ordered(&sites[k].site).iter().position(|end| *end == centre).expect("all end there");
+            let cut = (0..count).filter(|&k| cuts[k][joint(k)].is_some()).count();
+            // One of six is a point.
+            assert!(cut + 1 + count / 6 >= count, "{round}");
+            one_keeps += usize::from(cut < count);
+            none_does += usize::from(cut == count);
+            for _ in 0..300 {
+                let x: Point = std::array::from_fn(|axis| centre[axis] + 1.5 * unit());
+                let nearest = sites.iter().map(|site| site.distance_squared(&x)).fold(f64::INFINITY, f64::min).sqrt();
+                let holds = |(weighted, cuts): (&Weighted, &[Option<f64>; 2])| {
+                    let ends = ordered(&weighted.site);
+                    let length = distance_squared(&ends[0], &ends[1]).sqrt();
+                    weighted.distance_squared(&x).sqrt() <= nearest * (1.0 + 1e-12)
+                        && (0..2).all(|end| {
+                            let along = subtract(&ends[end], &ends[1 - end]);
+                            cuts[end].is_none_or(|most| dot(&subtract(&x, &ends[end]), &along) <= most * length)
+                        })
+                };
+                assert!(nearest > 1.1 || sites.iter().zip(&cuts).any(holds), "{round}: {x:?}");
+            }
+        }
+        assert!(one_keeps > 100 && none_does > 100, "{one_keeps} {none_does}");
+    }
+}
