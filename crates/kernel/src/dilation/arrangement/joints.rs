@@ -12,10 +12,10 @@
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
 use super::form::Form;
-use super::polytopes::{Shell, ordered};
+use super::polytopes::{Plane, Shell, ordered};
 use crate::attractor::cell::{Point, between, dot, subtract};
 use crate::dilation::tree::Weighted;
-use crate::split_mix::number;
+use crate::split_mix::{STEP, number};
 
 /// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
 const SHIFT: f64 = 0.04;
@@ -33,7 +33,7 @@ struct End {
 }
 
 /// How far beyond its ends, in their order, every site may be cut; none where it is not. `form` is that of the polytopes that will be cut.
-pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) -> Shell, trial: u64) -> Vec<[Option<f64>; 2]> {
+pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) -> Shell) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
     for (site, weighted) in (0..).zip(sites) {
         // Zeros have two signs.
@@ -70,7 +70,7 @@ pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) ->
         let keeper = joint.iter().filter(|end| deficit(end) == least).min_by_key(|end| (end.end.is_some(), end.site)).map(|end| end.site);
         for end in joint {
             let Some(own) = end.end else { continue };
-            let shift = SHIFT * band * (0.5 + 0.5 * share(trial, end.site, own));
+            let shift = SHIFT * band * (0.5 + 0.5 * share(end.site, own));
             if common < most {
                 cuts[end.site as usize][own] = Some(length * shell.outer + shift);
             } else if Some(end.site) != keeper {
@@ -81,13 +81,25 @@ pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) ->
     cuts
 }
 
+/// The planes that a site's dilations are cut by.
+pub(super) fn planes(site: &Weighted, beyond: [Option<f64>; 2]) -> [Option<Plane>; 2] {
+    let ends = ordered(&site.site);
+    std::array::from_fn(|end| {
+        let along = unit(&subtract(&ends[end], &ends[1 - end]));
+        beyond[end].map(|beyond| [along[0], along[1], along[2], dot(&along, &ends[end]) + beyond])
+    })
+}
+
 /// The unit vector along a segment, out of one of its ends.
 fn outward(sites: &[Weighted], end: &End) -> Point {
     let ends = ordered(&sites[end.site as usize].site);
     let own = end.end.unwrap_or_default();
-    let along = subtract(&ends[own], &ends[1 - own]);
-    let length = dot(&along, &along).sqrt();
-    along.map(|part| part / length)
+    unit(&subtract(&ends[own], &ends[1 - own]))
+}
+
+fn unit(vector: &Point) -> Point {
+    let length = dot(vector, vector).sqrt();
+    vector.map(|part| part / length)
 }
 
 /// The length of a vector in the hull of some, nearly the shortest: each step goes to the shortest on the way to the lowest of them (Gilbert, 1966).
@@ -107,9 +119,8 @@ fn shortest(vectors: &[Point]) -> f64 {
 }
 
 /// A number in [0, 1) that looks random.
-fn share(trial: u64, site: u32, end: usize) -> f64 {
-    let seed = (trial << 33 | u64::from(site) << 1 | end as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    (number(!seed) >> 11) as f64 / (1_u64 << 53) as f64
+fn share(site: u32, end: usize) -> f64 {
+    (number(!(u64::from(site) << 1 | end as u64).wrapping_mul(STEP)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]
@@ -143,7 +154,7 @@ mod tests {
                     Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }
                 })
                 .collect();
-            let cuts = cuts(&sites, &form, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) }, 3);
+            let cuts = cuts(&sites, &form, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) });
             let centre = [5.0, -7.0, 2.0];
             let joint = |k: usize| ordered(&sites[k].site).iter().position(|end| *end == centre).expect("all end there");
             let cut = (0..count).filter(|&k| cuts[k][joint(k)].is_some()).count();

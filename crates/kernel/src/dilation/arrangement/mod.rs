@@ -22,14 +22,14 @@ use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
 use form::Form;
 use nerve::Common;
-use pieces::{Lists, Neighbours};
+use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at all
 /// sets. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
 const MOST_NEAR: [usize; 2] = [5_000, 200];
 /// Doubts that polytopes may leave, as a share of the sites, and in any case: more of them are no matter of a few places, and finer polytopes everywhere cost more than a lattice.
-const MOST_DOUBTS: f64 = 0.5;
+const MOST_DOUBTS: f64 = 0.2;
 const FEW_DOUBTS: f64 = 16.0;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
@@ -47,6 +47,8 @@ pub(super) const BYTES_PER_TRIANGLE: f64 = 600.0;
 pub(super) struct Arrangement<'a> {
     setting: &'a Setting,
     sites: Sites,
+    /// How far beyond its ends each of them is cut.
+    beyond: Vec<[Option<f64>; 2]>,
     near: Lists,
     /// About how many triangles will be made.
     pub(super) triangles: f64,
@@ -75,8 +77,18 @@ impl<'a> Arrangement<'a> {
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
-        let near = pieces::near(setting, &sites.list, MOST_NEAR, budget)?;
-        let Some(mut arrangement) = near.map(|near| Self { setting, sites, near, triangles: 0.0 }) else { return Ok(None) };
+        let shell = |site: &Weighted| setting.shell(site, State::default());
+        let Some(form) = setting.form(&sites.list, State::default()) else { return Ok(None) };
+        let beyond = joints::cuts(&sites.list, &form, shell);
+        let body = |(weighted, &beyond): (&Weighted, &[Option<f64>; 2])| Body {
+            site: weighted.site,
+            reach: weighted.in_space(setting.outer) + setting.slack,
+            cuts: joints::planes(weighted, beyond),
+        };
+        let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
+        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
+        drop(bodies);
+        let mut arrangement = Self { setting, sites, beyond, near, triangles: 0.0 };
         arrangement.triangles = arrangement.expected_triangles(budget)?;
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
@@ -127,7 +139,7 @@ impl<'a> Arrangement<'a> {
     fn engine(&self, trial: u64) -> Engine<'_> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
-        Engine { setting: self.setting, sites, near: &self.near, polytopes: Polytopes::default(), states, beyond: Vec::new(), trial }
+        Engine { setting: self.setting, sites, beyond: &self.beyond, near: &self.near, polytopes: Polytopes::default(), states, trial }
     }
 }
 
@@ -208,6 +220,24 @@ impl State {
     }
 }
 
+impl Setting {
+    /// The band of a site's polytope.
+    fn shell(&self, site: &Weighted, state: State) -> Shell {
+        let [inner, radius, outer] = [self.least, self.reach, self.outer].map(|distance| site.in_space(distance));
+        let share = FINER.powi(-(state.level as i32));
+        let inner = if state.side == Side::Around { radius } else { radius - share * (radius - inner) };
+        let outer = if state.side == Side::Within { radius } else { radius + share * (outer - radius) };
+        Shell { inner: inner + self.slack, outer: outer - self.slack }
+    }
+
+    /// The form of polytopes for a state, which keep to one side, whichever, or to both; none where none is fine enough.
+    fn form(&self, sites: &[Weighted], state: State) -> Option<Form> {
+        let sides: &[Side] = if state.side == Side::Both { &[Side::Both] } else { &[Side::Within, Side::Around] };
+        let shells = sites.iter().flat_map(|site| sides.iter().map(|&side| self.shell(site, State { side, ..state })));
+        Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min))
+    }
+}
+
 /// What a trial came to.
 enum Run {
     Done(Box<Arranged>),
@@ -220,11 +250,10 @@ enum Run {
 struct Engine<'a> {
     setting: &'a Setting,
     sites: &'a [Weighted],
+    beyond: &'a [[Option<f64>; 2]],
     near: &'a Lists,
     polytopes: Polytopes,
     states: Vec<State>,
-    /// How far beyond its ends a site's dilation is cut, where it is.
-    beyond: Vec<[Option<f64>; 2]>,
     trial: u64,
 }
 
@@ -233,42 +262,31 @@ impl Engine<'_> {
         if !self.begin(budget)? {
             return Ok(Run::Open);
         }
-        let (mut neighbours, mut doubts) = (Neighbours::default(), Vec::<Doubt>::new());
-        let mut changed = vec![true; self.sites.len()];
+        let (mut changed, mut doubts) = (vec![true; self.sites.len()], Vec::<Doubt>::new());
+        let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
         while changed.contains(&true) {
-            let stale = neighbours.update(&self.polytopes, self.near, &changed, budget)?;
+            let stale = self.near.around(&changed);
             doubts.retain(|doubt| !stale[doubt.sites[0] as usize]);
-            doubts.extend(nerve::doubts(self.setting, &self.polytopes, self.near, &stale, budget)?);
-            if doubts.len() as f64 > (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) {
-                return Ok(Run::Doubtful);
-            }
+            let more = most.saturating_sub(doubts.len());
+            let found = nerve::doubts(self.setting, &self.polytopes, self.near, &stale, more, budget)?;
+            let Some(found) = found else { return Ok(Run::Doubtful) };
+            doubts.extend(found);
             changed = self.refine(&doubts);
         }
-        let Some(boundary) = facets::boundary(&self.polytopes, &neighbours.pieces, budget)? else { return Ok(Run::Open) };
+        let pieces = pieces::find(&self.polytopes, self.near, budget)?;
+        let Some(boundary) = facets::boundary(&self.polytopes, &pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
         Ok(Run::Done(Box::new(Arranged { surface, uncertain: doubts.len() as u64 })))
     }
 
     /// Makes the first polytopes; whether there are such.
     fn begin(&mut self, budget: &Budget) -> Result<bool, Stopped> {
-        let Some(form) = self.form(State::default(), [false; 2]) else { return Ok(false) };
-        let (shape, shell) = (&self.polytopes.forms[form], |site: &Weighted| self.shell(site, State::default()));
-        self.beyond = shape.as_ref().map(|shape| joints::cuts(self.sites, shape, shell, self.trial)).unwrap_or_default();
         for index in 0..self.sites.len() {
             budget.cancel.check()?;
             let Some(polytope) = self.polytope(index, State::default()) else { return Ok(false) };
             self.polytopes.all.push(polytope);
         }
         Ok(true)
-    }
-
-    /// The band of a site's polytope.
-    fn shell(&self, site: &Weighted, state: State) -> Shell {
-        let [inner, radius, outer] = [self.setting.least, self.setting.reach, self.setting.outer].map(|distance| site.in_space(distance));
-        let (share, slack) = (FINER.powi(-(state.level as i32)), self.setting.slack);
-        let inner = if state.side == Side::Around { radius } else { radius - share * (radius - inner) };
-        let outer = if state.side == Side::Within { radius } else { radius + share * (outer - radius) };
-        Shell { inner: inner + slack, outer: outer - slack }
     }
 
     /// The index of the form for a state; none where none is fine enough.
@@ -278,9 +296,7 @@ impl Engine<'_> {
             self.polytopes.forms.resize_with(own + 1, || None);
         }
         if self.polytopes.forms[whole].is_none() {
-            let sides: &[Side] = if state.side == Side::Both { &[Side::Both] } else { &[Side::Within, Side::Around] };
-            let shells = self.sites.iter().flat_map(|site| sides.iter().map(|&side| self.shell(site, State { side, ..state })));
-            self.polytopes.forms[whole] = Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min));
+            self.polytopes.forms[whole] = self.setting.form(self.sites, state);
         }
         if self.polytopes.forms[own].is_none() {
             self.polytopes.forms[own] = self.polytopes.forms[whole].as_ref().map(|form| form.cut(cut));
@@ -293,10 +309,10 @@ impl Engine<'_> {
         let (site, beyond) = (self.sites[index], self.beyond[index]);
         let number = self.form(state, beyond.map(|beyond| beyond.is_some()))?;
         let seed = (self.trial << 8 | number as u64) << 32 | index as u64;
-        let most = self.shell(&site, State::default()).outer;
+        let most = self.setting.shell(&site, State::default()).outer;
         let cut = Cut { beyond: beyond.map(Option::unwrap_or_default), most };
         let form = self.polytopes.forms[number].as_ref()?;
-        Polytope::new(site, form, number, self.shell(&site, state), cut, seed)
+        Polytope::new(site, form, number, self.setting.shell(&site, state), cut, seed)
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

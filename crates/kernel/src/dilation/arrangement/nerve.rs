@@ -27,7 +27,10 @@ const STEPS: usize = 12;
 /// Bodies of a simplex at most.
 const MOST_BODIES: usize = 4;
 
-/// The sets of sites whose polytopes were not shown to have a common point exactly where the dilations have: those whose first site is `stale`.
+/// Sites that are looked at before doubts are counted.
+const AT_A_TIME: usize = 16;
+
+/// The sets of sites whose polytopes were not shown to have a common point exactly where the dilations have: those whose first site is `stale`. `None` where there are more than `most`.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -36,20 +39,26 @@ pub(super) fn doubts(
     polytopes: &Polytopes,
     near: &Lists,
     stale: &[bool],
+    most: usize,
     budget: &Budget,
-) -> Result<Vec<Doubt>, Stopped> {
+) -> Result<Option<Vec<Doubt>>, Stopped> {
     let nerve = Nerve { setting, polytopes };
     let of = |first: u32| {
         budget.cancel.check()?;
         let mut found = Vec::new();
-        if stale[first as usize] {
-            let later: Vec<u32> = near.of(first).iter().copied().filter(|&other| other > first).collect();
-            nerve.extend(&mut vec![first], &later, &mut found, budget)?;
-        }
+        let later: Vec<u32> = near.of(first).iter().copied().filter(|&other| other > first).collect();
+        nerve.extend(&mut vec![first], &later, &mut found, budget)?;
         Ok(found)
     };
-    let found: Vec<Vec<Doubt>> = (0..polytopes.count()).into_par_iter().map(of).collect::<Result<_, Stopped>>()?;
-    Ok(found.into_iter().flatten().collect())
+    let (sites, mut doubts): (Vec<u32>, Vec<Doubt>) = ((0..polytopes.count()).filter(|&site| stale[site as usize]).collect(), Vec::new());
+    for some in sites.chunks(AT_A_TIME) {
+        let found: Vec<Vec<Doubt>> = some.par_iter().map(|&site| of(site)).collect::<Result<_, Stopped>>()?;
+        doubts.extend(found.into_iter().flatten());
+        if doubts.len() > most {
+            return Ok(None);
+        }
+    }
+    Ok(Some(doubts))
 }
 
 struct Nerve<'a> {

@@ -7,8 +7,6 @@
 use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
 use crate::attractor::cell::{Point, Site, between, cross, dot, subtract};
 use crate::budget::{Budget, Stopped};
-use crate::dilation::plan::Setting;
-use crate::dilation::tree::Weighted;
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -55,25 +53,33 @@ impl Lists {
     pub(super) fn of(&self, index: u32) -> &[u32] {
         &self.0[index as usize]
     }
+
+    /// Which polytopes are some of them, or near to one.
+    pub(super) fn around(&self, some: &[bool]) -> Vec<bool> {
+        self.0.iter().zip(some).map(|(near, &own)| own || near.iter().any(|&other| some[other as usize])).collect()
+    }
 }
 
-/// Of every site, those that a point of the band may be near to as well. `None` where that is too much for an arrangement: the squares of the numbers of neighbours, or the sets of up to four sites
+/// A site, how far its dilation reaches, and the planes that this is cut by.
+pub(super) struct Body {
+    pub(super) site: Site,
+    pub(super) reach: f64,
+    pub(super) cuts: [Option<Plane>; 2],
+}
+
+/// Of every site, those whose dilations may meet its own. `None` where that is too much for an arrangement: the squares of the numbers of neighbours, or the sets of up to four sites
 /// that are near to each other, are more than `most` on average. Where there are few sites, more are allowed.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn near(setting: &Setting, sites: &[Weighted], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
-    let reach = |site: &Weighted| site.in_space(setting.outer) + setting.slack;
-    let boxes: Vec<Box32> = sites
-        .iter()
-        .map(|site| {
-            let reach = reach(site);
-            Box32::of(&ends(&site.site).iter().flat_map(|end| [-reach, reach].map(|by| end.map(|x| x + by))).collect::<Vec<Point>>())
-        })
-        .collect();
+pub(super) fn near(bodies: &[Body], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
+    let grown = |body: &Body| {
+        ends(&body.site).iter().flat_map(|end| [-body.reach, body.reach].map(|by| end.map(|x| x + by))).collect::<Vec<Point>>()
+    };
+    let boxes: Vec<Box32> = bodies.iter().map(|body| Box32::of(&grown(body))).collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
-    let [squares, sets] = most.map(|most| most.saturating_mul(sites.len() + FEW));
+    let [squares, sets] = most.map(|most| most.saturating_mul(bodies.len() + FEW));
     let total = AtomicUsize::new(0);
     let of = |index: u32| {
         budget.cancel.check()?;
@@ -81,11 +87,11 @@ pub(super) fn near(setting: &Setting, sites: &[Weighted], most: [usize; 2], budg
         if total.load(Ordering::Relaxed) > squares {
             return Ok(found);
         }
-        let site = &sites[index as usize];
+        let body = &bodies[index as usize];
         tree.query(own, 0, |leaf| {
             for (&item, other) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
-                let theirs = &sites[item as usize];
-                if item != index && own.meets(other) && !are_apart(&site.site, &theirs.site, reach(site) + reach(theirs)) {
+                let theirs = &bodies[item as usize];
+                if item != index && own.meets(other) && !body.is_apart(theirs) {
                     found.push(item);
                 }
             }
@@ -131,6 +137,16 @@ fn ends(site: &Site) -> &[Point] {
     }
 }
 
+impl Body {
+    /// Whether it surely does not meet another: one is beyond a plane that the other is cut by, or the sites are too far from each other.
+    fn is_apart(&self, other: &Self) -> bool {
+        let is_cut_off = |by: &Self, body: &Self| {
+            by.cuts.iter().flatten().any(|plane| ends(&body.site).iter().all(|end| height(plane, end) > body.reach))
+        };
+        is_cut_off(self, other) || is_cut_off(other, self) || are_apart(&self.site, &other.site, self.reach + other.reach)
+    }
+}
+
 /// Whether a plane shows that sites are farther from each other than a distance. Alternating projections converge to a closest pair, and the plane across it parts them best.
 fn are_apart(one: &Site, other: &Site, distance: f64) -> bool {
     let mut x = ends(one)[0];
@@ -157,74 +173,45 @@ const MOST_PROJECTIONS: usize = 8;
 /// So many sites more are counted for the averages: where there are few, it does not matter.
 const FEW: usize = 40;
 
-/// What is known of the polytopes' neighbours, and of their parts in the union's edges. It stays where polytopes near are what they were.
-#[derive(Debug, Default)]
-pub(super) struct Neighbours {
-    /// Of every polytope, those that meet it: no facet parts them.
-    met: Vec<Vec<u32>>,
-    /// The facets that lie within another.
-    hidden: Vec<Mask>,
-    /// The pieces that it has with later ones.
-    pub(super) pieces: Vec<Pieces>,
+/// The pieces that every polytope has with later ones.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Result<Vec<Pieces>, Stopped> {
+    let indices = || (0..polytopes.count()).into_par_iter();
+    let met = indices().map(|index| {
+        budget.cancel.check()?;
+        Ok(met(polytopes, near, index))
+    });
+    let met: Vec<Vec<u32>> = met.collect::<Result<_, Stopped>>()?;
+    let hidden: Vec<Mask> = indices().map(|index| hidden(polytopes, index, &met[index as usize])).collect();
+    let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden };
+    let pieces = indices().map_init(Scratch::default, |scratch, index| {
+        budget.cancel.check()?;
+        arrangement.of(index, scratch);
+        Ok(std::mem::take(&mut scratch.out))
+    });
+    pieces.collect()
 }
 
-impl Neighbours {
-    /// Finds anew what depends on polytopes that `changed`. Returns which pieces, and facets, may be others now.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(super) fn update(&mut self, polytopes: &Polytopes, near: &Lists, changed: &[bool], budget: &Budget) -> Result<Vec<bool>, Stopped> {
-        self.met.resize_with(changed.len(), Vec::new);
-        self.hidden.resize(changed.len(), Mask::default());
-        self.pieces.resize_with(changed.len(), Pieces::default);
-        let indices = || (0..polytopes.count()).into_par_iter();
-        let around = |of: &[bool]| -> Vec<bool> {
-            indices().map(|index| of[index as usize] || near.of(index).iter().any(|&other| of[other as usize])).collect()
-        };
-        let mut stale = around(changed);
-        self.met.par_iter_mut().zip(indices()).filter(|(_, index)| stale[*index as usize]).try_for_each(|(met, index)| {
-            budget.cancel.check()?;
-            met.clear();
-            met.extend(near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))));
-            Ok(())
-        })?;
-        let met = &self.met;
-        // Lines end where facets are hidden: where those are others, so may be the pieces of polytopes near.
-        let altered = self.hidden.par_iter_mut().zip(indices()).map(|(own, index)| {
-            budget.cancel.check()?;
-            if !stale[index as usize] {
-                return Ok(false);
-            }
-            let before = std::mem::replace(own, hidden(polytopes, index, &met[index as usize]));
-            Ok(changed[index as usize] || before != *own)
-        });
-        let altered: Vec<bool> = altered.collect::<Result<_, Stopped>>()?;
-        stale = around(&altered);
-        let arrangement = Arrangement { polytopes, met, hidden: &self.hidden };
-        let pieces = self.pieces.par_iter_mut().zip(indices()).filter(|(_, index)| stale[*index as usize]);
-        pieces.try_for_each_init(Scratch::default, |scratch, (pieces, index)| {
-            budget.cancel.check()?;
-            arrangement.of(index, scratch);
-            *pieces = std::mem::take(&mut scratch.out);
-            Ok(())
-        })?;
-        Ok(stale)
-    }
+/// The polytopes that meet a polytope: no facet parts them.
+fn met(polytopes: &Polytopes, near: &Lists, index: u32) -> Vec<u32> {
+    near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))).collect()
 }
 
 /// How many pieces some polytopes have, each edge of the union on both its facets.
 pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let total = polytopes.all.len();
-    let (mut met, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
+    let (mut lists, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
     for &index in of.iter().chain(of.iter().flat_map(|&index| near.of(index))) {
-        let slot = &mut met[index as usize];
+        let slot = &mut lists[index as usize];
         if slot.is_none() {
-            let own: Vec<u32> = near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))).collect();
+            let own = met(polytopes, near, index);
             masks[index as usize] = hidden(polytopes, index, &own);
             *slot = Some(own);
         }
     }
-    let met: Vec<Vec<u32>> = met.into_iter().map(Option::unwrap_or_default).collect();
+    let met: Vec<Vec<u32>> = lists.into_iter().map(Option::unwrap_or_default).collect();
     let arrangement = Arrangement { polytopes, met: &met, hidden: &masks };
     let mut scratch = Scratch::default();
     of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
