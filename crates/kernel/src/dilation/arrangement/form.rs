@@ -44,10 +44,12 @@ pub(super) struct Edge {
     pub(super) facets: [u16; 2],
 }
 
-/// How many belts, rows above them, and shares of the belt's density in rows are tried.
-const BELTS: usize = 4;
+/// Facets, times 1 - 1 / reach, of the best polytopes with many (Fejes Toth, 1953): their caps cover a sphere 1.21 times.
+const FEWEST: f64 = 2.42;
+/// Rows above the belt, beyond a sixth of its facets, facets in them as shares of the belt's density, and how far each is turned from the one below it, in its facets, that are tried.
 const ROWS: usize = 6;
-const DENSITIES: [f64; 4] = [0.8, 0.9, 1.0, 1.1];
+const DENSITIES: [f64; 10] = [0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15];
+const TURNS: [f64; 2] = [0.5, 0.38];
 /// Rounding of unit vectors, far below any edge.
 const ROUNDING: f64 = 1e-9;
 
@@ -55,25 +57,17 @@ impl Form {
     /// The one with the fewest facets, of those that are tried, that lies within the ball with radius `most`.
     pub(super) fn within(most: f64) -> Option<Self> {
         let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
-        let mut best: Option<Self> = None;
-        for belt in least..least + BELTS {
-            // Rows as far apart as facets of the belt, or up to half as much again.
-            let fewest = (belt / 6).max(1);
-            for rows in fewest..fewest + ROWS {
-                for density in DENSITIES {
-                    let (normals, ends) = rows_of(belt, rows, density);
-                    let is_fewer = best.as_ref().is_none_or(|best| normals.len() < best.normals.len());
-                    if is_fewer && normals.len() <= MOST_FACETS {
-                        best = Self::new(normals, ends, most).or(best);
-                    }
-                }
-            }
-        }
-        best
+        let fewest = (FEWEST / (1.0 - 1.0 / most)) as usize;
+        let mut patterns: Vec<(usize, Pattern)> = Pattern::all(least).map(|pattern| (pattern.facets(), pattern)).collect();
+        patterns.retain(|(facets, _)| (fewest..=MOST_FACETS).contains(facets));
+        // The belt's facets along a segment are crossed by more others.
+        patterns.sort_by_key(|&(facets, pattern)| facets + 2 * pattern.belt);
+        patterns.iter().find_map(|(_, pattern)| Self::new(pattern, most))
     }
 
-    /// The polytope with these facets, if it is simple, has no vertex on the plane across the axis, and lies within `most`.
-    fn new(normals: Vec<Point>, ends: Vec<usize>, most: f64) -> Option<Self> {
+    /// The polytope with a pattern of facets, if it is simple, has no vertex on the plane across the axis, and lies within `most`.
+    fn new(pattern: &Pattern, most: f64) -> Option<Self> {
+        let (normals, ends) = pattern.normals();
         let count = normals.len();
         // Facets that meet in a vertex within `most` are no farther from each other than this.
         let widest = 2.0 / (most * most) - 1.0 - ROUNDING;
@@ -154,26 +148,64 @@ fn edges(normals: &[Point], corners: &[Corner], places: &[Point]) -> Vec<Edge> {
     edges
 }
 
-/// Normals in rows around the axis, and the ends they are at.
-fn rows_of(belt: usize, rows: usize, density: f64) -> (Vec<Point>, Vec<usize>) {
-    let (mut normals, mut ends) = (Vec::new(), Vec::new());
-    for place in 0..belt {
-        let (sine, cosine) = (TAU * place as f64 / belt as f64).sin_cos();
-        normals.push([cosine, sine, 0.0]);
-        ends.push(0);
+/// A belt of facets, and rows of them above and below it.
+#[derive(Clone, Copy)]
+struct Pattern {
+    /// Facets of the belt.
+    belt: usize,
+    rows: usize,
+    /// Facets along the rows over those along the belt, for the same length.
+    density: f64,
+    /// Whether the last row is one facet, across the axis.
+    is_closed: bool,
+    turn: f64,
+}
+
+impl Pattern {
+    /// Those that are tried, with as many facets in the belt or up to twice as many.
+    fn all(least: usize) -> impl Iterator<Item = Self> {
+        (least..2 * least).flat_map(|belt| {
+            let fewest = (belt / 6).max(1);
+            (fewest..fewest + ROWS + belt / 4).flat_map(move |rows| {
+                DENSITIES.into_iter().flat_map(move |density| {
+                    [true, false].into_iter().flat_map(move |is_closed| TURNS.map(|turn| Self { belt, rows, density, is_closed, turn }))
+                })
+            })
+        })
     }
-    for row in 1..=rows {
-        let (up, out) = (FRAC_PI_2 * row as f64 / rows as f64).sin_cos();
-        let count = if row == rows { 1 } else { ((belt as f64 * out * density).ceil() as usize).max(3) };
-        for place in 0..count {
-            let (sine, cosine) = (TAU * (place as f64 + 0.5 * (row % 2) as f64) / count as f64).sin_cos();
-            for end in [1, 0] {
-                normals.push([cosine * out, sine * out, if end == 1 { up } else { -up }]);
-                ends.push(end);
+
+    /// The sine and cosine of a row's latitude, and its facets.
+    fn row(&self, row: usize) -> (f64, f64, usize) {
+        let spacing = FRAC_PI_2 / (self.rows as f64 + if self.is_closed { 0.0 } else { 0.5 });
+        let (up, out) = (spacing * row as f64).sin_cos();
+        let count = if row == self.rows && self.is_closed { 1 } else { ((self.belt as f64 * out * self.density).round() as usize).max(3) };
+        (up, out, count)
+    }
+
+    fn facets(&self) -> usize {
+        self.belt + 2 * (1..=self.rows).map(|row| self.row(row).2).sum::<usize>()
+    }
+
+    /// Normals, the belt's first, and the ends they are at.
+    fn normals(&self) -> (Vec<Point>, Vec<usize>) {
+        let (mut normals, mut ends) = (Vec::new(), Vec::new());
+        for place in 0..self.belt {
+            let (sine, cosine) = (TAU * place as f64 / self.belt as f64).sin_cos();
+            normals.push([cosine, sine, 0.0]);
+            ends.push(0);
+        }
+        for row in 1..=self.rows {
+            let (up, out, count) = self.row(row);
+            for place in 0..count {
+                let (sine, cosine) = (TAU * (place as f64 + self.turn * row as f64) / count as f64).sin_cos();
+                for end in [1, 0] {
+                    normals.push([cosine * out, sine * out, if end == 1 { up } else { -up }]);
+                    ends.push(end);
+                }
             }
         }
+        (normals, ends)
     }
-    (normals, ends)
 }
 
 /// The point on three planes n . x = c, if there is one to speak of.
