@@ -379,20 +379,19 @@ impl<'a> Simplifier<'a> {
             })
     }
 
-    /// Whether the new triangles meet no others. Where old ones did, it is enough that there are fewer such pairs, or no more when
-    /// nothing moves to speak of.
+    /// Whether the new triangles meet no others. Where old ones did, by no more than rounding, it is enough that no more do, when nothing moves to speak of: a crossing must not grow out of what
+    /// [`crate::solid::mend`] can part.
     fn is_free(&mut self, setting: &Setting, mesh: &HalfEdges, vertex: u32, m: usize) -> bool {
         if self.mender.stays_graph(mesh, vertex, Some(m), None) || self.mender.meetings(mesh, vertex, Some(m), None, 0) == 0 {
             return true;
         }
         let target = self.mender.star.ring[m];
         let moved = distance_squared(&mesh.points[vertex as usize], &mesh.points[target as usize]).sqrt();
-        let before = self.mender.meetings(mesh, vertex, None, None, usize::MAX);
-        if before == 0 {
+        if moved > TINY * setting.rounding {
             return false;
         }
-        let after = self.mender.meetings(mesh, vertex, Some(m), None, usize::MAX);
-        after < before || (after == before && moved <= TINY * setting.rounding)
+        let before = self.mender.meetings(mesh, vertex, None, None, usize::MAX);
+        before > 0 && self.mender.meetings(mesh, vertex, Some(m), None, before) <= before
     }
 }
 
