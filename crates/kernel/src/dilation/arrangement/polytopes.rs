@@ -147,6 +147,8 @@ const SHIFT: f64 = 0.08;
 const OWN_SHIFT: f64 = 0.1;
 /// Facets are shifted against each other by this share of the shortest edge at most: the form stays what it is.
 const LEAST_EDGE: f64 = 0.1;
+/// Shifts that are tried, each a quarter of the one before: where edges are short beside the angle of their facets, the first may be too large.
+const SHIFTS: i32 = 4;
 
 impl Polytope {
     /// The polytope of a point or a segment, with a form that lies in its shell; none where facets are too small to be shifted.
@@ -168,27 +170,31 @@ impl Polytope {
         let share = |index: u64| (number(seed.wrapping_mul(1024).wrapping_add(index)) >> 11) as f64 / (1_u64 << 53) as f64;
         let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(0);
         let own = (OWN_SHIFT * room).min(LEAST_EDGE * shape.shortest * shell.inner);
-        let offset = |facet: usize| flat(facet).map_or_else(|| all + own * share(1 + facet as u64), |end| cut.beyond[end]);
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
-        let plane = |(facet, (normal, &end)): (usize, (&Point, &usize))| {
-            let normal = turned(normal);
-            [normal[0], normal[1], normal[2], offset(facet) + dot(&normal, &ends[end])]
+        let shifted = |own: f64| {
+            let offset = |facet: usize| flat(facet).map_or_else(|| all + own * share(1 + facet as u64), |end| cut.beyond[end]);
+            let plane = |(facet, (normal, &end)): (usize, (&Point, &usize))| {
+                let normal = turned(normal);
+                [normal[0], normal[1], normal[2], offset(facet) + dot(&normal, &ends[end])]
+            };
+            let planes: Box<[Plane]> = shape.normals.iter().zip(&shape.ends).enumerate().map(plane).collect();
+            let corner = |corner: &Corner| {
+                let facets = corner.facets.map(usize::from);
+                let at = turned(&meeting(facets.map(|facet| &shape.normals[facet]), facets.map(offset))?);
+                Some(std::array::from_fn(|axis| ends[corner.end][axis] + at[axis]))
+            };
+            let corners: Box<[Point]> = shape.corners.iter().map(corner).collect::<Option<_>>()?;
+            let keeps_form = shape.corners.iter().zip(&corners).all(|(corner, point)| {
+                let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
+                others.all(|(_, plane)| height(plane, point) < 0.0)
+            });
+            keeps_form.then_some((planes, corners))
         };
-        let planes: Box<[Plane]> = shape.normals.iter().zip(&shape.ends).enumerate().map(plane).collect();
-        let corner = |corner: &Corner| {
-            let facets = corner.facets.map(usize::from);
-            let at = turned(&meeting(facets.map(|facet| &shape.normals[facet]), facets.map(offset))?);
-            Some(std::array::from_fn(|axis| ends[corner.end][axis] + at[axis]))
-        };
-        let corners: Box<[Point]> = shape.corners.iter().map(corner).collect::<Option<_>>()?;
-        let keeps_form = shape.corners.iter().zip(&corners).all(|(corner, point)| {
-            let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
-            others.all(|(_, plane)| height(plane, point) < 0.0)
-        });
+        let (planes, corners) = (0..SHIFTS).find_map(|number| shifted(own * 0.25_f64.powi(number)))?;
         let low = std::array::from_fn(|axis| corners.iter().map(|corner: &Point| corner[axis]).fold(f64::INFINITY, f64::min));
         let high = std::array::from_fn(|axis| corners.iter().map(|corner: &Point| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
         let cuts = shape.flats.map(|flat| flat.map(|facet| planes[usize::from(facet)]));
-        keeps_form.then_some(Self { site, form, planes, cuts, corners, low, high })
+        Some(Self { site, form, planes, cuts, corners, low, high })
     }
 
     /// The ends of its site, both the same for a point.
