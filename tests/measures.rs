@@ -1,6 +1,6 @@
 //! Dimensions, centroids and inertia against closed forms.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use glam::{DMat3, DVec3};
 use lacuna_exchange::document::{DocumentLimits, read_model};
@@ -273,6 +273,32 @@ fn walls_gaps_and_the_smallest_box_of_two_balls() {
     let params = Params { thickness: true, ..Params::new(0.02) };
     let job = Job { kind: JobKind::Measure, inputs, params, outputs: Vec::new(), limits: Limits::default() };
     assert_eq!(run(&job, &Budget::default()).unwrap_err().code, "job.not-a-solid");
+}
+
+/// A lattice's surface has needles and folds within its tolerance; they are no walls and no gaps. Its mesh alone does not tell that, and a warning does.
+#[test]
+fn folds_are_no_walls() {
+    let shape = document(
+        r#"{"lacuna": 1, "shape": {"family": "bezier_surface", "control_points":
+        [[[0,0,0],[0,10,10],[0,20,0]], [[10,0,-10],[10,10,0],[10,20,-10]], [[20,0,0],[20,10,10],[20,20,0]]]}}"#,
+    );
+    let (radius, tolerance) = (1.0, 0.05);
+    let found = measured(Model { name: None, shape }, Params { radius_mm: Some(radius), thickness: true, ..Params::new(tolerance) });
+    let [low, high] = found.thickness.unwrap().wall.unwrap().least_mm;
+    assert!(2.0 * (radius - tolerance) * FRAC_1_SQRT_2 <= low && high <= 2.0 * (radius + tolerance), "[{low}, {high}]");
+    // Two sheets as near to each other as the tolerance.
+    let slab = |height: f64| {
+        let corners: Vec<[f64; 3]> = (0..8).map(|k| [f64::from(k & 1), f64::from(k >> 1 & 1), height * f64::from(k >> 2)]).collect();
+        document(&format!(
+            r#"{{"lacuna": 1, "shape": {{"family": "mesh", "vertices": {corners:?},
+            "faces": [[0,2,3,1],[4,5,7,6],[0,1,5,4],[2,6,7,3],[0,4,6,2],[1,3,7,5]]}}}}"#
+        ))
+    };
+    for (height, warns) in [(0.05, true), (0.25, false)] {
+        let found = measured(Model { name: None, shape: slab(height) }, Params { thickness: true, ..Params::new(tolerance) });
+        assert_within(found.thickness.unwrap().wall.unwrap().least_mm, height, 1e-12);
+        assert_eq!(found.warnings.iter().any(|warning| warning.contains("a fold of one surface")), warns, "{:?}", found.warnings);
+    }
 }
 
 /// Hakenberg, Reif, Schaefer, Warren 2014: Doo and Sabin's surface of the unit cube encloses 6241/9920. The surface itself has no volume.

@@ -297,7 +297,8 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         if job.params.thickness {
             let surfaces = if is_solid(attractor) { attractor.surfaces() } else { Vec::new() };
             let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
-            let (least, map) = walls_and_gaps(mesh, mapped, budget)?;
+            let (least, map) = walls_and_gaps(mesh, 0.0, mapped, budget)?;
+            certificate.warnings.extend(least.folds(tolerance));
             (certificate.thickness, geometry) = (Some(least), map);
         }
         if let Some(direction) = job.params.direction {
@@ -321,7 +322,8 @@ fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, 
         certificate.oriented_box = smallest_box(attractor, radius.mm(), tolerance, budget)?;
     }
     if job.params.thickness {
-        let (least, map) = walls_and_gaps(mesh, mapped, budget)?;
+        let error_mm = dilation.inner_mm.max(dilation.outer_mm);
+        let (least, map) = walls_and_gaps(mesh, error_mm, mapped, budget)?;
         (certificate.thickness, geometry) = (Some(least), map);
     }
     Ok(Outcome { geometry, certificate })

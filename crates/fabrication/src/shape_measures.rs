@@ -7,7 +7,7 @@ use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::mesh_of;
 use lacuna_kernel::measure::section::{NoDirection, PlaneFrame};
 use lacuna_kernel::measure::{
-    NotEnclosed, Side, Thickness, ThicknessMap, enclosed_volume, extent_along, oriented_box, thickness, thickness_map,
+    FOLD, NotEnclosed, Side, Thickness, ThicknessMap, enclosed_volume, extent_along, oriented_box, thickness, thickness_map,
 };
 use lacuna_kernel::solid::{Crossings, TriMesh};
 use lacuna_kernel::tolerance::Tolerance;
@@ -85,8 +85,9 @@ pub struct LeastThicknessStatement {
     pub between_mm: [[f64; 3]; 2],
 }
 
-/// Least thickness along the normals of the mesh that is measured, between faces without a common corner: at edges sharper than a right angle every wall ends
-/// in nothing. For a dilation the mesh is the one that would be written, without simplification.
+/// Least thickness along the normals of the mesh that is measured, between faces that look at each other, whose normals are opposite within 45 degrees and that have no corner in common: beside
+/// edges sharper than a right angle every wall ends in nothing. For a dilation the mesh is the one that would be written, without simplification, faces lower than twice its
+/// bound tell no direction, and those nearer to each other than thrice the bound are taken for folds of one surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
@@ -97,6 +98,23 @@ pub struct ThicknessStatement {
     /// Of gaps, through the air.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub gap: Option<LeastThicknessStatement>,
+}
+
+impl ThicknessStatement {
+    /// What is thinner than what may be folds of a mesh that stands for another shape within a tolerance, if anything is.
+    pub(crate) fn folds(&self, tolerance: Tolerance) -> Option<String> {
+        let fold = FOLD * tolerance.mm();
+        let thin = |(name, found): (&str, &Option<LeastThicknessStatement>)| {
+            found.as_ref().filter(|found| found.least_mm[0] < fold).map(|found| format!("{name} of {:e} mm", found.least_mm[0]))
+        };
+        let thin: Vec<String> = [("a wall", &self.wall), ("a gap", &self.gap)].into_iter().filter_map(thin).collect();
+        let thin = (!thin.is_empty()).then(|| thin.join(" and "))?;
+        Some(format!(
+            "the mesh has {thin}, less than {fold:e} mm: if it stands for another shape within the tolerance of {:e} mm, that may be a fold of one surface; measure that shape itself with \"radius_mm\", or \
+             give the mesh's own tolerance",
+            tolerance.mm()
+        ))
+    }
 }
 
 /// A solid's mesh with the thickness of its walls and gaps, which is measured as that of a [`ThicknessStatement`].
@@ -172,8 +190,13 @@ fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Resu
     }
 }
 
-/// Least walls and gaps of a closed mesh, and their map if it is wanted.
-pub(crate) fn walls_and_gaps(mesh: &TriMesh, mapped: bool, budget: &Budget) -> Result<(ThicknessStatement, Geometry), JobError> {
+/// Least walls and gaps of a closed mesh that stands for a shape within `error_mm`, and their map if it is wanted.
+pub(crate) fn walls_and_gaps(
+    mesh: &TriMesh,
+    error_mm: f64,
+    mapped: bool,
+    budget: &Budget,
+) -> Result<(ThicknessStatement, Geometry), JobError> {
     let count = mesh.triangles.len() as u64;
     if mapped && count > budget.limits.triangles {
         #[expect(clippy::cast_precision_loss, reason = "limits are shown, not computed with")]
@@ -194,11 +217,11 @@ pub(crate) fn walls_and_gaps(mesh: &TriMesh, mapped: bool, budget: &Budget) -> R
         })
     };
     if !mapped {
-        let [wall, gap] = [thickness(mesh, Side::Wall, budget)?, thickness(mesh, Side::Gap, budget)?];
+        let [wall, gap] = [thickness(mesh, Side::Wall, error_mm, budget)?, thickness(mesh, Side::Gap, error_mm, budget)?];
         return Ok((ThicknessStatement { wall: stated(wall), gap: stated(gap) }, Geometry::None));
     }
     // The map tells the least as well.
-    let [wall, gap] = [thickness_map(mesh, Side::Wall, budget)?, thickness_map(mesh, Side::Gap, budget)?];
+    let [wall, gap] = [thickness_map(mesh, Side::Wall, error_mm, budget)?, thickness_map(mesh, Side::Gap, error_mm, budget)?];
     let least = ThicknessStatement { wall: stated(wall.least), gap: stated(gap.least) };
     Ok((least, Geometry::Thickness(Box::new(MappedThickness { mesh: mesh.clone(), wall, gap }))))
 }

@@ -21,7 +21,7 @@ pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use enclosed::{NotEnclosed, enclosed_volume};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};
 pub use oriented_box::{OrientedBox, oriented_box};
-pub use thickness::{Side, Thickness, ThicknessMap, thickness, thickness_map};
+pub use thickness::{FOLD, Side, Thickness, ThicknessMap, thickness, thickness_map};
 
 /// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]

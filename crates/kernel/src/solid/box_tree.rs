@@ -110,6 +110,11 @@ impl BoxTree {
         }
     }
 
+    /// The box of all.
+    pub(crate) fn whole(&self) -> &Box32 {
+        &self.nodes[1]
+    }
+
     /// The number of leaves.
     pub(crate) fn leaves(&self) -> usize {
         self.leaves
