@@ -3,6 +3,7 @@
 //!
 //! Results and documents never change, so every shelf needs only six verbs. A thing is there in full or not at all.
 
+use std::fs::{self, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -74,6 +75,8 @@ pub struct Store {
     shelf: Shelf,
     /// Where results are written before they take their place.
     scratch: PathBuf,
+    /// Held as long as the folder is in use. The system gives it back however the process ends.
+    _alone: Option<fs::File>,
 }
 
 #[derive(Debug)]
@@ -82,13 +85,30 @@ enum Shelf {
     Bucket(Bucket),
 }
 
+/// Takes the folder for this process alone: two that write to it would take up each other's jobs.
+fn alone(root: &Path) -> io::Result<fs::File> {
+    fs::create_dir_all(root)?;
+    let path = root.join("in-use");
+    let file = fs::File::options().create(true).truncate(false).write(true).open(&path)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => {
+            let message = format!("another service uses the folder {}: stop it, or give this one a folder of its own", root.display());
+            Err(io::Error::new(io::ErrorKind::ResourceBusy, message))
+        }
+        Err(TryLockError::Error(error)) => Err(error),
+    }
+}
+
 impl Store {
     /// Opens a data folder.
     ///
     /// # Errors
     /// When the folder cannot be made or written.
     pub fn open(root: &Path) -> io::Result<Self> {
-        Ok(Self { shelf: Shelf::Folder(Folder::open(root, &ROOMS)?), scratch: root.join("results") })
+        // Before anything is cleared away that another process may be writing.
+        let alone = alone(root)?;
+        Ok(Self { shelf: Shelf::Folder(Folder::open(root, &ROOMS)?), scratch: root.join("results"), _alone: Some(alone) })
     }
 
     /// Opens a bucket, `s3://BUCKET/FOLDER`; the data folder only holds what is being written.
@@ -99,7 +119,7 @@ impl Store {
         // Several processes may have the same folder: none clears what another is writing.
         let scratch = root.join("scratch");
         std::fs::create_dir_all(&scratch)?;
-        Ok(Self { shelf: Shelf::Bucket(Bucket::open(address, runtime)?), scratch })
+        Ok(Self { shelf: Shelf::Bucket(Bucket::open(address, runtime)?), scratch, _alone: None })
     }
 
     /// Whether it can be used now.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::io;
 use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use lacuna_kernel::budget::StopReason;
 
@@ -93,6 +94,8 @@ impl Embedded {
     /// more, and those that had been started twice have failed.
     pub(super) fn open(root: &Path, store: Arc<Store>, limits: DeskLimits) -> io::Result<Self> {
         let journal = Journal::open(root)?;
+        // Events of what an earlier process left have later ids than any that it gave: listeners that come back hear them all.
+        let started = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
         let batches = journal.batches()?.into_iter().map(|batch| (batch.id.clone(), Arc::new(batch)));
         let mut book = Book { batches: batches.collect(), ..Book::default() };
         for mut record in journal.jobs()? {
@@ -115,7 +118,7 @@ impl Embedded {
                 book.waiting.push_back((record.view.id.clone(), record.work));
                 *book.unfinished.entry(record.owner.clone()).or_default() += 1;
             }
-            book.insert(&Arc::new(LiveJob::new(record)));
+            book.insert(&Arc::new(LiveJob::at(record, started)));
         }
         Ok(Self { book: Mutex::new(book), arrived: Condvar::new(), batching: Mutex::default(), limits, journal, store })
     }

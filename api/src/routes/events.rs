@@ -27,7 +27,7 @@ pub(super) const RETRY: Duration = Duration::from_secs(2);
 
 /// A job's events: `state`, `progress`, `warning`, `output`, `done`; the last ends the stream.
 ///
-/// A client that lost the stream sends `Last-Event-ID` and gets what it missed.
+/// A client that lost the stream sends `Last-Event-ID` and gets what it missed; all there is, if the service was started again in between.
 #[utoipa::path(
     get, path = "/v1/jobs/{id}/events", operation_id = "job_events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
@@ -60,6 +60,8 @@ struct Listener {
 
 fn follow(job: Arc<LiveJob>, last: u64, closing: watch::Receiver<bool>) -> impl Stream<Item = Result<Sent, Infallible>> {
     let latest = job.events.subscribe();
+    // An id that was never given here is of an earlier process: the log begins anew.
+    let last = if last > *latest.borrow() { 0 } else { last };
     let listener = Listener { job, latest, closing, waiting: VecDeque::new(), last, over: false };
     stream::unfold(listener, |mut listener| async move { listener.next().await.map(|event| (Ok(event), listener)) })
 }
