@@ -7,7 +7,7 @@
 use lacuna_boolean::{BooleanEngine, ManifoldRust};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::solid::TriMesh;
+use lacuna_kernel::solid::{TriMesh, carried, without_flat_shells};
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::operand::{Operand, at_fault, operand, predicted, rounded, share, sources};
@@ -33,6 +33,11 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
     budget.report("combine", 0.0, 0);
     let combined =
         if operation == Operation::Trim { trim(job, &mut operands, budget)? } else { evaluate(operation, &mut operands, budget)? };
+    // What surfaces that touch leave between them is no thicker than what single precision moves, and no part of the result.
+    let flat_mm = carried(combined.vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max));
+    let without_flat = without_flat_shells(&combined, flat_mm);
+    let left_out_mm = if without_flat.is_some() { flat_mm } else { 0.0 };
+    let combined = without_flat.unwrap_or(combined);
     if combined.triangles.is_empty() {
         let message = match operation {
             Operation::Union | Operation::Hull => "the inputs have no volume",
@@ -51,7 +56,8 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
         let limit = LimitFacts { limit: "triangles", asked, allowed, remedy: Some(("triangles", asked)) };
         return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Limit, "limit.triangles", message) });
     }
-    let rounded = rounded(&combined, budget)?;
+    let mut rounded = rounded(&combined, budget)?;
+    rounded.moved_mm += left_out_mm;
     budget.report("combine", 1.0, rounded.solid.mesh().triangles.len() as u64);
     let certificate = certificate::of_operation(operation, ManifoldRust.name(), &operands, &rounded, tolerance);
     Ok(Outcome { geometry: Geometry::Solid(rounded.solid), certificate })

@@ -18,7 +18,7 @@ pub use crossings::Crossings;
 use glam::DVec3;
 pub use inside::Inside;
 pub use repair::{Repair, RepairError, Repaired, Unfilled, repair};
-pub use shells::{MisplacedShell, misplaced_shell};
+pub use shells::{MisplacedShell, misplaced_shell, without_flat_shells};
 pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.
