@@ -80,9 +80,7 @@ pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<
     }
     let empty = told.iter().filter(|plane| plane.polygons == 0).count();
     if empty > 0 {
-        certificate
-            .warnings
-            .push(format!("{empty} of {} sections are empty: their planes miss the solid, or only touch it from above", told.len()));
+        certificate.warnings.push(format!("{empty} of {} sections are empty: their planes miss the solid, or only touch it", told.len()));
     }
     let [normal, u, v] = [frame.normal(), frame.u(), frame.v()].map(|axis| axis.to_array());
     certificate.sections = Some(SectionsStatement { normal, u, v, planes: told });

@@ -61,7 +61,7 @@ pub struct Section {
     /// Where the plane is along the normal, in mm.
     pub offset_mm: f64,
     /// What the plane cuts. Loops do not cross if the mesh does not; they may touch where vertices lie in the plane. Corners on straight
-    /// runs are kept, points equal to the one before are not, nor are loops without area.
+    /// runs are kept, points equal to the one before are not, nor are loops without area, nor pairs of them that run along the same points both ways.
     pub polygons: Vec<Polygon>,
     /// Clockwise loops within no outer loop: a mesh that crosses itself may have some. Their area counts as negative.
     pub unmatched: Vec<Vec<DVec2>>,

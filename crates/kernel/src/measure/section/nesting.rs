@@ -8,6 +8,7 @@ use super::ring::{Ring, sides};
 use super::stabbing::{Span, Stabbing};
 use glam::DVec2;
 use robust::{Coord, orient2d};
+use std::collections::HashMap;
 
 /// A side of a loop that crosses some line, from its lower end to its upper.
 struct Side {
@@ -31,7 +32,8 @@ impl Side {
 
 /// Polygons in the order of their outer loops, and the holes in none. A hole goes to the smallest outer loop around it that is larger than
 /// itself: what lies in the hole is not.
-pub(super) fn nest(rings: Vec<Ring>) -> (Vec<Polygon>, Vec<Vec<DVec2>>) {
+pub(super) fn nest(mut rings: Vec<Ring>) -> (Vec<Polygon>, Vec<Vec<DVec2>>) {
+    cancel(&mut rings);
     let owners = owners(&rings);
     let mut place = vec![0; rings.len()];
     let mut polygons: Vec<Polygon> = Vec::new();
@@ -52,6 +54,46 @@ pub(super) fn nest(rings: Vec<Ring>) -> (Vec<Polygon>, Vec<Vec<DVec2>>) {
         }
     }
     (polygons, unmatched)
+}
+
+/// Leaves out pairs of loops that run along the same points both ways: what the plane touches from below along a curve has no area.
+fn cancel(rings: &mut Vec<Ring>) {
+    // A loop from its least point on, the way around that an outer loop goes.
+    let name = |ring: &Ring| -> Vec<[u64; 2]> {
+        let mut points: Vec<DVec2> = ring.points.clone();
+        if ring.area < 0.0 {
+            points.reverse();
+        }
+        let order = |a: &DVec2, b: &DVec2| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
+        let first = (0..points.len()).min_by(|&a, &b| order(&points[a], &points[b])).unwrap_or(0);
+        points.rotate_left(first);
+        // Zeros have two signs.
+        points.iter().map(|point| point.to_array().map(|x| (x + 0.0).to_bits())).collect()
+    };
+    if rings.iter().all(|ring| ring.area > 0.0) {
+        return;
+    }
+    // The box's corner and the number of points tell most loops apart.
+    let key = |ring: &Ring| {
+        let least = ring.points.iter().copied().reduce(DVec2::min).unwrap_or_default();
+        (ring.points.len(), least.to_array().map(|x| (x + 0.0).to_bits()))
+    };
+    let mut outer: HashMap<_, Vec<usize>> = HashMap::new();
+    for (index, ring) in rings.iter().enumerate().filter(|(_, ring)| ring.area > 0.0) {
+        outer.entry(key(ring)).or_default().push(index);
+    }
+    let mut stays = vec![true; rings.len()];
+    for (index, ring) in rings.iter().enumerate().filter(|(_, ring)| ring.area < 0.0) {
+        let like = outer.get_mut(&key(ring));
+        if let Some(like) = like
+            && let Some(place) = like.iter().position(|&other| name(&rings[other]) == name(ring))
+        {
+            stays[index] = false;
+            stays[like.remove(place)] = false;
+        }
+    }
+    let mut stays = stays.into_iter();
+    rings.retain(|_| stays.next().unwrap_or(true));
 }
 
 /// The outer loop around each hole.
