@@ -246,10 +246,12 @@ impl HalfEdgeMesh {
     }
 
     fn bow_tie(&self, vertex: u32) -> MeshFault {
-        let fan: Vec<usize> = self.around(vertex).map(|half_edge| self.face(half_edge)).collect();
-        let mut at_vertex = self.half_edges().filter(|&half_edge| self.origin(half_edge) == vertex).map(|half_edge| self.face(half_edge));
+        let mut fan: Vec<usize> = self.around(vertex).map(|half_edge| self.face(half_edge)).collect();
         let known = fan[0];
-        let other = at_vertex.find(|face| !fan.contains(face)).expect("a fan that is not all faces leaves one out");
+        // It may be as large as the mesh.
+        fan.sort_unstable();
+        let mut at_vertex = self.half_edges().filter(|&half_edge| self.origin(half_edge) == vertex).map(|half_edge| self.face(half_edge));
+        let other = at_vertex.find(|face| fan.binary_search(face).is_err()).expect("a fan that is not all faces leaves one out");
         MeshFault::BowTie { vertex, faces: [known.min(other), known.max(other)] }
     }
 

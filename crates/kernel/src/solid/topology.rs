@@ -145,18 +145,22 @@ pub(crate) fn has_no_area([a, b, c]: [DVec3; 3]) -> bool {
     (b - a).cross(c - a).length_squared() <= 0.0
 }
 
-/// Whether the pairs (b, c) are the steps of one cycle: a closed, oriented, manifold fan.
+/// Whether the pairs (b, c) are the steps of one cycle that comes nowhere twice: a closed, oriented, manifold fan. Sorts them, because one vertex
+/// may be a corner of all triangles.
 fn is_cycle(link: &mut [(u32, u32)]) -> bool {
+    link.sort_unstable();
+    // Where two steps begin at the same neighbour, four triangles meet in the edge to it.
+    if link.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+        return false;
+    }
     let start = link[0].0;
     let mut current = link[0].1;
-    // Steps already taken are kept in front, in order: short links need no other structure.
-    for taken in 1..link.len() {
+    for _ in 1..link.len() {
         if current == start {
             return false;
         }
-        let Some(next) = (taken..link.len()).find(|&index| link[index].0 == current) else { return false };
-        link.swap(taken, next);
-        current = link[taken].1;
+        let Ok(next) = link.binary_search_by_key(&current, |step| step.0) else { return false };
+        current = link[next].1;
     }
     current == start
 }
@@ -215,5 +219,49 @@ impl Around {
             let at = corners.iter().position(|&corner| corner == vertex).unwrap_or(0);
             (corners[(at + 1) % 3], corners[(at + 2) % 3])
         }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    /// A disk about vertex 0, its triangles in an order that a search from the front finds last.
+    #[test]
+    fn a_vertex_of_all_triangles_is_counted_in_little_time() {
+        const RIM: u32 = 300_000;
+        let mut vertices = vec![DVec3::ZERO];
+        vertices.extend(
+            (0..RIM).map(|k| (std::f64::consts::TAU * f64::from(k) / f64::from(RIM)).sin_cos()).map(|(y, x)| DVec3::new(x, y, 0.0)),
+        );
+        let triangles = (0..RIM).rev().map(|k| [0, k + 1, (k + 1) % RIM + 1]).collect();
+        let start = Instant::now();
+        let topology = Topology::of(&TriMesh { vertices, triangles }, &Budget::default()).expect("indices are valid");
+        assert_eq!((topology.edges, topology.boundary_edges, topology.nonmanifold_vertices), (2 * u64::from(RIM), u64::from(RIM), 0));
+        assert!(start.elapsed() < Duration::from_secs(4), "{:?}", start.elapsed());
+    }
+
+    /// Two tetrahedra on one edge: around its ends the triangles can be walked once through all, twice through the edge.
+    #[test]
+    fn an_edge_of_four_triangles_is_found_whatever_their_order() {
+        let tetrahedron = |[a, b, c, d]: [u32; 4]| [[a, c, b], [a, b, d], [b, c, d], [a, d, c]];
+        let all = [tetrahedron([0, 1, 2, 3]), tetrahedron([0, 1, 4, 5])].concat();
+        let vertices: Vec<DVec3> = [[0, 0, 0], [0, 0, 9], [9, 0, 0], [0, 9, 0], [-9, 0, 0], [0, -9, 0]]
+            .map(|at: [i32; 3]| DVec3::from_array(at.map(f64::from)))
+            .to_vec();
+        for turn in 0..all.len() {
+            for turned in [false, true] {
+                let mut triangles = all.clone();
+                triangles.rotate_left(turn);
+                if turned {
+                    triangles.reverse();
+                }
+                let mesh = TriMesh { vertices: vertices.clone(), triangles };
+                let topology = Topology::of(&mesh, &Budget::default()).expect("indices are valid");
+                assert_eq!((topology.nonmanifold_edges, topology.edges), (1, 11), "turn {turn}, {turned}");
+            }
+        }
     }
 }
