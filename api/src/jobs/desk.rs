@@ -189,6 +189,28 @@ impl Desk {
         Ok((job, replayed))
     }
 
+    /// The job that an owner's idempotency key has made of the same body, whatever has become since of what that names. It blocks.
+    ///
+    /// # Errors
+    /// When the key was used with another body, or the ledger fails.
+    pub fn made_by(&self, owner: &str, used: &Idempotency) -> Result<Option<Arc<LiveJob>>, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.made_by(owner, used),
+            Ledger::Shared(ledger) => ledger.made_by(owner, used),
+        }
+    }
+
+    /// The batch that an owner's idempotency key has made of the same body, as [`Desk::made_by`] tells of jobs.
+    ///
+    /// # Errors
+    /// As [`Desk::made_by`].
+    pub fn batch_made_by(&self, owner: &str, used: &Idempotency) -> Result<Option<Batch>, Problem> {
+        match &self.ledger {
+            Ledger::Embedded(ledger) => ledger.batch_made_by(owner, used),
+            Ledger::Shared(ledger) => ledger.batch_made_by(owner, used),
+        }
+    }
+
     /// The records of new jobs, whose documents are kept.
     fn recorded(&self, submissions: Vec<Submission>) -> Result<Vec<JobRecord>, Problem> {
         let digests = submissions.iter().map(|submission| Digest::of(&submission.document));

@@ -145,13 +145,19 @@ impl Embedded {
         accepted.map(|job| (job, false))
     }
 
+    /// The job that an owner's idempotency key made, if it did; a key that is being used now has made none yet.
+    pub(super) fn made_by(&self, owner: &str, used: &Idempotency) -> Result<Option<Arc<LiveJob>>, Problem> {
+        let book = self.book();
+        let id = book.keys.get(&(owner.to_owned(), used.key)).cloned().flatten();
+        id.and_then(|id| book.jobs.get(&id).cloned()).map(|job| same_body(job, used)).transpose()
+    }
+
     fn reserve(&self, place: &(String, Digest), used: &Idempotency) -> Result<Option<Arc<LiveJob>>, Problem> {
         let mut book = self.book();
         match book.keys.get(place) {
             Some(None) => Err(refusal::key_in_progress()),
             Some(Some(id)) => match book.jobs.get(id).cloned() {
-                Some(job) if job.with(|r| r.idempotency.as_ref().map(|first| first.body)) == Some(used.body) => Ok(Some(job)),
-                Some(_) => Err(refusal::key_used_otherwise()),
+                Some(job) => same_body(job, used).map(Some),
                 None => {
                     book.keys.insert(place.clone(), None);
                     Ok(None)
@@ -480,4 +486,10 @@ impl Embedded {
             job.cancel.fire(StopReason::Cancelled);
         }
     }
+}
+
+/// The job that a key made, if it was for the same body.
+fn same_body(job: Arc<LiveJob>, used: &Idempotency) -> Result<Arc<LiveJob>, Problem> {
+    let first = job.with(|record| record.idempotency.as_ref().map(|first| first.body));
+    if first == Some(used.body) { Ok(job) } else { Err(refusal::key_used_otherwise()) }
 }

@@ -89,6 +89,12 @@ pub async fn submit(
 /// Reads all jobs, with the faults of all as one problem, and accepts them together.
 fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Batch, bool), Problem> {
     let Orderer { owner, trace } = orderer;
+    // Before the body is read, as for a job.
+    if let Some(used) = &idempotency
+        && let Some(batch) = state.desk.batch_made_by(&owner.0, used)?
+    {
+        return Ok((batch, true));
+    }
     let entries = documents::read_batch(body)?;
     // The request itself has been counted as one.
     state.submissions.draw(owner, entries.len() - 1)?;

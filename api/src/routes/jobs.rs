@@ -121,6 +121,12 @@ pub(super) async fn take(
 /// Reads, predicts and accepts: what is refused here never becomes a job.
 fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Arc<LiveJob>, bool), Problem> {
     let Orderer { owner, trace } = orderer;
+    // Before the body is read: the models that it names may have been forgotten since.
+    if let Some(used) = &idempotency
+        && let Some(job) = state.desk.made_by(&owner.0, used)?
+    {
+        return Ok((job, true));
+    }
     let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
     let replaced = order.supersedes.as_deref().map(|id| {
         // Beside the event loop, where waiting is allowed.

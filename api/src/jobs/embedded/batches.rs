@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Book, Embedded};
 use crate::digest::Digest;
 use crate::jobs::batch::{Batch, BatchRecord};
-use crate::jobs::record::{JobRecord, JobState};
+use crate::jobs::record::{Idempotency, JobRecord, JobState};
 use crate::jobs::refusal;
 use crate::problem::Problem;
 
@@ -29,14 +29,20 @@ impl Embedded {
         // One batch at a time: a key that is in use is waited for.
         let _alone = crate::locked(&self.batching);
         if let Some(used) = &batch.idempotency
-            && let Some(first) = self.book().batch_of_key(&batch.owner, used.key)
+            && let Some(first) = self.batch_made_by(&batch.owner, used)?
         {
-            let same = first.record.idempotency.as_ref().is_some_and(|first| first.body == used.body);
-            return if same { Ok((first, true)) } else { Err(refusal::key_used_otherwise()) };
+            return Ok((first, true));
         }
         let record = Arc::new(batch);
         let jobs = self.accept(records, Some(&record))?.into_iter().map(Some).collect();
         Ok((Batch { record, jobs }, false))
+    }
+
+    /// The batch that an owner's idempotency key made, if it did.
+    pub(in crate::jobs) fn batch_made_by(&self, owner: &str, used: &Idempotency) -> Result<Option<Batch>, Problem> {
+        let Some(first) = self.book().batch_of_key(owner, used.key) else { return Ok(None) };
+        let same = first.record.idempotency.as_ref().is_some_and(|first| first.body == used.body);
+        if same { Ok(Some(first)) } else { Err(refusal::key_used_otherwise()) }
     }
 
     pub(in crate::jobs) fn find_batch(&self, owner: &str, id: &str) -> Option<Batch> {

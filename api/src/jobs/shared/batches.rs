@@ -5,6 +5,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use tokio_postgres::Row;
 use tokio_postgres::types::Type;
 
 use super::Shared;
@@ -12,11 +13,34 @@ use super::pool::Failure;
 use super::rows;
 use crate::jobs::batch::{Batch, BatchRecord};
 use crate::jobs::live::LiveJob;
-use crate::jobs::record::JobRecord;
+use crate::jobs::record::{Idempotency, JobRecord};
 use crate::jobs::refusal;
 use crate::problem::Problem;
 
+/// The batch that an owner's idempotency key made. Once its jobs have expired the key is free for another.
+const OF_KEY: &str = "SELECT record FROM lacuna_batches WHERE owner = $1 AND idempotency_key = $2
+    AND EXISTS (SELECT FROM lacuna_jobs WHERE batch = lacuna_batches.id AND state <> 'expired')";
+
+fn first_of_key(row: &Row, used: &Idempotency) -> Result<BatchRecord, Failure> {
+    let first: BatchRecord = serde_json::from_str(row.try_get(0)?)?;
+    let same = first.idempotency.as_ref().is_some_and(|first| first.body == used.body);
+    if same { Ok(first) } else { Err(refusal::key_used_otherwise().into()) }
+}
+
 impl Shared {
+    pub(in crate::jobs) fn batch_made_by(&self, owner: &str, used: &Idempotency) -> Result<Option<Batch>, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let row = client.query_typed_opt(OF_KEY, &[(&owner, Type::TEXT), (&used.key.hex(), Type::TEXT)]).await?;
+            client.done();
+            let Some(row) = row else { return Ok(None) };
+            let first = first_of_key(&row, used)?;
+            let jobs = self.jobs_of(&first.id).await?;
+            Ok(Some((first, jobs)))
+        };
+        Ok(self.runtime.block_on(self.within(asked))?.map(|(first, jobs)| self.gathered(first, jobs)))
+    }
+
     pub(in crate::jobs) fn submit_batch(&self, batch: BatchRecord, records: Vec<JobRecord>) -> Result<(Batch, bool), Problem> {
         let known = self.known_answers(&records)?;
         let accepted = async {
@@ -24,15 +48,9 @@ impl Shared {
             let transaction = client.transaction().await?;
             rows::lock_owner(&transaction, &batch.owner).await?;
             if let Some(used) = &batch.idempotency {
-                // Once its jobs have expired the key is free for another.
-                let question = "SELECT record FROM lacuna_batches WHERE owner = $1 AND idempotency_key = $2
-                    AND EXISTS (SELECT FROM lacuna_jobs WHERE batch = lacuna_batches.id AND state <> 'expired')";
                 let values = [(&batch.owner as _, Type::TEXT), (&used.key.hex() as _, Type::TEXT)];
-                if let Some(row) = transaction.query_typed_opt(question, &values).await? {
-                    let first: BatchRecord = serde_json::from_str(row.try_get(0)?)?;
-                    if first.idempotency.as_ref().map(|first| first.body) != Some(used.body) {
-                        return Err(refusal::key_used_otherwise().into());
-                    }
+                if let Some(row) = transaction.query_typed_opt(OF_KEY, &values).await? {
+                    let first = first_of_key(&row, used)?;
                     drop(transaction);
                     client.done();
                     return Ok((first, None));

@@ -20,7 +20,7 @@ use tokio_postgres::{Row, Transaction};
 
 use super::desk::{DeskLimits, Gauges, JobFilter, Made, Retention};
 use super::live::LiveJob;
-use super::record::{Answer, Ending, JobRecord, JobState, JobView};
+use super::record::{Answer, Ending, Idempotency, JobRecord, JobState, JobView};
 use super::refusal;
 use crate::digest::Digest;
 use crate::documents::kind_word;
@@ -125,6 +125,17 @@ impl Shared {
         Ok((self.mirror(record, revision), replayed))
     }
 
+    /// The job that an owner's idempotency key made, if it did.
+    pub(super) fn made_by(&self, owner: &str, used: &Idempotency) -> Result<Option<Arc<LiveJob>>, Problem> {
+        let asked = async {
+            let client = self.pool.get().await?;
+            let row = client.query_typed_opt(&of_key(), &[(&owner, Type::TEXT), (&used.key.hex(), Type::TEXT)]).await?;
+            client.done();
+            row.map(|row| first_of_key(&row, used)).transpose()
+        };
+        Ok(self.runtime.block_on(self.within(asked))?.map(|(record, revision)| self.mirror(record, revision)))
+    }
+
     /// What the same work as that of these jobs left earlier, where all of it is still there.
     fn known_answers(&self, records: &[JobRecord]) -> Result<HashMap<Digest, Answer>, Problem> {
         let asked = async {
@@ -151,13 +162,9 @@ impl Shared {
         let transaction = client.transaction().await?;
         rows::lock_owner(&transaction, &record.owner).await?;
         if let Some(used) = &record.idempotency {
-            let question = format!("SELECT {} FROM lacuna_jobs WHERE owner = $1 AND idempotency_key = $2", rows::COLUMNS);
-            if let Some(row) = transaction.query_typed_opt(&question, &[(&record.owner, Type::TEXT), (&used.key.hex(), Type::TEXT)]).await?
-            {
-                let (first, revision) = rows::read(&row)?;
-                if first.idempotency.as_ref().map(|first| first.body) != Some(used.body) {
-                    return Err(refusal::key_used_otherwise().into());
-                }
+            let values = [(&record.owner as _, Type::TEXT), (&used.key.hex() as _, Type::TEXT)];
+            if let Some(row) = transaction.query_typed_opt(&of_key(), &values).await? {
+                let (first, revision) = first_of_key(&row, used)?;
                 drop(transaction);
                 client.done();
                 return Ok((first, revision, true));
@@ -505,4 +512,15 @@ fn digest(hex: &str) -> Option<Digest> {
 /// The work of some jobs as a column holds it.
 fn works(records: &[JobRecord]) -> Vec<String> {
     records.iter().map(|record| record.work.hex()).collect()
+}
+
+/// Asks for the job that an owner's idempotency key made.
+fn of_key() -> String {
+    format!("SELECT {} FROM lacuna_jobs WHERE owner = $1 AND idempotency_key = $2", rows::COLUMNS)
+}
+
+fn first_of_key(row: &Row, used: &Idempotency) -> Result<(JobRecord, u64), Failure> {
+    let (first, revision) = rows::read(row)?;
+    let same = first.idempotency.as_ref().is_some_and(|first| first.body == used.body);
+    if same { Ok((first, revision)) } else { Err(refusal::key_used_otherwise().into()) }
 }
