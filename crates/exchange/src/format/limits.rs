@@ -14,14 +14,16 @@ pub struct ReadLimits {
     pub vertices: u64,
     /// Triangles of the mesh that results, all instances counted. Default 50 million.
     pub triangles: u64,
-    /// Entries of an archive. Default 4096: a 3MF file of many parts has a few hundred.
+    /// Entries of an archive. Default 200: a 3MF file has a handful, and one for each part and picture.
     pub archive_entries: u64,
     /// Inflated bytes of an archive, counted while inflating because declared sizes lie.
-    /// Default 4 GiB.
+    /// Default 1 GiB.
     pub inflated_bytes: u64,
-    /// Inflated bytes for one byte of the archive. Default 200: vertices in XML deflate to about a
+    /// Inflated bytes for one byte of the archive. Default 100: vertices in XML deflate to about a
     /// tenth, a bomb reaches a thousand.
     pub inflation_ratio: u64,
+    /// Nesting of elements in the XML of an archive. Default 32: a 3MF file has seven levels of its own.
+    pub xml_depth: u64,
     /// Nesting of components in a 3MF file. Default 32.
     pub component_depth: u64,
     /// Placed objects of a 3MF file, components followed. Default 100 000.
@@ -34,9 +36,10 @@ impl Default for ReadLimits {
             file_bytes: 512 << 20,
             vertices: 50_000_000,
             triangles: 50_000_000,
-            archive_entries: 4096,
-            inflated_bytes: 4 << 30,
-            inflation_ratio: 200,
+            archive_entries: 200,
+            inflated_bytes: 1 << 30,
+            inflation_ratio: 100,
+            xml_depth: 32,
             component_depth: 32,
             instances: 100_000,
         }

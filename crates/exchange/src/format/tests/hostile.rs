@@ -195,6 +195,27 @@ fn two_entries_of_one_name_are_refused() {
 }
 
 #[test]
+fn an_archive_has_few_entries_and_its_elements_lie_in_few_others() {
+    let nested = |levels: usize| {
+        // The model is around them, and the tetrahedron beside.
+        let body = format!(
+            "{}{}<resources><object id='1'>{TETRAHEDRON}</object></resources><build><item objectid='1'/></build>",
+            "<a>".repeat(levels),
+            "</a>".repeat(levels)
+        );
+        threemf("", &body)
+    };
+    assert!(nested(31).is_ok());
+    let error = nested(32).unwrap_err();
+    assert_eq!((error.limit_facts().unwrap().limit, error.limit_facts().unwrap().allowed), ("xml_depth", 32.0));
+
+    let names: Vec<String> = (0..201).map(|k| format!("x/{k}")).collect();
+    let parts: Vec<(&str, &str)> = names.iter().map(|name| (name.as_str(), "")).collect();
+    let facts = read(&package(&parts), Some(Format::ThreeMf), &ReadLimits::default()).unwrap_err();
+    assert_eq!((facts.limit_facts().unwrap().limit, facts.limit_facts().unwrap().allowed), ("archive_entries", 200.0));
+}
+
+#[test]
 fn bombs_are_stopped_while_they_inflate() {
     let spaces = " ".repeat(40 << 20);
     let bomb = model("", &spaces);

@@ -97,7 +97,7 @@ fn open<'a>(bytes: &'a [u8], limits: &'a ReadLimits) -> Result<Package<'a>, Form
     const ALWAYS_ALLOWED: u64 = 1 << 20;
     let ratio_most = (bytes.len() as u64).saturating_mul(limits.inflation_ratio).max(ALWAYS_ALLOWED);
     let archive_most = limits.inflated_bytes.min(ratio_most);
-    let allowance = Allowance { archive_left: archive_most, archive_most };
+    let allowance = Allowance { archive_left: archive_most, archive_most, depth_most: limits.xml_depth };
     Ok(Package { archive, allowance, limits, parsed: (0, 0) })
 }
 

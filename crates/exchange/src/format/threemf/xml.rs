@@ -1,6 +1,7 @@
 //! The little of XML that a 3MF file needs: escaping out, and a guarded event stream in.
 
 use super::super::error::{FormatError, Place};
+use super::super::limits::within;
 use super::malformed;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -30,6 +31,8 @@ pub(super) struct Allowance {
     pub(super) archive_left: u64,
     /// The bound that was set on them, for the message.
     pub(super) archive_most: u64,
+    /// How deep elements may lie in each other.
+    pub(super) depth_most: u64,
 }
 
 /// Longest tag or text: a certificate in the metadata has a few kilobytes.
@@ -86,6 +89,7 @@ pub(super) fn visit<R: Read>(
     allowance: &mut Allowance,
     visitor: &mut dyn FnMut(Tag<'_, '_>, u64) -> Result<(), FormatError>,
 ) -> Result<(), FormatError> {
+    let depth_most = allowance.depth_most;
     let counted = Counted { source: BufReader::with_capacity(64 << 10, source), allowance, event_left: 0, exceeded: None };
     let mut reader = Reader::from_reader(counted);
     let mut buffer = Vec::new();
@@ -109,6 +113,7 @@ pub(super) fn visit<R: Read>(
             Event::Start(start) => {
                 depth += 1;
                 elements += 1;
+                within(place(), "xml_depth", depth, depth_most)?;
                 visitor(Tag::Start(&start), byte)?;
             }
             Event::Empty(start) => {
