@@ -7,9 +7,10 @@ use std::process::Command;
 use std::time::Duration;
 
 use lacuna_tests::support::binary::succeed;
+use lacuna_tests::support::cases::model;
 use lacuna_tests::support::python::system_python;
 use lacuna_tests::support::scratch::Scratch;
-use lacuna_tests::support::service::{Answer, Service};
+use lacuna_tests::support::service::{Answer, Service, is_alive, send_signal, until};
 use serde_json::{Value, json};
 
 /// A cube of quads with a side, in the form of OBJ.
@@ -279,6 +280,8 @@ fn a_key_keeps_no_more_than_its_share() {
     assert_eq!(upload(&service, &headers, first.as_bytes()).status, 200);
     assert_eq!(service.delete(&format!("/v1/models/{id}")).status, 204);
     assert_eq!(upload(&service, &headers, second.as_bytes()).status, 201);
+    // Model documents count as mesh files do.
+    refused(&service.post("/v1/models", &model("ifs/sierpinski_tetrahedron")), 422, "limit.stored-bytes");
 }
 
 #[test]
@@ -289,4 +292,82 @@ fn a_job_cannot_name_a_mesh_until_memory_ends() {
     let inputs: Vec<Value> = (0..20).map(|k| json!({ "name": format!("box {k}"), "model_ref": id })).collect();
     let job = json!({ "lacuna": 1, "kind": "intersect", "inputs": inputs, "params": { "tolerance_mm": 0.01, "operation": "union" } });
     refused(&service.post("/v1/jobs", &job), 422, "limit.referenced-faces");
+}
+
+/// One face that goes round its three corners so many times: a file of little more than six bytes for each time.
+fn long_face(rounds: usize) -> Vec<u8> {
+    format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf{}\n", " 1 2 3".repeat(rounds)).into_bytes()
+}
+
+#[test]
+fn files_are_read_apart_from_the_service_while_somebody_waits() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_API_KEYS", "first-key,second-key")]);
+    let file = long_face(2_000_000);
+    let head = format!(
+        "POST /v1/models HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer first-key\r\ncontent-type: model/obj\r\ncontent-length: {}\r\n\r\n",
+        file.len()
+    );
+    let client = || {
+        let mut client = TcpStream::connect(service.address).unwrap();
+        client.write_all(head.as_bytes()).unwrap();
+        client.write_all(&file).unwrap();
+        client
+    };
+    let first = client();
+    until(Duration::from_secs(20), "a reader", || !service.answering().is_empty());
+    // It will take as long as it likes.
+    let reader = service.answering()[0];
+    assert!(send_signal(reader, "STOP"));
+    let others: Vec<TcpStream> = (0..9).map(|_| client()).collect();
+
+    // Ten files of one key wait for it, and nobody else.
+    let second = ("authorization", "Bearer second-key");
+    assert_eq!(service.get_with("/v1/models", &[second]).status, 200);
+    let cube = upload(&service, &[second, ("content-type", "model/obj")], cube(0.0, 1.0).as_bytes());
+    assert_eq!(cube.status, 201, "{}", cube.json());
+    let job = json!({ "lacuna": 1, "kind": "convert", "model_ref": cube.json()["id"], "params": { "tolerance_mm": 0.01 } });
+    assert_eq!(service.post_with("/v1/jobs", &[second], job.to_string().as_bytes()).status, 202);
+    assert!(is_alive(reader));
+
+    drop((first, others));
+    until(Duration::from_secs(20), "the end of what nobody waits for", || !service.answering().contains(&reader));
+    assert_eq!(service.get_with("/v1/models", &[("authorization", "Bearer first-key")]).json()["items"], json!([]));
+}
+
+#[test]
+fn a_file_that_takes_too_much_is_refused_with_the_way_out() {
+    for (setting, value, code) in
+        [("LACUNA_LIMIT_MEMORY_BYTES", "30000000", "limit.memory"), ("LACUNA_LIMIT_SECONDS", "0.02", "limit.seconds")]
+    {
+        let scratch = Scratch::new();
+        let service = Service::start_with(scratch.path(), &[(setting, value)]);
+        let answer = upload(&service, &[("content-type", "model/obj")], &long_face(1_000_000));
+        refused(&answer, 422, code);
+        let detail = answer.json()["detail"].to_string();
+        assert!(detail.contains(value) && detail.contains("fewer triangles"), "{detail}");
+        assert_eq!(kept(scratch.path()), 0);
+    }
+}
+
+#[test]
+fn an_order_is_repeated_though_its_model_has_been_forgotten() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let id = uploaded(&service, "box.obj", cube(0.0, 1.0).as_bytes())["id"].clone();
+    let job = json!({ "lacuna": 1, "kind": "convert", "model_ref": id, "params": { "tolerance_mm": 0.01 } });
+    let batch = json!({ "lacuna": 1, "jobs": [{ "job": job }] });
+    let send = |path: &str, document: &Value| service.post_with(path, &[("idempotency-key", "once")], document.to_string().as_bytes());
+    let first = (send("/v1/jobs", &job), send("/v1/batches", &batch));
+    assert!(first.0.status < 300 && first.1.status < 300, "{} {}", first.0.json(), first.1.json());
+    assert_eq!(service.delete(&format!("/v1/models/{}", id.as_str().unwrap())).status, 204);
+    let again = (send("/v1/jobs", &job), send("/v1/batches", &batch));
+    for (first, again) in [(first.0, again.0), (first.1, again.1)] {
+        assert_eq!((again.header("idempotency-replayed"), &again.json()["id"]), ("true", &first.json()["id"]), "{}", again.json());
+    }
+    // Another body is another order, whatever it names; and without the key the model is missed.
+    let mut other = job.clone();
+    other["params"]["tolerance_mm"] = json!(0.02);
+    refused(&send("/v1/jobs", &other), 422, "idempotency-mismatch");
+    refused(&service.post("/v1/jobs", &job), 422, "job.unknown-model");
 }

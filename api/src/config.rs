@@ -143,7 +143,7 @@ pub struct Config {
     pub body_seconds: u64,
     /// Longest mesh file that is taken, in bytes.
     pub upload_bytes: u64,
-    /// Mesh files that one key may keep, in bytes.
+    /// Models and mesh files that one key may keep, in bytes.
     pub stored_bytes: u64,
     /// Time for a whole upload, in seconds; between two pieces of it `body_seconds` may pass.
     pub upload_seconds: u64,

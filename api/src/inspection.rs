@@ -1,6 +1,7 @@
 //! What a mesh file really contains, and what a slicer will make of it.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use lacuna_exchange::format::{self, Format, MeshFile, ReadLimits, Unit};
 use lacuna_kernel::budget::Budget;
@@ -11,6 +12,7 @@ use lacuna_kernel::solid::{Topology, TriMesh};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::digest::Digest;
 use crate::problem::{Finding, Problem, ProblemKind};
 use crate::production::{self, format_problem};
 
@@ -117,6 +119,38 @@ pub struct Prompt {
 /// When the file cannot be read within the limits.
 pub fn read(bytes: &[u8], format: Option<Format>, limits: &ReadLimits) -> Result<MeshFile, Problem> {
     production::guarded(|| format::read(bytes, format, limits))?.map_err(|error| format_problem(&error))
+}
+
+/// What may be built of an upload; its length is a setting.
+fn limits_of_uploads(upload_bytes: u64) -> ReadLimits {
+    ReadLimits { file_bytes: upload_bytes, vertices: 20_000_000, triangles: 20_000_000, ..ReadLimits::default() }
+}
+
+/// What was found in a mesh file that was uploaded.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Examined {
+    /// The digest of the file.
+    pub digest: Digest,
+    /// What it holds.
+    pub report: MeshReport,
+}
+
+/// Reads and examines a mesh file that was uploaded.
+///
+/// # Errors
+/// When it cannot be read within the limits, or holds no faces.
+pub fn examine(path: &Path, format: Option<Format>, upload_bytes: u64) -> Result<Examined, Problem> {
+    let bytes = std::fs::read(path).map_err(|error| Problem::io("the file that arrived cannot be read", &error))?;
+    let file = read(&bytes, format, &limits_of_uploads(upload_bytes))?;
+    let (digest, length) = (Digest::of(&bytes), bytes.len() as u64);
+    // The report takes memory of its own.
+    drop(bytes);
+    if file.mesh.triangles.is_empty() {
+        let format = file.facts.format;
+        let detail = format!("the {format} file holds no triangles and no polygons; a mesh is expected");
+        return Err(Problem::new(ProblemKind::InvalidFile, detail).code("upload.empty"));
+    }
+    Ok(Examined { digest, report: report(&file, length)? })
 }
 
 /// What can be counted in a mesh.

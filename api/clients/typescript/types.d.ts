@@ -715,7 +715,7 @@ export interface LimitCapability {
   /** Jobs that may wait. */ queued_jobs: number;
   /** Hours after which ended jobs expire: what they made is given up. */ retention_hours: number;
   /** Most wall time of a job, in seconds. */ seconds: number;
-  /** Bytes of all mesh files that one key may keep. */ stored_bytes: number;
+  /** Bytes of all models and mesh files that one key may keep. */ stored_bytes: number;
   /** Submissions per minute and key. */ submissions_per_minute: number;
   /** Most triangles of a result. */ triangles: number;
   /** Bytes of an uploaded mesh file. */ upload_bytes: number;

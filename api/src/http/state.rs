@@ -11,6 +11,7 @@ use crate::config::Config;
 use crate::documents::Stored;
 use crate::jobs::asked::Asked;
 use crate::jobs::desk::{Desk, DeskLimits};
+use crate::jobs::readers::Readers;
 use crate::metrics::Metrics;
 use crate::problem::Problem;
 use crate::production::Engine;
@@ -33,6 +34,8 @@ pub struct AppState {
     pub engine: Engine,
     /// Who answers questions.
     asked: Asked,
+    /// Who reads mesh files that are uploaded.
+    pub readers: Readers,
     /// Who submitted how often.
     pub submissions: RateLimiter,
     /// Who called otherwise how often.
@@ -90,6 +93,7 @@ impl AppState {
             closing: watch::Sender::new(false),
             engine,
             asked: Asked::new(engine),
+            readers: Readers::new(engine),
             submissions,
             calls,
             blocking,

@@ -1,4 +1,4 @@
-//! A process that does jobs or answers questions for the service, one after the other: the other end of `process.rs`.
+//! A process that does jobs, answers questions or reads uploads for the service, one after the other: the other end of `process.rs`.
 //!
 //! It is asked on stdin, answers on stdout, and knows neither the store nor the network. When stdin closes, because the
 //! service has gone, however it went, this process ends at once.
@@ -19,6 +19,7 @@ use super::process::Purpose;
 use super::record::Step;
 use crate::documents::{Stored, StoredMesh};
 use crate::files::PendingFile;
+use crate::inspection;
 use crate::problem::Problem;
 use crate::production::{self, Engine};
 use crate::questions::{self, Question};
@@ -47,6 +48,7 @@ pub fn serve() -> Result<(), Problem> {
         let said = match heard {
             Heard::Job(task) => production::guarded(|| desk.perform(&task)),
             Heard::Question(asked) => production::guarded(|| desk.answer(&asked)),
+            Heard::Upload(upload) => production::guarded(|| examine(&upload)),
             _ => return Err(Problem::internal("an answer without a question")),
         };
         let said = said.and_then(|said| said).unwrap_or_else(|problem| Said::Failed(Box::new(problem)));
@@ -59,6 +61,7 @@ pub fn serve() -> Result<(), Problem> {
 enum Heard {
     Job(Box<Task>),
     Question(Box<Asked>),
+    Upload(Upload),
     Stored(Option<Stored>),
     File(String),
 }
@@ -68,6 +71,14 @@ struct Asked {
     question: Question,
     document: Vec<u8>,
     most: Limits,
+    memory_bytes: u64,
+}
+
+/// A mesh file to examine.
+struct Upload {
+    name: String,
+    format: Option<Format>,
+    upload_bytes: u64,
     memory_bytes: u64,
 }
 
@@ -93,6 +104,10 @@ fn hear(stdin: &mut BufReader<io::Stdin>) -> io::Result<Option<Heard>> {
         Told::Question { question, bytes, most, memory_bytes } => {
             let document = messages::announced(stdin, bytes)?;
             Heard::Question(Box::new(Asked { question, document, most: most.into(), memory_bytes }))
+        }
+        Told::Upload { name, format, upload_bytes, memory_bytes } => {
+            let format = format.map(|format| Format::from_name(&format).ok_or(io::ErrorKind::InvalidData)).transpose()?;
+            Heard::Upload(Upload { name, format, upload_bytes, memory_bytes })
         }
         Told::Mesh(None) => Heard::Stored(None),
         Told::Model(bytes) => Heard::Stored(Some(Stored::Document(messages::announced(stdin, bytes)?))),
@@ -138,6 +153,13 @@ impl Desk {
         let _alone = crate::locked(&self.said);
         messages::send(&mut io::stdout().lock(), said, &[])
     }
+}
+
+/// Reads a mesh file and tells what is in it.
+fn examine(upload: &Upload) -> Result<Said, Problem> {
+    memory::limit(upload.memory_bytes)?;
+    let examined = inspection::examine(Path::new(&upload.name), upload.format, upload.upload_bytes)?;
+    serde_json::to_string(&examined).map(Said::Answer).map_err(|error| Problem::internal(error.to_string()))
 }
 
 impl Workshop for Desk {

@@ -34,6 +34,17 @@ pub(super) enum Told {
         /// The memory that the answer may take, in bytes.
         memory_bytes: u64,
     },
+    /// A mesh file to examine, which lies in the process's folder.
+    Upload {
+        /// Its name there.
+        name: String,
+        /// As what to read it, by the ending of the format; that is found in the file when absent.
+        format: Option<String>,
+        /// The most bytes that it may have.
+        upload_bytes: u64,
+        /// The memory that reading it may take, in bytes.
+        memory_bytes: u64,
+    },
     /// The mesh file that was asked for, which follows; without a head there is none.
     Mesh(Option<MeshHead>),
     /// The model document that was asked for, which follows, with so many bytes.
@@ -76,7 +87,7 @@ pub(super) enum Said {
         /// What is proven of them.
         certificate: Box<Certificate>,
     },
-    /// The answer to a question.
+    /// The answer to a question, or what was found in a mesh file.
     Answer(String),
     /// There is no result.
     Failed(Box<Problem>),

@@ -1,4 +1,4 @@
-//! A worker's process: the same program, which does one job, or answers one question, after the other on this side's behalf (`apart.rs` is the
+//! A worker's process: the same program, which does one job, answers one question, or reads one upload after the other on this side's behalf (`apart.rs` is the
 //! other side).
 //!
 //! What a job does to its process (memory that runs out, a crash of native code, a stack that overflows) it does to nobody else. A
@@ -13,7 +13,8 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use lacuna_kernel::budget::{Limits, StopReason};
+use lacuna_exchange::format::Format;
+use lacuna_kernel::budget::{CancelToken, Limits, StopReason};
 use lacuna_kernel::error::LimitFacts;
 
 use super::live::LiveJob;
@@ -48,7 +49,7 @@ pub enum Purpose {
     /// It does jobs, whenever nobody else needs the processor.
     #[default]
     Jobs,
-    /// It answers questions that somebody waits for.
+    /// It answers questions, or reads uploads, that somebody waits for.
     Questions,
 }
 
@@ -71,6 +72,21 @@ enum Heard {
     Words(String),
     /// No message.
     Garbled(io::Error),
+}
+
+/// What an answer may take.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds<'a> {
+    /// Memory in bytes.
+    pub(super) memory_bytes: u64,
+    /// Time.
+    pub(super) time: Duration,
+    /// How much longer it is waited for, because the process looks at the clock itself.
+    pub(super) grace: Duration,
+    /// What helps if the memory is not enough.
+    pub(super) advice: &'static str,
+    /// Fired when nobody waits for the answer any more.
+    pub(super) cancel: &'a CancelToken,
 }
 
 /// Why a job has no files.
@@ -161,18 +177,20 @@ impl Process {
         }
     }
 
-    /// The answer to a question.
-    fn ask(&mut self, told: &Told, document: &[u8], memory_bytes: u64, find: ModelFinder<'_>) -> Result<String, Failure> {
+    /// The answer to a question, or what is in an upload.
+    fn ask(&mut self, told: &Told, document: &[u8], bounds: &Bounds<'_>, find: ModelFinder<'_>) -> Result<String, Failure> {
         self.tell(told, document);
-        let (deadline, mut silent) = (Instant::now() + questions::TIME + GRACE, true);
+        let (deadline, mut silent) = (Instant::now() + bounds.time + bounds.grace, true);
         loop {
-            let heard = self.heard.recv_timeout(deadline.saturating_duration_since(Instant::now()));
+            let late = (Instant::now() >= deadline).then_some(StopReason::Deadline);
+            if let Some(reason) = bounds.cancel.reason().or(late) {
+                return Err(Failure::Over(production::stopped(reason, bounds.time.as_secs_f64())));
+            }
+            let heard = self.heard.recv_timeout(LOOK_EVERY);
             silent &= !matches!(heard, Ok(Heard::Said(_)));
             match heard {
-                Err(RecvTimeoutError::Timeout) => {
-                    return Err(Failure::Over(production::stopped(StopReason::Deadline, questions::TIME.as_secs_f64())));
-                }
-                Err(RecvTimeoutError::Disconnected) => return Err(self.dead(memory_bytes, ASK_FOR_LESS, silent)),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err(self.dead(bounds.memory_bytes, bounds.advice, silent)),
                 Ok(Heard::Words(line)) => self.remember(line),
                 Ok(Heard::Garbled(error)) => return Err(garbled(&error)),
                 Ok(Heard::Said(Said::NeedsStored(word))) => self.lend(find(&word)),
@@ -275,7 +293,23 @@ impl Place {
         threads: usize,
     ) -> Result<String, Problem> {
         let told = Told::Question { question, bytes: document.len() as u64, most: most.into(), memory_bytes };
-        self.with_process(store, threads, |process| process.ask(&told, document, memory_bytes, find))
+        let bounds = Bounds { memory_bytes, time: questions::TIME, grace: GRACE, advice: ASK_FOR_LESS, cancel: &CancelToken::new() };
+        self.with_process(store, threads, |process| process.ask(&told, document, &bounds, find))
+    }
+
+    /// Examines a mesh file of the store's scratch folder, with so many threads.
+    pub(super) fn examine(
+        &mut self,
+        name: String,
+        format: Option<Format>,
+        upload_bytes: u64,
+        bounds: &Bounds<'_>,
+        store: &Store,
+        threads: usize,
+    ) -> Result<String, Problem> {
+        let format = format.map(|format| format.facts().ending.to_owned());
+        let told = Told::Upload { name, format, upload_bytes, memory_bytes: bounds.memory_bytes };
+        self.with_process(store, threads, |process| process.ask(&told, &[], bounds, &|_| None))
     }
 
     fn with_process<T>(

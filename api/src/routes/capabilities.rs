@@ -49,7 +49,7 @@ pub struct LimitCapability {
     body_bytes: usize,
     /// Bytes of an uploaded mesh file.
     upload_bytes: u64,
-    /// Bytes of all mesh files that one key may keep.
+    /// Bytes of all models and mesh files that one key may keep.
     stored_bytes: u64,
     /// Seconds that `Prefer: wait` may ask.
     wait_seconds: u64,

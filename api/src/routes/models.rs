@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::uploads::{self, MeshFile, UploadQuery};
+use crate::digest::Digest;
 use crate::documents;
 use crate::files;
 use crate::http::auth::Owner;
@@ -68,6 +69,7 @@ pub async fn store(
         let kept = state.beside(move |state| {
             let model = documents::read_model(&body)?;
             let document = documents::model_document(&model);
+            uploads::check_share(state, &owner, Digest::of(document.as_bytes()), document.len() as u64)?;
             let kept = state.store.keep_model(&owner.0, model.name.as_deref(), document.as_bytes());
             kept.map_err(|error| Problem::io("the model could not be stored", &error))
         });

@@ -4,16 +4,18 @@ use std::time::Duration;
 
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
-use lacuna_exchange::format::{FORMATS, Format, ReadLimits};
+use lacuna_exchange::format::{FORMATS, Format};
+use lacuna_kernel::budget::{CancelToken, StopReason};
 use lacuna_kernel::error::LimitFacts;
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
 
 use crate::digest::Digest;
+use crate::files::PendingFile;
 use crate::http::auth::Owner;
 use crate::http::body;
 use crate::http::state::{AppState, Shared};
-use crate::inspection;
+use crate::inspection::Examined;
 use crate::problem::{Problem, ProblemKind};
 use crate::store::ModelView;
 
@@ -42,18 +44,6 @@ const MORE_MEDIA_TYPES: [(&str, Format); 6] = [
     ("model/x3d-vrml", Format::Vrml),
     ("x-world/x-vrml", Format::Vrml),
 ];
-
-/// What may be inflated and built of an upload; its length is a setting.
-fn reading(upload_bytes: u64) -> ReadLimits {
-    ReadLimits {
-        file_bytes: upload_bytes,
-        archive_entries: 1000,
-        inflated_bytes: 1 << 30,
-        vertices: 20_000_000,
-        triangles: 20_000_000,
-        ..ReadLimits::default()
-    }
-}
 
 /// What the headers and the query say of a mesh file.
 #[derive(Debug, PartialEq)]
@@ -126,40 +116,53 @@ pub async fn receive(state: &Shared, owner: Owner, query: UploadQuery, request: 
     let pending = state.beside(move |state| state.store.new_upload().map_err(failed)).await?;
     let idle = Duration::from_secs(state.config.body_seconds);
     let pending = body::receive(request, pending, state.config.upload_bytes, idle).await?;
-    state.beside(move |state| keep(state, &owner, told, pending)).await
+    let place = state.readers.place(&owner.0).await?;
+    let cancel = CancelToken::new();
+    // When the client leaves, what is waited for here is dropped, and this with it.
+    let _leaving = Leaving(cancel.clone());
+    state
+        .at_once(move |state| {
+            let kept = keep(state, &owner, told, pending, &cancel);
+            drop(place);
+            kept
+        })
+        .await
 }
 
-fn keep(state: &AppState, owner: &Owner, told: Told, mut pending: crate::files::PendingFile) -> Result<(ModelView, bool), Problem> {
-    use std::io::Read as _;
-    let failed = |error: std::io::Error| Problem::io("the file could not be kept", &error);
-    let mut bytes = Vec::new();
-    pending.reread().map_err(failed)?.read_to_end(&mut bytes).map_err(failed)?;
-    let file = inspection::read(&bytes, told.format, &reading(state.config.upload_bytes))?;
-    if file.mesh.triangles.is_empty() {
-        let format = file.facts.format;
-        let detail = format!("the {format} file holds no triangles and no polygons; a mesh is expected");
-        return Err(Problem::new(ProblemKind::InvalidFile, detail).code("upload.empty"));
+/// Stops the reading of a file when it is dropped.
+struct Leaving(CancelToken);
+
+impl Drop for Leaving {
+    fn drop(&mut self) {
+        self.0.fire(StopReason::Cancelled);
     }
-    let digest = Digest::of(&bytes);
-    check_share(state, owner, digest, bytes.len() as u64)?;
-    let report = inspection::report(&file, bytes.len() as u64)?;
-    // The mesh may be large, and the next one waits for its memory.
-    drop((file, bytes));
-    state.store.keep_upload(&owner.0, told.name, &mut pending, digest, report).map_err(failed)
+}
+
+fn keep(state: &AppState, owner: &Owner, told: Told, mut pending: PendingFile, cancel: &CancelToken) -> Result<(ModelView, bool), Problem> {
+    let config = &state.config;
+    let examined = state.readers.examine(&pending, told.format, config.upload_bytes, &config.job_limits, &state.store, cancel)?;
+    let Examined { digest, report } = examined;
+    check_share(state, owner, digest, report.bytes)?;
+    let kept = state.store.keep_upload(&owner.0, told.name, &mut pending, digest, report);
+    kept.map_err(|error| Problem::io("the file could not be kept", &error))
 }
 
 /// A key that never forgets anything must not fill the disk for all.
-fn check_share(state: &AppState, owner: &Owner, digest: Digest, bytes: u64) -> Result<(), Problem> {
+///
+/// # Errors
+/// When with so many bytes of this digest the key would keep more than its share.
+pub(super) fn check_share(state: &AppState, owner: &Owner, digest: Digest, bytes: u64) -> Result<(), Problem> {
     let kept = state.store.list_models(&owner.0).map_err(|error| Problem::io("the models could not be counted", &error))?;
-    let others: u64 = kept.iter().filter(|view| view.mesh.is_some() && view.digest != digest).map(|view| view.bytes).sum();
+    let others: u64 = kept.iter().filter(|view| view.digest != digest).map(|view| view.bytes).sum();
     let (asked, allowed) = (others.saturating_add(bytes), state.config.stored_bytes);
     if asked <= allowed {
         return Ok(());
     }
     #[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
     let facts = LimitFacts { limit: "stored_bytes", asked: asked as f64, allowed: allowed as f64, remedy: None };
-    let detail =
-        format!("the mesh files of this key would have {asked} bytes, and {allowed} may be kept; DELETE /v1/models/ID forgets one");
+    let detail = format!(
+        "the models and mesh files of this key would have {asked} bytes, and {allowed} may be kept; DELETE /v1/models/ID forgets one"
+    );
     Err(Problem::new(ProblemKind::Limit, detail).code("limit.stored-bytes").limit(&facts))
 }
 
