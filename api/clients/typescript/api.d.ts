@@ -76,7 +76,8 @@ export class Api extends Transport {
   cancelJob(id: string, options?: { signal?: AbortSignal }): Promise<JobView>;
   /**
    * A job's events: `state`, `progress`, `warning`, `output`, `done`; the last ends the stream. A client that lost
-   * the stream sends `Last-Event-ID` and gets what it missed.
+   * the stream sends `Last-Event-ID` and gets what it missed; all there is, if the service was started again in
+   * between.
    */
   jobEvents(id: string, options?: { lastEventId?: number | null; signal?: AbortSignal }): AsyncGenerator<ServerEvent>;
   /**

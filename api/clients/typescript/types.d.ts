@@ -1269,9 +1269,11 @@ export interface TerrainShape {
 }
 
 /**
- * Least thickness along the normals of the mesh that is measured, between faces without a common corner: at
- * edges sharper than a right angle every wall ends in nothing. For a dilation the mesh is the one that would be
- * written, without simplification.
+ * Least thickness along the normals of the mesh that is measured, between faces that look at each other, whose
+ * normals are opposite within 45 degrees and that have no corner in common: beside edges sharper than a right
+ * angle every wall ends in nothing. For a dilation the mesh is the one that would be written, without
+ * simplification, faces lower than twice its bound tell no direction, and those nearer to each other than thrice
+ * the bound are taken for folds of one surface.
  */
 export interface ThicknessStatement {
   gap?: LeastThicknessStatement | null;

@@ -126,7 +126,8 @@ class Api(Transport):
     def job_events(self, id: str, *, last_event_id: int | None | None = None) -> Iterator[Event]:
         """A job's events: `state`, `progress`, `warning`, `output`, `done`; the last ends the stream.
 
-        A client that lost the stream sends `Last-Event-ID` and gets what it missed.
+        A client that lost the stream sends `Last-Event-ID` and gets what it missed; all there is, if the
+        service was started again in between.
         """
         return self._events('GET', f"/v1/jobs/{quote(id, safe='')}/events", header={'Last-Event-ID': last_event_id}, accept='text/event-stream, application/problem+json')
 
