@@ -358,7 +358,12 @@ mod tests {
         store.keep_result(&mut pending, digest).unwrap();
         let leftover = root.join("results").join(format!(".x{PENDING_ENDING}"));
         fs::write(&leftover, b"half").unwrap();
+        // Whoever is at work in a folder is not disturbed.
+        assert_eq!(Store::open(&root).unwrap_err().kind(), ErrorKind::ResourceBusy);
+        assert!(leftover.exists());
 
+        drop(pending);
+        drop(store);
         let store = Store::open(&root).unwrap();
         assert!(!leftover.exists());
         let place = root.join(result_name(digest));

@@ -73,6 +73,11 @@ impl Service {
         Self { state, folder }
     }
 
+    /// Ends, as a process does, and leaves its folder to the next.
+    fn leave(mut self) -> PathBuf {
+        std::mem::take(&mut self.folder)
+    }
+
     async fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: impl Into<Body>) -> (StatusCode, HeaderMap, Vec<u8>) {
         let mut request = Request::builder().method(method).uri(path);
         for (name, value) in headers {
@@ -321,7 +326,7 @@ async fn queues_are_bounded_and_outlive_the_process() {
     assert_eq!(service.get("/readyz").await.0, StatusCode::SERVICE_UNAVAILABLE);
     assert_eq!(service.submit(0.3, &[]).await.0, StatusCode::SERVICE_UNAVAILABLE);
 
-    let next = Service::start_in(service.folder.clone(), 1, &[]);
+    let next = Service::start_in(service.leave(), 1, &[]);
     assert_eq!(next.ended(job["id"].as_str().unwrap()).await["state"], "succeeded");
     let (_, list) = next.get("/v1/jobs?state=succeeded&limit=1").await;
     assert_eq!(list["items"][0]["id"], job["id"]);

@@ -649,7 +649,7 @@ mod tests {
         let digest = Digest::of(b"a file");
         let output = Output { name: "obj".into(), file_name: "a.obj".into(), media_type: "model/obj".into(), bytes: 6, digest };
         let answer = super::super::record::Answer { outputs: vec![output.clone()], certificate: Default::default() };
-        let finish = |body: &str| {
+        let finish = |desk: &Desk, body: &str| {
             let (job, replayed) = desk.submit(submission(body, Some("k"))).unwrap();
             assert!(!replayed);
             desk.conclude(&desk.take().unwrap(), &Ending::Done(Box::new(answer.clone())));
@@ -658,27 +658,29 @@ mod tests {
             job.id()
         };
         let hour = Duration::from_secs(3600);
-        let sweep = |jobs, records, most_records| desk.sweep(Retention { jobs, records, most_records }).unwrap();
-        let first = finish("{}");
-        sweep(hour, hour, 10);
+        let sweep = |desk: &Desk, jobs, records, most_records| desk.sweep(Retention { jobs, records, most_records }).unwrap();
+        let first = finish(&desk, "{}");
+        sweep(&desk, hour, hour, 10);
         assert_eq!((look(&desk, "ada", &first).unwrap().state(), made(&desk, "ada", digest)), (JobState::Succeeded, Some(false)));
-        sweep(Duration::ZERO, hour, 10);
+        sweep(&desk, Duration::ZERO, hour, 10);
         let record = look(&desk, "ada", &first).unwrap().record();
         assert_eq!((record.view.state, &record.view.outputs, record.view.attempt), (JobState::Expired, &vec![output], 1));
         assert!(record.view.finished.is_some() && record.view.expired >= record.view.finished);
         assert!(record.view.certificate.is_none() && record.view.problem.is_none() && record.idempotency.is_none());
         assert_eq!((made(&desk, "ada", digest), made(&desk, "bob", digest)), (Some(true), None));
         // Its key is free, and what is made again is there again.
-        let second = finish("[]");
+        let second = finish(&desk, "[]");
         assert_ne!(first, second);
         assert_eq!(made(&desk, "ada", digest), Some(false));
         // It outlives the process, and no more of them than may be are kept, nor for longer.
-        assert_eq!(look(&desk_of(), "ada", &first).unwrap().record(), record);
-        sweep(Duration::ZERO, hour, 1);
+        drop(desk);
+        let desk = desk_of();
+        assert_eq!(look(&desk, "ada", &first).unwrap().record(), record);
+        sweep(&desk, Duration::ZERO, hour, 1);
         assert!(look(&desk, "ada", &first).is_none());
         assert_eq!(look(&desk, "ada", &second).unwrap().state(), JobState::Expired);
         std::thread::sleep(Duration::from_millis(3));
-        sweep(Duration::ZERO, Duration::ZERO, 1);
+        sweep(&desk, Duration::ZERO, Duration::ZERO, 1);
         assert!(look(&desk, "ada", &second).is_none() && made(&desk, "ada", digest).is_none());
         assert_eq!(std::fs::read_dir(root.join("jobs")).unwrap().count(), 0);
         std::fs::remove_dir_all(root).unwrap();
