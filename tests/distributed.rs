@@ -320,3 +320,31 @@ fn a_job_that_has_expired_is_known_to_every_front_end_for_a_while() {
     until(PATIENCE, "no record", || fourth.get("/v1/jobs").json()["items"] == json!([]));
     assert_eq!(fourth.get(&result).status, 404);
 }
+
+#[test]
+fn keys_are_served_by_turns_however_many_jobs_one_has() {
+    let Some(stage) = Stage::set() else { return };
+    let front = stage.start_with("front", "front", &[("LACUNA_API_KEYS", "ada,ben")]);
+    let submit = |key: &str, number: u32| {
+        let answer = front.post_with("/v1/jobs", &[("authorization", &format!("Bearer {key}"))], order(number).to_string().as_bytes());
+        assert_eq!(answer.status, 202, "{}", answer.json());
+        answer.json()["id"].as_str().unwrap().to_owned()
+    };
+    let many: Vec<String> = (0..8).map(|number| submit("ada", number)).collect();
+    let few: Vec<String> = (8..10).map(|number| submit("ben", number)).collect();
+    let _worker = stage.start("worker", "one");
+    let started = |key: &str, id: &String| {
+        let authorization = format!("Bearer {key}");
+        let mut job = Value::Null;
+        until(PATIENCE, "the end", || {
+            job = front.get_with(&format!("/v1/jobs/{id}"), &[("authorization", &authorization)]).json();
+            job["state"] == "succeeded"
+        });
+        job["started"].as_str().unwrap().to_owned()
+    };
+    let of_many: Vec<String> = many.iter().map(|id| started("ada", id)).collect();
+    let of_few: Vec<String> = few.iter().map(|id| started("ben", id)).collect();
+    // Each of the few begins behind as many of the many as there were turns.
+    assert!(of_few[0] < of_many[2] && of_few[1] < of_many[3], "{of_few:?} {of_many:?}");
+    assert!(of_many.is_sorted() && of_few.is_sorted());
+}

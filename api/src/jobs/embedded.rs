@@ -1,6 +1,6 @@
 //! The ledger of one process: all jobs in memory, every lasting change on the device before anybody sees it.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::io;
 use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -19,6 +19,9 @@ use crate::problem::Problem;
 use crate::store::Store;
 
 mod batches;
+mod queue;
+
+use queue::{Queue, Waiting};
 
 /// The ledger.
 #[derive(Debug)]
@@ -40,8 +43,8 @@ struct Book {
     batches: BTreeMap<String, Arc<BatchRecord>>,
     /// What idempotency keys were used for; nothing yet while the first submission is accepted.
     keys: HashMap<(String, Digest), Option<String>>,
-    /// Jobs that wait, first come first served.
-    waiting: VecDeque<(String, Digest)>,
+    /// Jobs that wait.
+    waiting: Queue,
     /// Work that workers are at.
     at_work: HashSet<Digest>,
     /// Jobs that have not ended, by owner, those that are being accepted included.
@@ -83,9 +86,7 @@ impl Book {
     }
 
     fn stop_waiting(&mut self, id: &str) -> bool {
-        let before = self.waiting.len();
-        self.waiting.retain(|(waiting, _)| waiting != id);
-        self.waiting.len() < before
+        !self.waiting.take_all(|job| job.id == id).is_empty()
     }
 }
 
@@ -115,7 +116,7 @@ impl Embedded {
             }
             if record.view.state == JobState::Queued {
                 // Accepted before: it is not refused now.
-                book.waiting.push_back((record.view.id.clone(), record.work));
+                book.waiting.add(waiting(&record));
                 *book.unfinished.entry(record.owner.clone()).or_default() += 1;
             }
             book.insert(&Arc::new(LiveJob::at(record, started)));
@@ -210,10 +211,11 @@ impl Embedded {
         }
         let mut jobs = Vec::with_capacity(records.len());
         for record in records {
-            let waiting = waits(&record).then(|| (record.view.id.clone(), record.work));
+            if waits(&record) {
+                book.waiting.add(waiting(&record));
+            }
             let job = Arc::new(LiveJob::new(record));
             book.insert(&job);
-            book.waiting.extend(waiting);
             jobs.push(job);
         }
         if let Some(batch) = batch {
@@ -291,7 +293,7 @@ impl Embedded {
         };
         let stopped = job.change(stop, |record| self.settle(record));
         if waited && stopped.is_err() {
-            self.book().waiting.push_front((id, job.with(|record| record.work)));
+            self.book().waiting.put_back(job.with(waiting));
         }
         stopped.map(|()| job.view())
     }
@@ -325,11 +327,11 @@ impl Embedded {
             if book.closed {
                 return None;
             }
-            if let Some(place) = book.waiting.iter().position(|(_, work)| !book.at_work.contains(work))
-                && let Some((id, work)) = book.waiting.remove(place)
-                && let Some(job) = book.jobs.get(&id).cloned()
-            {
-                book.at_work.insert(work);
+            let Book { waiting, at_work, jobs, .. } = &mut *book;
+            if let Some(next) = waiting.take(|job| !at_work.contains(&job.work)) {
+                // Its owner has just forgotten it.
+                let Some(job) = jobs.get(&next.id).cloned() else { continue };
+                at_work.insert(next.work);
                 drop(book);
                 self.start(&job);
                 return Some(job);
@@ -372,7 +374,7 @@ impl Embedded {
         let mut book = self.book();
         book.at_work.remove(&work);
         if state == JobState::Queued {
-            book.waiting.push_front((id, work));
+            book.waiting.put_back(job.with(waiting));
         }
         let followers = match ending {
             Ending::Done(_) => self.followers(&mut book, work),
@@ -390,16 +392,14 @@ impl Embedded {
     }
 
     fn followers(&self, book: &mut Book, work: Digest) -> Vec<Arc<LiveJob>> {
-        let ids: Vec<String> = book.waiting.iter().filter(|(_, other)| *other == work).map(|(id, _)| id.clone()).collect();
-        book.waiting.retain(|(_, other)| *other != work);
-        ids.iter().filter_map(|id| book.jobs.get(id).cloned()).collect()
+        let equal = book.waiting.take_all(|job| job.work == work);
+        equal.iter().filter_map(|job| book.jobs.get(&job.id).cloned()).collect()
     }
 
     fn answer_follower(&self, job: &Arc<LiveJob>, answer: &super::record::Answer) {
         if let Err(error) = job.change(|record| record.view.finish(answer.clone(), true), |record| self.settle(record)) {
             tracing::error!(%error, "a job that has its answer could not be recorded; it waits on");
-            let place = job.with(|record| (record.view.id.clone(), record.work));
-            self.book().waiting.push_back(place);
+            self.book().waiting.add(job.with(waiting));
             self.arrived.notify_one();
         }
     }
@@ -486,6 +486,11 @@ impl Embedded {
             job.cancel.fire(StopReason::Cancelled);
         }
     }
+}
+
+/// A job as it waits.
+fn waiting(record: &JobRecord) -> Waiting {
+    Waiting { id: record.view.id.clone(), owner: record.owner.clone(), work: record.work }
 }
 
 /// The job that a key made, if it was for the same body.

@@ -40,7 +40,7 @@ const PATIENCE: Duration = Duration::from_secs(6);
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
 
 /// What makes the tables, step by step: the version of a database is the number of steps that it has behind it.
-const STEPS: [&str; 2] = [include_str!("schema.sql"), include_str!("batches.sql")];
+const STEPS: [&str; 3] = [include_str!("schema.sql"), include_str!("batches.sql"), include_str!("turns.sql")];
 
 /// The ledger.
 #[derive(Debug)]
@@ -355,9 +355,9 @@ impl Shared {
             let mut client = self.pool.get().await?;
             let transaction = client.transaction().await?;
             let question = format!(
-                "SELECT {} FROM lacuna_jobs job WHERE state = 'queued' AND NOT EXISTS
+                "SELECT {} FROM lacuna_jobs job LEFT JOIN lacuna_turns last ON last.owner = job.owner WHERE state = 'queued' AND NOT EXISTS
                 (SELECT FROM lacuna_jobs other WHERE other.work = job.work AND other.state IN ('running', 'cancelling'))
-                ORDER BY number LIMIT 1 FOR UPDATE OF job SKIP LOCKED",
+                ORDER BY coalesce(last.turn, 0), number LIMIT 1 FOR UPDATE OF job SKIP LOCKED",
                 rows::COLUMNS
             );
             let Some(row) = transaction.query_typed_opt(&question, &[]).await? else {
@@ -373,6 +373,7 @@ impl Shared {
                 Err(Failure::Database(error)) if error.code() == Some(&SqlState::UNIQUE_VIOLATION) => continue,
                 Err(error) => return Err(error),
             }
+            rows::note_turn(&transaction, &record.owner).await?;
             transaction.commit().await?;
             client.done();
             return Ok(Some(Arc::new(LiveJob::at(record, revision + 1))));

@@ -36,6 +36,14 @@ pub(super) async fn lock_owner(transaction: &Transaction<'_>, owner: &str) -> Re
     Ok(())
 }
 
+/// Puts an owner behind all others: first come, first served is for the jobs of one owner, and owners are served by turns.
+pub(super) async fn note_turn(transaction: &Transaction<'_>, owner: &str) -> Result<(), Failure> {
+    let statement = "INSERT INTO lacuna_turns (owner, turn) VALUES ($1, nextval('lacuna_turn'))
+        ON CONFLICT (owner) DO UPDATE SET turn = excluded.turn";
+    transaction.execute_typed(statement, &[(&owner, Type::TEXT)]).await?;
+    Ok(())
+}
+
 /// The record of a job, which stays as it is until the transaction ends.
 pub(super) async fn locked(transaction: &Transaction<'_>, id: &str) -> Result<Option<(JobRecord, u64)>, Failure> {
     let question = format!("SELECT {COLUMNS} FROM lacuna_jobs WHERE id = $1 FOR UPDATE");
