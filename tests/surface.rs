@@ -635,3 +635,22 @@ fn a_job_that_has_expired_says_so_to_its_owner() {
     until(Duration::from_secs(20), "an absent job", || service.get_with("/v1/jobs", &[ada]).json()["items"] == json!([]));
     assert_eq!(service.get_with(&result, &[ada]).status, 404);
 }
+
+#[test]
+fn pages_from_elsewhere_change_nothing() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_CORS_ORIGINS", "https://cad.example")]);
+    let own = format!("http://{}", service.address);
+    // What a form of any page may send without asking first.
+    let send =
+        |method: &str, origin: &str| service.request(method, "/v1/jobs", &[("origin", origin), ("content-type", "text/plain")], b"{}");
+    for foreign in ["https://evil.example", "null", "http://localhost:1"] {
+        let refused = send("POST", foreign);
+        assert_eq!((refused.status, &refused.json()["code"]), (403, &json!("foreign-origin")), "{foreign}");
+        assert!(refused.json()["detail"].as_str().unwrap().contains("LACUNA_CORS_ORIGINS"));
+        assert_eq!(service.get_with("/v1/jobs", &[("origin", foreign)]).status, 200, "{foreign}");
+    }
+    for allowed in [own.as_str(), "https://cad.example"] {
+        assert_eq!(send("POST", allowed).status, 415, "{allowed}");
+    }
+}
