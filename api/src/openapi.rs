@@ -67,6 +67,12 @@ pub fn document() -> Value {
             document["paths"][address]["get"]["responses"]["200"]["content"][media_type] = json!({});
         }
     }
+    // What may happen to any operation: the device fails, the database is away, time is over.
+    let operations = document["paths"].as_object_mut().into_iter().flatten().filter_map(|(_, methods)| methods.as_object_mut());
+    for operation in operations.flatten().map(|(_, operation)| operation).filter(|operation| operation["responses"].is_object()) {
+        operation["responses"]["5XX"] = json!({ "description": "The service cannot answer now; `code` and `detail` say why, and whether to ask again.",
+            "content": { "application/problem+json": { "schema": { "$ref": "#/components/schemas/Problem" } } } });
+    }
     document["components"]["schemas"]["ShortOrder"] = short_order(&document["components"]["schemas"]["Job"]);
     document
 }
@@ -103,6 +109,15 @@ mod tests {
             for name in ["application/octet-stream", "application/json", "model/stl", "model/3mf", "image/png", "image/svg+xml"] {
                 assert!(names.contains(&name), "{name}: {names:?}");
             }
+        }
+    }
+
+    #[test]
+    fn every_operation_may_fail() {
+        let document = document();
+        let paths = document["paths"].as_object().into_iter().flatten();
+        for (method, operation) in paths.filter_map(|(_, methods)| methods.as_object()).flatten() {
+            assert!(operation["responses"]["5XX"].is_object(), "{method} {}", operation["operationId"]);
         }
     }
 

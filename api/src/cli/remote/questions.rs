@@ -65,7 +65,11 @@ pub(in super::super) struct AtServer<'s> {
 
 impl<'s> AtServer<'s> {
     /// Ctrl-C stops the case that is at work there.
+    ///
+    /// # Errors
+    /// When the service is not there or does not know the key: no case has failed then.
     pub(in super::super) fn new(server: &'s Server) -> Result<Self, Problem> {
+        let _: Value = server.json(Method::GET, "/v1/capabilities", &[], &[])?;
         let token = CancelToken::new();
         stop::on_signals(&token)?;
         Ok(Self { server, token })
