@@ -260,6 +260,56 @@ fn slow_clients_are_sent_away_and_keep_nobody_waiting() {
 }
 
 #[test]
+fn who_does_not_read_keeps_no_connection() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_BODY_SECONDS", "2"), ("LACUNA_CONNECTIONS", "8")]);
+    let job = service.done(&large());
+    let (digest, bytes) = (job["outputs"][0]["digest"].as_str().unwrap(), job["outputs"][0]["bytes"].as_u64().unwrap());
+    // More than sockets hold, asked for by all connections that there are; nobody reads.
+    let request = format!("GET /v1/results/{digest} HTTP/1.1\r\nhost: localhost\r\n\r\n");
+    let times = usize::try_from((64 << 20) / bytes + 1).unwrap();
+    let mut deaf: Vec<TcpStream> = (0..8).map(|_| TcpStream::connect(service.address).unwrap()).collect();
+    for stream in &mut deaf {
+        stream.write_all(request.repeat(times).as_bytes()).unwrap();
+    }
+    let start = Instant::now();
+    until(PATIENCE, "an answer beside all deaf clients", || {
+        service.try_post("/v1/jobs", &small(0)).is_some_and(|answer| answer.status / 100 == 2)
+    });
+    eprintln!("8 clients that do not read took all 8 connections; the next client was answered after {:?}", start.elapsed());
+    for mut stream in deaf {
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let mut rest = Vec::new();
+        // A reset is a closed connection, too.
+        let _ = stream.read_to_end(&mut rest);
+        assert!((rest.len() as u64) < bytes * times as u64, "nobody was waited for");
+    }
+    assert!(service.said(&["all connections are taken"]));
+}
+
+#[test]
+fn an_answer_given_early_arrives_at_who_is_still_sending() {
+    let scratch = Scratch::new();
+    let service = Service::start_with(scratch.path(), &[("LACUNA_API_KEYS", "ada"), ("LACUNA_BODY_BYTES", "1000000")]);
+    for (path, headers, status) in [
+        ("/v1/jobs", "content-type: application/json", "401"),
+        ("/v1/jobs", "content-type: application/json\r\nauthorization: Bearer ada", "413"),
+        ("/v1/jobs", "content-type: text/plain\r\nauthorization: Bearer ada", "415"),
+        ("/v1/nothing", "authorization: Bearer ada", "404"),
+    ] {
+        let mut stream = TcpStream::connect(service.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let body = vec![b' '; 40 << 20];
+        write!(stream, "POST {path} HTTP/1.1\r\nhost: localhost\r\n{headers}\r\ncontent-length: {}\r\n\r\n", body.len()).unwrap();
+        // As simple clients do: all is sent before anything is read.
+        stream.write_all(&body).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status} ")), "{status}: {answer}");
+    }
+}
+
+#[test]
 fn a_thousand_idle_listeners_cost_little_and_leave_in_order() {
     const LISTENERS: usize = 1000;
     let scratch = Scratch::new();

@@ -129,6 +129,8 @@ pub struct Config {
     pub workers: usize,
     /// Threads that they share; 0 for one per core.
     pub threads: usize,
+    /// Connections that are open at the same time; who comes then waits.
+    pub connections: usize,
     /// The keys; without any, everybody who reaches the address is the same owner.
     pub keys: Vec<Key>,
     /// Origins whose pages may call the service.
@@ -218,6 +220,27 @@ impl Reader<'_> {
         default: T,
         expected: &'static str,
     ) -> Result<T, BadSetting> {
+        self.take_if(name, flag, default, expected, |_| true)
+    }
+
+    /// A number of something that there must be.
+    fn positive<T: ToString + std::str::FromStr + From<u8> + PartialOrd>(
+        &mut self,
+        name: &'static str,
+        default: T,
+    ) -> Result<T, BadSetting> {
+        self.take_if(name, None, default, "a whole number from 1 on is expected", |value| *value >= T::from(1))
+    }
+
+    /// A value that passes a test.
+    fn take_if<T: ToString + std::str::FromStr>(
+        &mut self,
+        name: &'static str,
+        flag: Option<T>,
+        default: T,
+        expected: &'static str,
+        fits: impl Fn(&T) -> bool,
+    ) -> Result<T, BadSetting> {
         let (value, origin) = match (flag, self.stated(name)) {
             (Some(value), _) => (value, Origin::Flag),
             (None, Some((text, origin))) => {
@@ -226,6 +249,9 @@ impl Reader<'_> {
             }
             (None, None) => (default, Origin::Default),
         };
+        if !fits(&value) {
+            return Err(BadSetting { name, value: value.to_string(), expected });
+        }
         self.told.push(Told { name, value: value.to_string(), origin });
         Ok(value)
     }
@@ -282,35 +308,42 @@ impl Config {
         let config = Self {
             role: reader.take("LACUNA_ROLE", flags.role, Role::All, "all, front or worker is expected")?,
             shared,
-            lease_seconds: reader.take("LACUNA_LEASE_SECONDS", None, 15, COUNT)?.clamp(1, 3600),
+            lease_seconds: reader.take_if("LACUNA_LEASE_SECONDS", None, 15, "a whole number from 1 to 3600 is expected", |seconds| {
+                (1..=3600).contains(seconds)
+            })?,
             bind: address,
             metrics_bind: metrics_bind.transpose()?,
             traces_url: read_traces(&mut reader)?,
             data: PathBuf::from(data),
-            workers: reader.take("LACUNA_WORKERS", flags.workers, 2, COUNT)?.clamp(1, 256),
+            workers: reader.take_if("LACUNA_WORKERS", flags.workers, 2, "a whole number from 1 to 256 is expected", |count| {
+                (1..=256).contains(count)
+            })?,
+            connections: reader.positive("LACUNA_CONNECTIONS", 2048)?,
             threads: reader.take("LACUNA_THREADS", flags.threads, 0, COUNT)?,
             keys: read_keys(&mut reader, filed_keys),
             cors_origins: reader.list("LACUNA_CORS_ORIGINS", &[], false),
             host_names: read_host_names(&mut reader, flags)?,
-            body_bytes: reader.take("LACUNA_BODY_BYTES", None, 8 << 20, COUNT)?,
-            header_seconds: reader.take("LACUNA_HEADER_SECONDS", None, 10, COUNT)?,
-            body_seconds: reader.take("LACUNA_BODY_SECONDS", None, 30, COUNT)?,
-            upload_bytes: reader.take("LACUNA_UPLOAD_BYTES", None, 256 << 20, COUNT)?,
-            stored_bytes: reader.take("LACUNA_STORED_BYTES_PER_KEY", None, 8 << 30, COUNT)?,
-            upload_seconds: reader.take("LACUNA_UPLOAD_SECONDS", None, 600, COUNT)?,
-            answer_seconds: reader.take("LACUNA_ANSWER_SECONDS", None, 60, COUNT)?,
-            queued: reader.take("LACUNA_QUEUED", None, 256, COUNT)?,
-            jobs_per_key: reader.take("LACUNA_JOBS_PER_KEY", None, 128, COUNT)?,
-            submissions_per_minute: reader.take("LACUNA_SUBMISSIONS_PER_MINUTE", None, 600, COUNT)?,
-            calls_per_minute: reader.take("LACUNA_CALLS_PER_MINUTE", None, 6000, COUNT)?,
+            body_bytes: reader.positive("LACUNA_BODY_BYTES", 8 << 20)?,
+            header_seconds: reader.positive("LACUNA_HEADER_SECONDS", 10)?,
+            body_seconds: reader.positive("LACUNA_BODY_SECONDS", 30)?,
+            upload_bytes: reader.positive("LACUNA_UPLOAD_BYTES", 256 << 20)?,
+            stored_bytes: reader.positive("LACUNA_STORED_BYTES_PER_KEY", 8 << 30)?,
+            upload_seconds: reader.positive("LACUNA_UPLOAD_SECONDS", 600)?,
+            answer_seconds: reader.positive("LACUNA_ANSWER_SECONDS", 60)?,
+            queued: reader.positive("LACUNA_QUEUED", 256)?,
+            jobs_per_key: reader.positive("LACUNA_JOBS_PER_KEY", 128)?,
+            submissions_per_minute: reader.positive("LACUNA_SUBMISSIONS_PER_MINUTE", 600)?,
+            calls_per_minute: reader.positive("LACUNA_CALLS_PER_MINUTE", 6000)?,
             drain_seconds: reader.take("LACUNA_DRAIN_SECONDS", None, 20, COUNT)?,
             retention_hours: reader.take("LACUNA_RETENTION_HOURS", None, 72, COUNT)?,
             expired_hours: reader.take("LACUNA_EXPIRED_HOURS", None, 720, COUNT)?,
             expired_jobs: reader.take("LACUNA_EXPIRED_JOBS", None, 10_000, COUNT)?,
             job_limits: Limits {
-                seconds: reader.take("LACUNA_LIMIT_SECONDS", None, 3600.0, "seconds are expected")?,
-                memory_bytes: reader.take("LACUNA_LIMIT_MEMORY_BYTES", None, defaults.memory_bytes, COUNT)?,
-                triangles: reader.take("LACUNA_LIMIT_TRIANGLES", None, 50_000_000, COUNT)?,
+                seconds: reader.take_if("LACUNA_LIMIT_SECONDS", None, 3600.0, "seconds above 0 are expected", |seconds: &f64| {
+                    seconds.is_finite() && *seconds > 0.0
+                })?,
+                memory_bytes: reader.positive("LACUNA_LIMIT_MEMORY_BYTES", defaults.memory_bytes)?,
+                triangles: reader.positive("LACUNA_LIMIT_TRIANGLES", 50_000_000)?,
                 ..defaults
             },
             log: reader.take("LACUNA_LOG", None, LevelFilter::INFO, "error, warn, info, debug, trace or off is expected")?,
@@ -524,5 +557,32 @@ mod tests {
     fn nonsense_is_named() {
         let error = Config::read(&Flags::default(), &|name| (name == "LACUNA_QUEUED").then(|| "many".into())).unwrap_err();
         assert_eq!((error.name, error.value.as_str()), ("LACUNA_QUEUED", "many"));
+    }
+
+    #[test]
+    fn numbers_that_would_stop_everything_are_refused() {
+        let with =
+            |name: &'static str, value: &'static str| Config::read(&Flags::default(), &move |asked| (asked == name).then(|| value.into()));
+        for (name, value) in [
+            ("LACUNA_WORKERS", "0"),
+            ("LACUNA_WORKERS", "257"),
+            ("LACUNA_LEASE_SECONDS", "0"),
+            ("LACUNA_LEASE_SECONDS", "3601"),
+            ("LACUNA_CONNECTIONS", "0"),
+            ("LACUNA_BODY_SECONDS", "0"),
+            ("LACUNA_QUEUED", "-1"),
+            ("LACUNA_CALLS_PER_MINUTE", "0"),
+            ("LACUNA_LIMIT_TRIANGLES", "0"),
+            ("LACUNA_LIMIT_SECONDS", "0"),
+            ("LACUNA_LIMIT_SECONDS", "-3"),
+            ("LACUNA_LIMIT_SECONDS", "NaN"),
+            ("LACUNA_LIMIT_SECONDS", "inf"),
+        ] {
+            let error = with(name, value).unwrap_err();
+            assert_eq!((error.name, error.value.as_str()), (name, value));
+        }
+        assert_eq!(with("LACUNA_EXPIRED_JOBS", "0").unwrap().0.expired_jobs, 0);
+        let flags = Flags { workers: Some(0), ..Flags::default() };
+        assert_eq!(Config::read(&flags, &|_| None).unwrap_err().name, "LACUNA_WORKERS");
     }
 }

@@ -43,9 +43,10 @@ fn environment(name: &str) -> Option<String> {
 
 /// `lacuna serve`.
 pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
-    let (config, _) = Config::read(&Flags::from(&args), &environment)?;
+    let (mut config, _) = Config::read(&Flags::from(&args), &environment)?;
     start_log(config.log, config.log_json);
     log_panics();
+    config.connections = connections_within(config.connections, allow_files());
     work::use_threads(Some(config.threads))?;
     let failed = |error| Problem::io("the service cannot start", &error);
     config.traces_url.as_deref().map_or(Ok(()), traces::start).map_err(failed)?;
@@ -58,6 +59,33 @@ pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
     // Requests that are still read must not hold the exit up.
     runtime.shutdown_timeout(Duration::from_secs(1));
     result
+}
+
+/// Files that a process has open beside connections and what those send: the ledger, jobs' pipes and results, the database.
+const OTHER_FILES: u64 = 512;
+
+/// As many connections as are wished for, or as the open files allow: a connection may have a file that it sends.
+fn connections_within(wished: usize, files: Option<u64>) -> usize {
+    let most = files.map_or(u64::MAX, |files| files.saturating_sub(OTHER_FILES).max(files / 4) / 2).max(1);
+    let most = usize::try_from(most).unwrap_or(usize::MAX);
+    if most < wished {
+        tracing::warn!(connections = most, "LACUNA_CONNECTIONS is {wished}, and only so many fit the limit of open files (ulimit -n)");
+    }
+    wished.min(most)
+}
+
+/// Raises the limit of open files as far as a process may, and tells it; none where there is no limit.
+fn allow_files() -> Option<u64> {
+    #[cfg(unix)]
+    {
+        use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+        let limit = getrlimit(Resource::Nofile);
+        // Where it cannot be raised, what there was stays.
+        let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
+        getrlimit(Resource::Nofile).current
+    }
+    #[cfg(not(unix))]
+    None
 }
 
 fn start_log(level: LevelFilter, json: bool) {
@@ -121,4 +149,18 @@ fn ask_ready(address: &str) -> std::io::Result<String> {
     let mut answer = Vec::new();
     stream.take(4096).read_to_end(&mut answer)?;
     Ok(String::from_utf8_lossy(&answer).lines().next().unwrap_or_default().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn connections_fit_the_open_files() {
+        assert_eq!(connections_within(2048, None), 2048);
+        assert_eq!(connections_within(2048, Some(1 << 20)), 2048);
+        assert_eq!(connections_within(2048, Some(1024)), 256);
+        assert_eq!(connections_within(2048, Some(100)), 12);
+        assert_eq!(connections_within(2048, Some(1)), 1);
+    }
 }

@@ -12,8 +12,10 @@ use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::OwnedSemaphorePermit;
 use tower::ServiceExt;
 
+use super::connection::{Connection, Patience};
 use super::router::{operation, probes, router};
 use super::state::{AppState, Shared};
 use crate::config::Config;
@@ -24,6 +26,12 @@ use crate::traces;
 
 /// Time for answers that are under way when the time for jobs is over.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
+
+/// Time for which a closed connection takes what its peer still sends.
+const LINGERING: Duration = Duration::from_secs(30);
+
+/// A peer of a closed connection that has sent nothing for so long has sent all.
+const SILENT: Duration = Duration::from_secs(2);
 
 /// Between two sweeps of what is too old to keep.
 const SWEEP_EVERY: Duration = Duration::from_secs(3600);
@@ -89,8 +97,10 @@ pub async fn serve(config: Config, told: impl FnOnce(std::net::SocketAddr), stop
 
 async fn accept(listener: &TcpListener, app: Router, state: &Shared, connections: Option<&GracefulShutdown>) {
     loop {
+        // Who looks after the service is not counted: its address is answered however many others there are.
+        let place = if connections.is_some() { place(state).await } else { None };
         match listener.accept().await {
-            Ok((stream, _)) => attend(stream, app.clone(), state, connections),
+            Ok((stream, _)) => attend(stream, app.clone(), state, connections, place),
             Err(error) => {
                 // Out of descriptors, most likely: wait for connections to end instead of spinning.
                 tracing::warn!(%error, "a connection was not accepted");
@@ -100,8 +110,16 @@ async fn accept(listener: &TcpListener, app: Router, state: &Shared, connections
     }
 }
 
-/// Answers a connection; those that are counted are waited for when the service goes down.
-fn attend(stream: TcpStream, app: Router, state: &Shared, connections: Option<&GracefulShutdown>) {
+/// A place for one more connection. Who comes when all are taken waits, at the listening socket, until one ends.
+async fn place(state: &Shared) -> Option<OwnedSemaphorePermit> {
+    if state.connections.available_permits() == 0 {
+        tracing::warn!(connections = state.config.connections, "all connections are taken (LACUNA_CONNECTIONS), others wait");
+    }
+    Arc::clone(&state.connections).acquire_owned().await.ok()
+}
+
+/// Answers a connection, which has its place until it ends; those that are counted are waited for when the service goes down.
+fn attend(stream: TcpStream, app: Router, state: &Shared, connections: Option<&GracefulShutdown>, place: Option<OwnedSemaphorePermit>) {
     let _ = stream.set_nodelay(true);
     let service = service_fn(move |request: hyper::Request<Incoming>| {
         let app = app.clone();
@@ -113,8 +131,11 @@ fn attend(stream: TcpStream, app: Router, state: &Shared, connections: Option<&G
     let mut builder = hyper::server::conn::http1::Builder::new();
     // A client that sends its head byte by byte would hold a connection forever.
     builder.timer(TokioTimer::new()).header_read_timeout(Duration::from_secs(state.config.header_seconds));
+    let patience = Patience { stalled: Duration::from_secs(state.config.body_seconds), lingering: LINGERING, silent: SILENT };
+    let stream = Connection::new(stream, patience);
     let connection = builder.serve_connection(TokioIo::new(stream), service);
-    let told = |ended: hyper::Result<()>| {
+    let told = move |ended: hyper::Result<()>| {
+        drop(place);
         if let Err(error) = ended {
             tracing::debug!(%error, "a connection broke off");
         }
@@ -147,13 +168,13 @@ async fn sweep(state: Shared) {
     let age = hours(state.config.retention_hours);
     let retention = Retention { jobs: age, records: hours(state.config.expired_hours), most_records: state.config.expired_jobs };
     loop {
-        match state.beside(move |state| state.desk.sweep(retention)).await {
+        match state.beside(None, move |state| state.desk.sweep(retention)).await {
             Ok(removed) => tracing::info!(removed, "swept"),
             Err(problem) => tracing::error!(detail = %problem.detail, "not swept"),
         }
         // A job that waits may be the only one that still needs a file.
         let idle = state.desk.gauges().await.is_ok_and(|gauges| gauges.queued + gauges.running == 0);
-        let uploads = state.beside(move |state| {
+        let uploads = state.beside(None, move |state| {
             let swept = if idle { state.store.sweep_uploads(age) } else { Ok(0) };
             swept.map_err(|error| Problem::io("sweeping uploads", &error))
         });

@@ -7,6 +7,7 @@ use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 
 use super::auth::{Owner, RateLimiter};
+use super::places::Places;
 use crate::config::Config;
 use crate::documents::Stored;
 use crate::jobs::asked::Asked;
@@ -40,8 +41,10 @@ pub struct AppState {
     pub submissions: RateLimiter,
     /// Who called otherwise how often.
     pub calls: RateLimiter,
+    /// Places for connections.
+    pub connections: Arc<Semaphore>,
     /// Places for work on documents beside the event loop.
-    blocking: Arc<Semaphore>,
+    blocking: Places,
 }
 
 /// The state as handlers take it.
@@ -84,7 +87,10 @@ impl AppState {
         let submissions = RateLimiter::new("submissions", config.submissions_per_minute);
         let calls = RateLimiter::new("calls", config.calls_per_minute);
         // Reading documents is short, but must not take the memory of many at once; several wait for the device at a time.
-        let blocking = Arc::new(Semaphore::new((config.workers * 2).max(8)));
+        let places = (config.workers * 2).max(8);
+        // Without keys there is one owner, who need not leave any to others.
+        let blocking = Places::new(places, if config.keys.is_empty() { places } else { places / 2 });
+        let connections = Arc::new(Semaphore::new(config.connections));
         Arc::new(Self {
             config,
             desk: Arc::new(desk),
@@ -96,6 +102,7 @@ impl AppState {
             readers: Readers::new(engine),
             submissions,
             calls,
+            connections,
             blocking,
         })
     }
@@ -119,15 +126,16 @@ impl AppState {
         self.asked.ask(question, document, &self.config.job_limits, &self.store, &self.models_of(owner))
     }
 
-    /// Does what blocks (parsing, disk, waiting for another process) beside the event loop.
+    /// Does what blocks (parsing, disk, waiting for another process) beside the event loop, for an owner or for the service itself.
     ///
     /// # Errors
     /// The work's own, or our defect when it panicked.
     pub async fn beside<T: Send + 'static>(
         self: &Arc<Self>,
+        owner: Option<Owner>,
         work: impl FnOnce(&AppState) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let place = Arc::clone(&self.blocking).acquire_owned().await.map_err(|error| Problem::internal(error.to_string()))?;
+        let place = self.blocking.take(owner.as_ref()).await;
         self.at_once(move |state| {
             let result = work(state);
             drop(place);

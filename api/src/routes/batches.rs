@@ -64,7 +64,7 @@ pub async fn submit(
     let used = idempotency_key(&headers)?.map(|key| Idempotency { key, body: Digest::of(&body) });
     let preference = Preference::of(&headers);
     let answer_seconds = state.config.answer_seconds;
-    let (batch, replayed) = state.beside(move |state| accept(state, &orderer, &body, used)).await?;
+    let (batch, replayed) = state.beside(Some(orderer.owner.clone()), move |state| accept(state, &orderer, &body, used)).await?;
     // As for a job: its id must arrive before the time for an answer is over.
     let left = Duration::from_secs(answer_seconds).mul_f64(0.9).saturating_sub(start.elapsed());
     let wait = preference.wait.map_or(Duration::ZERO, |wait| wait.min(left));

@@ -100,7 +100,7 @@ pub(super) async fn take(
     let mut preference = Preference::of(headers);
     let answer_seconds = state.config.answer_seconds;
     let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
-    let (job, replayed) = state.beside(move |state| accept(state, &orderer, &body, used)).await?;
+    let (job, replayed) = state.beside(Some(orderer.owner.clone()), move |state| accept(state, &orderer, &body, used)).await?;
     // Whoever asks for an answer at once gets it, wherever others wait.
     let usual = if preference.respond_async { Duration::ZERO } else { usual };
     // The job is accepted: its id must arrive before the time for an answer is over, of which a tenth is left for sending it.

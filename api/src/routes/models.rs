@@ -16,7 +16,7 @@ use crate::http::auth::Owner;
 use crate::http::body::{JsonBody, is_json};
 use crate::http::headers::{QueryOf, check_match, is_known, page_cursor, page_length};
 use crate::http::range;
-use crate::http::state::Shared;
+use crate::http::state::{AppState, Shared};
 use crate::jobs::record::Output;
 use crate::openapi::Model;
 use crate::problem::{Problem, ProblemKind};
@@ -66,7 +66,7 @@ pub async fn store(
 ) -> Result<Response, Problem> {
     let (view, new) = if is_json(request.headers()) {
         let JsonBody(body) = JsonBody::from_request(request, &state).await?;
-        let kept = state.beside(move |state| {
+        let kept = state.beside(Some(owner.clone()), move |state| {
             let model = documents::read_model(&body)?;
             let document = documents::model_document(&model);
             uploads::check_share(state, &owner, Digest::of(document.as_bytes()), document.len() as u64)?;
@@ -94,8 +94,9 @@ pub async fn list(
 ) -> Result<Json<ModelPage>, Problem> {
     let length = page_length(query.limit)?;
     let after = page_cursor(query.cursor, "mdl_")?;
-    let list = move |state: &crate::http::state::AppState| state.store.list_models(&owner.0).map_err(|error| Problem::io("models", &error));
-    let all = state.beside(list).await?;
+    let asker = owner.clone();
+    let list = move |state: &AppState| state.store.list_models(&owner.0).map_err(|error| Problem::io("models", &error));
+    let all = state.beside(Some(asker), list).await?;
     let after = after.unwrap_or_default();
     let mut items: Vec<ModelView> = all.into_iter().filter(|view| view.id > after).take(length + 1).collect();
     let more = items.len() > length;
@@ -119,7 +120,7 @@ pub async fn fetch(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let found = state.beside(move |state| {
+    let found = state.beside(Some(owner.clone()), move |state| {
         let failed = |error| Problem::io("the model could not be read", &error);
         let view = state.store.model(&owner.0, &id).map_err(failed)?.ok_or_else(|| absent(&id))?;
         let document = state.store.model_document(&owner.0, &id).map_err(failed)?;
@@ -149,7 +150,7 @@ pub async fn forget(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
-    let forgotten = state.beside(move |state| {
+    let forgotten = state.beside(Some(owner.clone()), move |state| {
         let failed = |error| Problem::io("the model could not be read", &error);
         let view = state.store.model(&owner.0, &id).map_err(failed)?.ok_or_else(|| absent(&id))?;
         check_match(&headers, &format!("\"{}\"", view.digest))?;

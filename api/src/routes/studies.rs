@@ -17,7 +17,7 @@ use crate::questions::Question;
 
 /// The answer to a question, as it was written.
 async fn json(state: &Shared, owner: Owner, question: Question, body: JsonBody) -> Result<Response, Problem> {
-    let answer = state.beside(move |state| state.ask(&owner, question, &body.0)).await?;
+    let answer = state.beside(Some(owner.clone()), move |state| state.ask(&owner, question, &body.0)).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
 }
 
@@ -56,7 +56,7 @@ pub async fn automaton(
         Problem::new(ProblemKind::NotAcceptable, detail)
     })?;
     let dot = media_type == DOT;
-    let drawn = state.beside(move |state| state.ask(&owner, Question::Draw { dot }, &body));
+    let drawn = state.beside(Some(owner.clone()), move |state| state.ask(&owner, Question::Draw { dot }, &body));
     let media_type = if dot { format!("{DOT}; charset=utf-8") } else { SVG.to_owned() };
     // The picture needs nothing from anywhere, whatever a browser is told to do with it.
     let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'".to_owned());

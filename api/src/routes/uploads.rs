@@ -113,7 +113,7 @@ fn file_name(headers: &HeaderMap) -> Option<String> {
 pub async fn receive(state: &Shared, owner: Owner, query: UploadQuery, request: Request) -> Result<(ModelView, bool), Problem> {
     let told = Told::of(request.headers(), &query)?;
     let failed = |error: std::io::Error| Problem::io("the file could not be kept", &error);
-    let pending = state.beside(move |state| state.store.new_upload().map_err(failed)).await?;
+    let pending = state.beside(Some(owner.clone()), move |state| state.store.new_upload().map_err(failed)).await?;
     let idle = Duration::from_secs(state.config.body_seconds);
     let pending = body::receive(request, pending, state.config.upload_bytes, idle).await?;
     let place = state.readers.place(&owner.0).await?;
