@@ -418,12 +418,12 @@ fn a_database_of_the_version_before_is_taken_over_with_its_jobs() {
         job["id"].as_str().unwrap().to_owned()
     };
     let _ =
-        stage.database.ask("DROP TABLE lacuna_batches; ALTER TABLE lacuna_jobs DROP COLUMN batch; UPDATE lacuna_schema SET version = 1");
+        stage.database.ask("DROP TABLE lacuna_turns; DROP SEQUENCE lacuna_turn; DROP TABLE lacuna_batches; ALTER TABLE lacuna_jobs DROP COLUMN batch; UPDATE lacuna_schema SET version = 1");
     let service = stage.start("all", "after");
     assert_eq!(view(&service, &id)["state"], "succeeded");
     let batch = ended(&service, &submit(&service, &batch([solid(0), solid(1)])));
     assert_eq!(batch["state"], "succeeded", "{batch}");
-    assert_eq!(stage.database.ask("SELECT version FROM lacuna_schema").trim(), "2");
+    assert_eq!(stage.database.ask("SELECT version FROM lacuna_schema").trim(), "3");
 }
 
 /// All files below a folder, by their places.
