@@ -19,6 +19,7 @@ pub mod inspection;
 pub mod jobs;
 pub mod metrics;
 pub mod openapi;
+pub mod orders;
 pub mod problem;
 pub mod production;
 pub mod questions;

@@ -9,11 +9,21 @@ use serde::{Deserialize, Serialize};
 use crate::addresses;
 use crate::documents::{self, ModelFinder, SolveReport};
 use crate::jobs::watchdog::Watchdog;
+use crate::orders;
 use crate::problem::{Finding, Problem, ProblemKind};
 use crate::production::{self, Engine, SolveProblem};
 
 /// Longest time that an answer may take: it is asked inside of a request.
 pub const TIME: Duration = Duration::from_secs(10);
+
+/// Longest time for reading all that an order names.
+const READING_TIME: Duration = Duration::from_secs(40);
+
+/// The most memory that an answer may take, in bytes; less where jobs may have less.
+const MEMORY_BYTES: u64 = 1 << 30;
+
+/// The same for reading all that an order names: as much as for a mesh file when it is uploaded.
+const READING_BYTES: u64 = 3 << 30;
 
 /// What is asked of a document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,14 +39,38 @@ pub enum Question {
     Address,
     /// What a job costs.
     Plan,
+    /// What the document of a job comes to, see [`crate::orders::Ordered`].
+    Order {
+        /// With what the job costs.
+        predicted: bool,
+    },
+    /// What the document of a batch comes to: its jobs, and what it calls them.
+    Batch,
     /// The unknown entries of a model.
     Solve,
+}
+
+impl Question {
+    /// The time and the memory in bytes that its answer may take.
+    #[must_use]
+    pub fn bounds(self) -> (Duration, u64) {
+        match self {
+            Self::Order { predicted: false } | Self::Batch => (READING_TIME, READING_BYTES),
+            _ => (TIME, MEMORY_BYTES),
+        }
+    }
+}
+
+/// Whether there is no answer because it would have taken too much time or memory.
+#[must_use]
+pub fn took_too_much(problem: &Problem) -> bool {
+    ["limit.seconds", "limit.memory"].contains(&problem.code.as_ref())
 }
 
 /// The answer: the text of a JSON document, or of a drawing.
 ///
 /// # Errors
-/// All that is wrong with what was asked, a limit, or that the answer takes longer than [`TIME`].
+/// All that is wrong with what was asked, a limit, or that the answer takes longer than its [`Question::bounds`].
 pub fn answer(question: Question, document: &[u8], most: &Limits, find: ModelFinder<'_>, engine: Engine) -> Result<String, Problem> {
     match question {
         Question::Validate => text(&watched(TIME, |budget| documents::validate(document, budget))?),
@@ -49,6 +83,8 @@ pub fn answer(question: Question, document: &[u8], most: &Limits, find: ModelFin
             text(&addresses::answer(&model, &sought, TIME).map_err(Problem::under_model)?)
         }
         Question::Plan => text(&predict(engine, &documents::read_order(document, most, find)?.job, TIME)?),
+        Question::Order { predicted } => text(&orders::read_job(document, predicted, most, find, engine)?),
+        Question::Batch => text(&orders::read_batch(document, most, find)?),
         Question::Solve => {
             let (model, values) = documents::read_solve(document, find)?;
             let solved = watched(TIME, |budget| production::solve(&model, &values, budget)).map_err(|problem| match problem {

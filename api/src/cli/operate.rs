@@ -9,7 +9,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::args::{Cli, ServeArgs};
 use super::{print, print_json, stop, work};
-use crate::config::{BadSetting, Config, Flags};
+use crate::config::{BadSetting, Config, Flags, Told};
 use crate::problem::{Problem, ProblemKind};
 use crate::{http, traces};
 
@@ -41,10 +41,29 @@ fn environment(name: &str) -> Option<String> {
     std::env::var(name).ok()
 }
 
+fn names() -> impl Iterator<Item = String> {
+    std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())
+}
+
+/// Variables that are called like settings and are none: misspelt, most likely. They are told and not refused, because not all are the user's.
+fn no_settings(names: impl Iterator<Item = String>, told: &[Told]) -> Vec<String> {
+    // What clients read, and what an orchestrator sets for a service that it calls `lacuna` (`LACUNA_PORT_7878_TCP_ADDR`).
+    let others = |name: &str| {
+        matches!(name, "LACUNA_API_KEY" | "LACUNA_SERVER") || name.starts_with("LACUNA_PORT") || name.starts_with("LACUNA_SERVICE_")
+    };
+    let known = |name: &str| told.iter().any(|told| told.name == name) || others(name);
+    let mut unknown: Vec<String> = names.filter(|name| name.starts_with("LACUNA_") && !known(name)).collect();
+    unknown.sort_unstable();
+    unknown
+}
+
 /// `lacuna serve`.
 pub(super) fn serve(args: ServeArgs) -> Result<(), Problem> {
-    let (mut config, _) = Config::read(&Flags::from(&args), &environment)?;
+    let (mut config, told) = Config::read(&Flags::from(&args), &environment)?;
     start_log(config.log, config.log_json);
+    for name in no_settings(names(), &told) {
+        tracing::warn!(name, "a variable that is no setting, and has no effect; `lacuna doctor` lists those that there are");
+    }
     log_panics();
     config.connections = connections_within(config.connections, allow_files());
     work::use_threads(Some(config.threads))?;
@@ -106,7 +125,8 @@ fn log_panics() {
 /// `lacuna doctor`.
 pub(super) fn doctor(args: &ServeArgs) -> Result<(), Problem> {
     let (_, told) = Config::read(&Flags::from(args), &environment)?;
-    print_json(&serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "settings": told }))
+    let unknown = no_settings(names(), &told);
+    print_json(&serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "settings": told, "unknown": unknown }))
 }
 
 /// `lacuna completions`.
@@ -154,6 +174,13 @@ fn ask_ready(address: &str) -> std::io::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn misspelt_variables_are_told() {
+        let (_, told) = Config::read(&Flags::default(), &|_| None).unwrap_or_else(|error| unreachable!("{error}"));
+        let names = ["LACUNA_WORKER", "LACUNA_WORKERS", "PATH", "LACUNA_SERVER", "LACUNA_PORT", "LACUNA_SERVICE_HOST", "LACUNA_BNID"];
+        assert_eq!(no_settings(names.into_iter().map(str::to_owned), &told), ["LACUNA_BNID", "LACUNA_WORKER"]);
+    }
 
     #[test]
     fn connections_fit_the_open_files() {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use lacuna_kernel::budget::{CancelToken, StopReason};
 use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 
@@ -45,6 +46,24 @@ pub struct AppState {
     pub connections: Arc<Semaphore>,
     /// Places for work on documents beside the event loop.
     blocking: Places,
+}
+
+/// Held while a request is answered: when its client leaves, or its time is over, what works for it is told.
+pub struct Leaving(CancelToken);
+
+impl Leaving {
+    /// What to hold, and the flag that falls when it is dropped.
+    #[must_use]
+    pub fn new() -> (Self, CancelToken) {
+        let cancel = CancelToken::new();
+        (Self(cancel.clone()), cancel)
+    }
+}
+
+impl Drop for Leaving {
+    fn drop(&mut self) {
+        self.0.fire(StopReason::Cancelled);
+    }
 }
 
 /// The state as handlers take it.
@@ -118,12 +137,12 @@ impl AppState {
         }
     }
 
-    /// The answer to an owner's question about a document: in another process, with a limit of its memory. It blocks.
+    /// The answer to an owner's question about a document: in another process, with a limit of its memory, for as long as anybody waits. It blocks.
     ///
     /// # Errors
     /// The answer's own.
-    pub fn ask(&self, owner: &Owner, question: Question, document: &[u8]) -> Result<String, Problem> {
-        self.asked.ask(question, document, &self.config.job_limits, &self.store, &self.models_of(owner))
+    pub fn ask(&self, owner: &Owner, question: Question, document: &[u8], cancel: &CancelToken) -> Result<String, Problem> {
+        self.asked.ask(question, document, &self.config.job_limits, &self.store, &self.models_of(owner), cancel)
     }
 
     /// Does what blocks (parsing, disk, waiting for another process) beside the event loop, for an owner or for the service itself.

@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
@@ -30,6 +31,10 @@ const MODEL: &str = r#"{"lacuna":1,"name":"bar","shape":{"family":"mesh","vertic
 const WAITS: f64 = 2.0;
 const PANICS: f64 = 3.0;
 const REFUSED: f64 = 4.0;
+const LONG_PLAN: f64 = 5.0;
+
+/// Plans of [`LONG_PLAN`] that were made.
+static LONG_PLANS: AtomicUsize = AtomicUsize::new(0);
 
 fn compute(job: &Job, budget: &Budget) -> Result<Outcome, Problem> {
     production::guarded(|| {
@@ -49,6 +54,10 @@ fn compute(job: &Job, budget: &Budget) -> Result<Outcome, Problem> {
 fn plan(job: &Job, _: &Budget) -> Result<Plan, Problem> {
     if job.params.tolerance_mm == REFUSED {
         return Err(Problem::new(ProblemKind::Limit, "too much").code("plan.triangles"));
+    }
+    if job.params.tolerance_mm == LONG_PLAN {
+        std::thread::sleep(Duration::from_millis(1500));
+        LONG_PLANS.fetch_add(1, Ordering::SeqCst);
     }
     Ok(Plan { leaf_cells: 1.0, ..Plan::default() })
 }
@@ -113,6 +122,19 @@ impl Drop for Service {
         self.state.desk.interrupt();
         let _ = std::fs::remove_dir_all(&self.folder);
     }
+}
+
+#[tokio::test]
+async fn who_is_told_that_the_time_is_over_has_ordered_nothing() {
+    let service = Service::start(1, &[("LACUNA_ANSWER_SECONDS", "1")]);
+    let (status, _, problem) = service.submit(LONG_PLAN, &[]).await;
+    assert_eq!((status, &problem["code"]), (StatusCode::GATEWAY_TIMEOUT, &json!("timeout")), "{problem}");
+    while LONG_PLANS.load(Ordering::SeqCst) == 0 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    // A moment, for what would follow.
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(service.get("/v1/jobs").await.1["items"], json!([]));
 }
 
 #[tokio::test]

@@ -7,17 +7,14 @@ use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use lacuna_kernel::budget::Limits;
+use lacuna_kernel::budget::{CancelToken, Limits};
 
-use super::process::{Place, Process, Purpose};
+use super::process::{ASK_FOR_LESS, Bounds, GRACE, Place, Process, Purpose};
 use crate::documents::ModelFinder;
 use crate::problem::Problem;
 use crate::production::Engine;
 use crate::questions::{self, Question};
 use crate::store::Store;
-
-/// The most memory that an answer may take, in bytes; less where jobs may have less.
-const MEMORY_BYTES: u64 = 1 << 30;
 
 /// Processes that wait for the next question, however long.
 const KEPT: usize = 2;
@@ -40,17 +37,26 @@ impl Asked {
         Self { engine, idle: Mutex::default() }
     }
 
-    /// The answer to a question, see [`questions::answer`]. It blocks.
+    /// The answer to a question, see [`questions::answer`], unless nobody wants it any more. It blocks.
     ///
     /// # Errors
-    /// The answer's own, and that it needs more memory than it may have.
-    pub fn ask(&self, question: Question, document: &[u8], most: &Limits, store: &Store, find: ModelFinder<'_>) -> Result<String, Problem> {
+    /// The answer's own, and that it needs more time or memory than it may have.
+    pub fn ask(
+        &self,
+        question: Question,
+        document: &[u8],
+        most: &Limits,
+        store: &Store,
+        find: ModelFinder<'_>,
+        cancel: &CancelToken,
+    ) -> Result<String, Problem> {
         if self.engine.here.is_some() {
             return questions::answer(question, document, most, find, self.engine);
         }
         let mut place = Place::of(Purpose::Questions, crate::locked(&self.idle).pop_back().map(|(_, process)| process));
-        let memory_bytes = MEMORY_BYTES.min(most.memory_bytes);
-        let answer = place.ask(question, document, *most, memory_bytes, store, find, rayon::current_num_threads());
+        let (time, memory_bytes) = question.bounds();
+        let bounds = Bounds { memory_bytes: memory_bytes.min(most.memory_bytes), time, grace: GRACE, advice: ASK_FOR_LESS, cancel };
+        let answer = place.ask(question, document, *most, &bounds, store, find, rayon::current_num_threads());
         let now = Instant::now();
         let mut idle = crate::locked(&self.idle);
         idle.extend(place.into_process().map(|process| (now, process)));

@@ -19,8 +19,8 @@ use super::record::{Ending, Idempotency, JobRecord, JobState, JobView, Output};
 use super::refusal;
 use super::shared::Shared;
 use crate::digest::Digest;
-use crate::documents::{self, Order};
 use crate::metrics::Metrics;
+use crate::orders::Ordered;
 use crate::problem::Problem;
 use crate::store::Store;
 use crate::traces::Context;
@@ -47,13 +47,13 @@ pub struct Submission {
 impl Submission {
     /// The submission of an owner's order.
     #[must_use]
-    pub fn of(owner: &str, order: &Order, idempotency: Option<Idempotency>, trace: Option<Context>) -> Self {
+    pub fn of(owner: &str, order: Ordered, idempotency: Option<Idempotency>, trace: Option<Context>) -> Self {
         Self {
             owner: owner.to_owned(),
-            kind: order.job.kind,
-            document: order.document().into_bytes(),
-            input_digest: documents::job_digest(&order.job),
-            limits: order.job.limits,
+            kind: order.kind,
+            limits: order.limits(),
+            document: order.document.into_bytes(),
+            input_digest: order.input_digest,
             idempotency,
             trace,
         }

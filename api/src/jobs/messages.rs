@@ -95,7 +95,7 @@ pub(super) enum Said {
 
 /// [`Limits`] as they travel.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(super) struct Most {
+pub(crate) struct Most {
     seconds: f64,
     memory_bytes: u64,
     cells: u64,

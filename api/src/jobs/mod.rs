@@ -14,7 +14,7 @@ mod journal;
 pub mod live;
 mod making;
 mod memory;
-mod messages;
+pub(crate) mod messages;
 pub mod process;
 pub mod readers;
 pub mod record;

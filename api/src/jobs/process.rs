@@ -25,7 +25,7 @@ use crate::documents::{ModelFinder, Stored};
 use crate::files::PendingFile;
 use crate::problem::{Problem, ProblemKind};
 use crate::production;
-use crate::questions::{self, Question};
+use crate::questions::Question;
 use crate::store::Store;
 
 /// Between two looks at the flag that stops a job: a share of the 250 ms within which its worker must be free.
@@ -41,7 +41,7 @@ const WORDS_KEPT: usize = 20;
 pub const COMMAND: &str = "do-jobs";
 
 /// How much longer than its time an answer is waited for: a process that looks at the clock says itself that it was not enough.
-const GRACE: Duration = Duration::from_secs(2);
+pub(super) const GRACE: Duration = Duration::from_secs(2);
 
 /// What a process is for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -287,14 +287,13 @@ impl Place {
         question: Question,
         document: &[u8],
         most: Limits,
-        memory_bytes: u64,
+        bounds: &Bounds<'_>,
         store: &Store,
         find: ModelFinder<'_>,
         threads: usize,
     ) -> Result<String, Problem> {
-        let told = Told::Question { question, bytes: document.len() as u64, most: most.into(), memory_bytes };
-        let bounds = Bounds { memory_bytes, time: questions::TIME, grace: GRACE, advice: ASK_FOR_LESS, cancel: &CancelToken::new() };
-        self.with_process(store, threads, |process| process.ask(&told, document, &bounds, find))
+        let told = Told::Question { question, bytes: document.len() as u64, most: most.into(), memory_bytes: bounds.memory_bytes };
+        self.with_process(store, threads, |process| process.ask(&told, document, bounds, find))
     }
 
     /// Examines a mesh file of the store's scratch folder, with so many threads.
@@ -373,7 +372,7 @@ fn overhear(stderr: impl Read, sender: &Sender<Heard>) {
 const ALLOW_MORE: &str = "allow more memory_bytes, or ask for a larger tolerance or a smaller model";
 
 /// What helps a question that does.
-const ASK_FOR_LESS: &str = "ask about a smaller model or a larger tolerance; a job may have more memory than an answer";
+pub(super) const ASK_FOR_LESS: &str = "ask about a smaller model or a larger tolerance; a job may have more memory than an answer";
 
 /// What a death tells.
 fn death(status: ExitStatus, words: &VecDeque<String>, memory_bytes: u64, advice: &str) -> Problem {

@@ -13,31 +13,28 @@ use axum::response::sse::{Event as Sent, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::future::BoxFuture;
 use futures_util::stream::{self, FuturesUnordered, Stream, StreamExt};
-use lacuna_kernel::error::LimitFacts;
+use lacuna_kernel::budget::CancelToken;
 use tokio::sync::watch;
 
 use super::events::{PING, RETRY};
-use super::jobs::{LOOK_AGAIN, Orderer};
+use super::jobs::{LOOK_AGAIN, Orderer, understood, unless_left};
 use crate::digest::Digest;
-use crate::documents;
 use crate::http::accept::Accept;
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
 use crate::http::headers::{PREFERENCE_APPLIED, Preference, idempotency_key};
-use crate::http::state::{AppState, Shared};
+use crate::http::state::{AppState, Leaving, Shared};
 use crate::jobs::batch::{Batch, BatchCertificate, BatchRow, BatchState, BatchView};
 use crate::jobs::desk::{BatchSubmission, Submission};
 use crate::jobs::record::Idempotency;
 use crate::openapi::Batch as BatchDocument;
+use crate::orders::Ordered;
 use crate::problem::{Problem, ProblemKind};
+use crate::questions::Question;
 use crate::traces::Context;
 
 const EVENT_STREAM: &str = "text/event-stream";
 const LINES: &str = "application/x-ndjson";
-
-/// Bytes of the jobs' documents, with the stored models that they name, that a batch has at most: all are in memory until the batch is accepted, and a short one can name a long model a
-/// hundred times. Eight times the longest body there is by default.
-const MOST_BYTES: usize = 64 << 20;
 
 /// Submits up to 100 jobs at once.
 ///
@@ -64,7 +61,9 @@ pub async fn submit(
     let used = idempotency_key(&headers)?.map(|key| Idempotency { key, body: Digest::of(&body) });
     let preference = Preference::of(&headers);
     let answer_seconds = state.config.answer_seconds;
-    let (batch, replayed) = state.beside(Some(orderer.owner.clone()), move |state| accept(state, &orderer, &body, used)).await?;
+    let (leaving, cancel) = Leaving::new();
+    let (batch, replayed) = state.beside(Some(orderer.owner.clone()), move |state| accept(state, &orderer, &body, used, &cancel)).await?;
+    drop(leaving);
     // As for a job: its id must arrive before the time for an answer is over.
     let left = Duration::from_secs(answer_seconds).mul_f64(0.9).saturating_sub(start.elapsed());
     let wait = preference.wait.map_or(Duration::ZERO, |wait| wait.min(left));
@@ -87,7 +86,13 @@ pub async fn submit(
 }
 
 /// Reads all jobs, with the faults of all as one problem, and accepts them together.
-fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Batch, bool), Problem> {
+fn accept(
+    state: &AppState,
+    orderer: &Orderer,
+    body: &[u8],
+    idempotency: Option<Idempotency>,
+    cancel: &CancelToken,
+) -> Result<(Batch, bool), Problem> {
     let Orderer { owner, trace } = orderer;
     // Before the body is read, as for a job.
     if let Some(used) = &idempotency
@@ -95,41 +100,13 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
     {
         return Ok((batch, true));
     }
-    let entries = documents::read_batch(body)?;
+    let answer = state.ask(owner, Question::Batch, body, cancel)?;
+    let jobs: Vec<(Option<String>, Ordered)> = understood(&answer)?;
     // The request itself has been counted as one.
-    state.submissions.draw(owner, entries.len() - 1)?;
-    let (find, mut length) = (state.models_of(owner), 0);
-    let (mut jobs, mut refusal) = (Vec::with_capacity(entries.len()), None::<Problem>);
-    for entry in entries {
-        // One at a time: a mesh that many jobs name is never in memory for all of them.
-        match documents::complete(entry.job, &state.config.job_limits, &find) {
-            Ok(order) => {
-                let submission = Submission::of(&owner.0, &order, None, *trace);
-                length += submission.document.len();
-                if length > MOST_BYTES {
-                    return Err(too_long(length));
-                }
-                jobs.push((entry.name, submission));
-            }
-            Err(problem) => match &mut refusal {
-                Some(first) => first.errors.extend(problem.errors),
-                None => refusal = Some(problem),
-            },
-        }
-    }
-    match refusal {
-        Some(problem) => Err(problem),
-        None => state.desk.submit_batch(BatchSubmission { owner: owner.0.clone(), jobs, idempotency }),
-    }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
-fn too_long(length: usize) -> Problem {
-    let facts = LimitFacts { limit: "batch_bytes", asked: length as f64, allowed: MOST_BYTES as f64, remedy: None };
-    let detail = format!(
-        "the jobs' documents, each with the stored models that it names, have more than {MOST_BYTES} bytes together; send the jobs in smaller batches, or upload their models as mesh files, which stay where they are"
-    );
-    Problem::new(ProblemKind::Limit, detail).code("limit.batch-bytes").limit(&facts)
+    state.submissions.draw(owner, jobs.len() - 1)?;
+    unless_left(cancel)?;
+    let jobs = jobs.into_iter().map(|(name, order)| (name, Submission::of(&owner.0, order, None, *trace))).collect();
+    state.desk.submit_batch(BatchSubmission { owner: owner.0.clone(), jobs, idempotency })
 }
 
 fn answer(view: BatchView) -> Response {

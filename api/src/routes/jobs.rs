@@ -7,7 +7,9 @@ use axum::Json;
 use axum::extract::{Extension, Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use lacuna_fabrication::{JobKind, Plan};
+use lacuna_fabrication::JobKind;
+use lacuna_kernel::budget::CancelToken;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
@@ -16,13 +18,15 @@ use crate::documents;
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
 use crate::http::headers::{PREFERENCE_APPLIED, Preference, QueryOf, idempotency_key, page_cursor, page_length};
-use crate::http::state::{AppState, Shared};
+use crate::http::state::{AppState, Leaving, Shared};
 use crate::jobs::desk::{JobFilter, Submission};
 use crate::jobs::live::LiveJob;
 use crate::jobs::record::{Idempotency, JobState, JobView};
 use crate::openapi::Job;
+use crate::orders::Ordered;
 use crate::problem::{Problem, ProblemKind};
-use crate::questions::Question;
+use crate::production;
+use crate::questions::{self, Question};
 use crate::traces::Context;
 
 /// Seconds after which to look at a job again.
@@ -100,7 +104,9 @@ pub(super) async fn take(
     let mut preference = Preference::of(headers);
     let answer_seconds = state.config.answer_seconds;
     let used = key.map(|key| Idempotency { key, body: Digest::of(&body) });
-    let (job, replayed) = state.beside(Some(orderer.owner.clone()), move |state| accept(state, &orderer, &body, used)).await?;
+    let (leaving, cancel) = Leaving::new();
+    let (job, replayed) = state.beside(Some(orderer.owner.clone()), move |state| accept(state, &orderer, &body, used, &cancel)).await?;
+    drop(leaving);
     // Whoever asks for an answer at once gets it, wherever others wait.
     let usual = if preference.respond_async { Duration::ZERO } else { usual };
     // The job is accepted: its id must arrive before the time for an answer is over, of which a tenth is left for sending it.
@@ -119,7 +125,13 @@ pub(super) async fn take(
 }
 
 /// Reads, predicts and accepts: what is refused here never becomes a job.
-fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<Idempotency>) -> Result<(Arc<LiveJob>, bool), Problem> {
+fn accept(
+    state: &AppState,
+    orderer: &Orderer,
+    body: &[u8],
+    idempotency: Option<Idempotency>,
+    cancel: &CancelToken,
+) -> Result<(Arc<LiveJob>, bool), Problem> {
     let Orderer { owner, trace } = orderer;
     // Before the body is read: the models that it names may have been forgotten since.
     if let Some(used) = &idempotency
@@ -127,31 +139,37 @@ fn accept(state: &AppState, orderer: &Orderer, body: &[u8], idempotency: Option<
     {
         return Ok((job, true));
     }
-    let order = documents::read_order(body, &state.config.job_limits, &state.models_of(owner))?;
+    let ask = |predicted| state.ask(owner, Question::Order { predicted }, body, cancel);
+    // A prediction that takes too long, or more memory than an answer may have, is no reason to refuse what may be done.
+    let answer = ask(true).or_else(|problem| if questions::took_too_much(&problem) { ask(false) } else { Err(problem) })?;
+    let order: Ordered = understood(&answer)?;
     let replaced = order.supersedes.as_deref().map(|id| {
         // Beside the event loop, where waiting is allowed.
         let found = tokio::runtime::Handle::current().block_on(state.desk.find(&owner.0, id))?;
         found.ok_or_else(|| documents::unknown_job(id))
     });
     let replaced = replaced.transpose()?;
-    match state.ask(owner, Question::Plan, body) {
-        Ok(answer) => {
-            let plan: Plan = serde_json::from_str(&answer).map_err(|error| Problem::internal(format!("a plan cannot be read: {error}")))?;
-            if let Some(excess) = plan.exceeds {
-                return Err(excess.into());
-            }
-        }
-        // A prediction that takes too long, or more memory than an answer may have, is no reason to refuse what may be done.
-        Err(problem) if ["limit.seconds", "limit.memory"].contains(&problem.code.as_ref()) => {}
-        Err(problem) => return Err(problem),
+    if let Some(excess) = order.plan.as_ref().and_then(|plan| plan.exceeds.clone()) {
+        return Err(excess.into());
     }
-    let accepted = state.desk.submit(Submission::of(&owner.0, &order, idempotency, *trace))?;
+    unless_left(cancel)?;
+    let accepted = state.desk.submit(Submission::of(&owner.0, order, idempotency, *trace))?;
     // Only now: a refusal must not cost the caller what there is. The same work twice is not replaced by itself.
     let id_of = |job: &LiveJob| job.with(|record| record.view.id.clone());
     if let Some(replaced) = replaced.filter(|replaced| id_of(replaced) != id_of(&accepted.0) && !replaced.state().is_final()) {
         state.desk.cancel(&replaced)?;
     }
     Ok(accepted)
+}
+
+/// What a process answered.
+pub(super) fn understood<T: DeserializeOwned>(answer: &str) -> Result<T, Problem> {
+    serde_json::from_str(answer).map_err(|error| Problem::internal(format!("an answer cannot be read: {error}")))
+}
+
+/// Nobody would learn the id of what is accepted now for a client that has left, or was told that its time is over.
+pub(super) fn unless_left(cancel: &CancelToken) -> Result<(), Problem> {
+    cancel.reason().map_or(Ok(()), |reason| Err(production::stopped(reason, 0.0)))
 }
 
 fn answer(view: JobView) -> Response {

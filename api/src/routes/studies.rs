@@ -10,14 +10,15 @@ use crate::documents::{SolveReport, ValidationReport};
 use crate::http::accept::Accept;
 use crate::http::auth::Owner;
 use crate::http::body::JsonBody;
-use crate::http::state::Shared;
+use crate::http::state::{Leaving, Shared};
 use crate::openapi::{AddressQuestion, Job, Model, SolveRequest};
 use crate::problem::{Problem, ProblemKind};
 use crate::questions::Question;
 
 /// The answer to a question, as it was written.
 async fn json(state: &Shared, owner: Owner, question: Question, body: JsonBody) -> Result<Response, Problem> {
-    let answer = state.beside(Some(owner.clone()), move |state| state.ask(&owner, question, &body.0)).await?;
+    let (_leaving, cancel) = Leaving::new();
+    let answer = state.beside(Some(owner.clone()), move |state| state.ask(&owner, question, &body.0, &cancel)).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
 }
 
@@ -56,7 +57,8 @@ pub async fn automaton(
         Problem::new(ProblemKind::NotAcceptable, detail)
     })?;
     let dot = media_type == DOT;
-    let drawn = state.beside(Some(owner.clone()), move |state| state.ask(&owner, Question::Draw { dot }, &body));
+    let (_leaving, cancel) = Leaving::new();
+    let drawn = state.beside(Some(owner.clone()), move |state| state.ask(&owner, Question::Draw { dot }, &body, &cancel));
     let media_type = if dot { format!("{DOT}; charset=utf-8") } else { SVG.to_owned() };
     // The picture needs nothing from anywhere, whatever a browser is told to do with it.
     let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'".to_owned());

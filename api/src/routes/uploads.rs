@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use lacuna_exchange::format::{FORMATS, Format};
-use lacuna_kernel::budget::{CancelToken, StopReason};
+use lacuna_kernel::budget::CancelToken;
 use lacuna_kernel::error::LimitFacts;
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
@@ -14,7 +14,7 @@ use crate::digest::Digest;
 use crate::files::PendingFile;
 use crate::http::auth::Owner;
 use crate::http::body;
-use crate::http::state::{AppState, Shared};
+use crate::http::state::{AppState, Leaving, Shared};
 use crate::inspection::Examined;
 use crate::problem::{Problem, ProblemKind};
 use crate::store::ModelView;
@@ -117,9 +117,7 @@ pub async fn receive(state: &Shared, owner: Owner, query: UploadQuery, request: 
     let idle = Duration::from_secs(state.config.body_seconds);
     let pending = body::receive(request, pending, state.config.upload_bytes, idle).await?;
     let place = state.readers.place(&owner.0).await?;
-    let cancel = CancelToken::new();
-    // When the client leaves, what is waited for here is dropped, and this with it.
-    let _leaving = Leaving(cancel.clone());
+    let (_leaving, cancel) = Leaving::new();
     state
         .at_once(move |state| {
             let kept = keep(state, &owner, told, pending, &cancel);
@@ -127,15 +125,6 @@ pub async fn receive(state: &Shared, owner: Owner, query: UploadQuery, request: 
             kept
         })
         .await
-}
-
-/// Stops the reading of a file when it is dropped.
-struct Leaving(CancelToken);
-
-impl Drop for Leaving {
-    fn drop(&mut self) {
-        self.0.fire(StopReason::Cancelled);
-    }
 }
 
 fn keep(state: &AppState, owner: &Owner, told: Told, mut pending: PendingFile, cancel: &CancelToken) -> Result<(ModelView, bool), Problem> {
