@@ -97,15 +97,14 @@ async fn refresh_all(shared: Arc<Shared>) {
 /// Takes up the jobs of workers that were not heard of for the time of their lease.
 ///
 /// While the database was away no worker could renew its lease. So only who has reached the database all through
-/// the last lease judges others by theirs.
+/// the time of two leases judges others by theirs: in the first of them every worker finds its way back.
 async fn look_after(ledger: Weak<Shared>) {
     let mut reached_since = Instant::now();
     loop {
         tokio::time::sleep(LOOK_EVERY).await;
         let Some(shared) = ledger.upgrade() else { return };
         crate::locked(&shared.mirrors).retain(|_, job| job.strong_count() > 0);
-        let judges = reached_since.elapsed() > shared.lease;
-        if let Err(problem) = shared.within(take_up(&shared, judges)).await {
+        if let Err(problem) = shared.within(take_up(&shared, &mut reached_since)).await {
             tracing::warn!(detail = %problem.detail, "leases cannot be looked at");
             reached_since = Instant::now();
         }
@@ -115,9 +114,15 @@ async fn look_after(ledger: Weak<Shared>) {
     }
 }
 
-async fn take_up(shared: &Shared, judges: bool) -> Result<(), Failure> {
+async fn take_up(shared: &Shared, reached_since: &mut Instant) -> Result<(), Failure> {
+    let asked = Instant::now();
     let mut client = shared.pool.get().await?;
     let transaction = client.transaction().await?;
+    // Who waited so long for an answer was not the only one.
+    if asked.elapsed() > shared.lease / 2 {
+        *reached_since = Instant::now();
+    }
+    let judges = reached_since.elapsed() > 2 * shared.lease;
     let question = format!(
         "SELECT {} FROM lacuna_jobs WHERE state IN ('running', 'cancelling') AND lease_until < now() AND $1
         ORDER BY number LIMIT 32 FOR UPDATE SKIP LOCKED",
