@@ -429,7 +429,7 @@ export interface ExactNumber {
 export interface Excess {
   /** What is allowed. */ allowed: number;
   /** What is predicted. */ asked: number;
-  /** Its name among the limits of a job: `cells`, `triangles` or `memory_bytes`. */ limit: string;
+  /** Its name among the limits of a job: `cells`, `triangles`, `memory_bytes` or `output_bytes`. */ limit: string;
   /** A parameter of the job, or the limit where no tolerance is enough, and a value that would pass. Empty when the search for one took too long. */ remedy: Record<string, number>;
 }
 
@@ -606,6 +606,7 @@ export interface JobLimits {
   /** Leaf cells that the evaluation may produce. */ cells?: number;
   /** Length of the longest address. */ depth?: number;
   /** Accounted memory in bytes. */ memory_bytes?: number;
+  /** Bytes of all files of the result, the certificate aside. */ output_bytes?: number;
   /** Wall time in seconds. */ seconds?: number;
   /** Triangles of the result. */ triangles?: number;
 }
@@ -712,6 +713,7 @@ export interface LimitCapability {
   /** Hours after that for which an expired job is still known. */ expired_hours: number;
   /** Unfinished jobs that one key may have. */ jobs_per_key: number;
   /** Most accounted memory of a job, in bytes. */ memory_bytes: number;
+  /** Most bytes of all files of a result. */ output_bytes: number;
   /** Jobs that may wait. */ queued_jobs: number;
   /** Hours after which ended jobs expire: what they made is given up. */ retention_hours: number;
   /** Most wall time of a job, in seconds. */ seconds: number;
@@ -970,7 +972,7 @@ export interface Plan {
   /** Edge of the lattice's cubes. `null` where points and segments are thickened without a lattice, and where nothing is thickened. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
   /** Peak memory of the process that does the job, in bytes. 0 where nothing is predicted. */ memory_bytes: number;
-  /** Bytes of a binary STL file with so many `triangles`. */ output_bytes: number;
+  /** Bytes of a binary STL file with so many `triangles`; of sections, those of all drawings that are asked for, or else of one in SVG. `null` for sections of what is thickened first, and where nothing is predicted. */ output_bytes?: number | null;
   /** The result is nowhere thinner than this, in mm: of a dilation 2 (r - tolerance) with the least radius r, and never less than r; of a wall its thickness less the tolerance. The certificate's `thickness_min_mm` is this or more. `null` where nothing is proven before the work: meshes as they are, booleans, levels, closed gaps. */ smallest_feature_mm?: number | null;
   /** Triangles of the result without simplification, which leaves a tenth to a hundredth of them. Of an operation on solids: those of its result. */ triangles: number;
 }

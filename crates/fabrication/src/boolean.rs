@@ -128,7 +128,7 @@ pub(crate) fn plan(
         None
     };
     let triangles = found.unwrap_or(plan.triangles);
-    Ok(Plan { triangles, output_bytes: stl_bytes(triangles), memory_bytes, ..plan })
+    Ok(Plan { triangles, output_bytes: Some(stl_bytes(triangles)), memory_bytes, ..plan })
 }
 
 /// Triangles of the operands that an operation is done with in some tens of milliseconds.

@@ -48,6 +48,11 @@ impl<'a> Source<'a> {
         let one = || wrong_inputs(job, "this kind takes one");
         if job.inputs.len() == 1 { sources(job, budget)?.pop().ok_or_else(one) } else { Err(one()) }
     }
+
+    /// Its surfaces, where it is a solid as it is.
+    pub(crate) fn meshes(&self) -> Option<Vec<TriMesh>> {
+        (self.radius_mm == 0.0 && is_solid(&self.attractor)).then(|| self.attractor.surfaces())
+    }
 }
 
 /// All inputs of a job.
@@ -249,7 +254,7 @@ pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &B
             seconds += effort::of_operand(triangles);
         }
     }
-    plan.output_bytes = stl_bytes(plan.triangles);
+    plan.output_bytes = Some(stl_bytes(plan.triangles));
     plan.cpu_seconds = Some(seconds);
     Ok(plan)
 }

@@ -431,6 +431,7 @@ JobLimits = TypedDict('JobLimits', {
     'cells': 'NotRequired[int]',
     'depth': 'NotRequired[int]',
     'memory_bytes': 'NotRequired[int]',
+    'output_bytes': 'NotRequired[int]',
     'seconds': 'NotRequired[float]',
     'triangles': 'NotRequired[int]',
 })
@@ -515,6 +516,7 @@ LimitCapability = TypedDict('LimitCapability', {
     'expired_hours': 'int',
     'jobs_per_key': 'int',
     'memory_bytes': 'int',
+    'output_bytes': 'int',
     'queued_jobs': 'int',
     'retention_hours': 'int',
     'seconds': 'float',
@@ -705,7 +707,7 @@ Plan = TypedDict('Plan', {
     'lattice_pitch_mm': 'NotRequired[float | None]',
     'leaf_cells': 'float',
     'memory_bytes': 'float',
-    'output_bytes': 'float',
+    'output_bytes': 'NotRequired[float | None]',
     'smallest_feature_mm': 'NotRequired[float | None]',
     'triangles': 'float',
 })
