@@ -60,6 +60,8 @@ pub(super) struct MeshHead {
     pub(super) name: Option<String>,
     /// As what to read it: the ending of its format.
     pub(super) format: String,
+    /// The word by which a worker finds it again.
+    pub(super) reference: String,
     /// How long it is.
     pub(super) bytes: u64,
 }
