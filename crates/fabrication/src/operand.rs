@@ -161,7 +161,7 @@ fn closed_surface(name: &str, attractor: &Attractor, tolerance: Tolerance, budge
 }
 
 /// The volume within d of a mesh's triangles is at most this: the sum of Steiner's formula over all of them.
-fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
+pub(crate) fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
     let corner = |index: u32| mesh.vertices[index as usize];
     let perimeter = |&[a, b, c]: &[u32; 3]| corner(a).distance(corner(b)) + corner(b).distance(corner(c)) + corner(c).distance(corner(a));
     let length: f64 = mesh.triangles.iter().map(perimeter).sum();
