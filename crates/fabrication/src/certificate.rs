@@ -239,8 +239,9 @@ pub struct CellPairStatement {
     pub first_mm: [f64; 3],
     /// A point of the second, likewise; of what is no shape the nearest to the first.
     pub second_mm: [f64; 3],
-    /// How far `first_mm` and `second_mm` may be from points of the two shapes: rounding.
-    pub off_mm: [f64; 2],
+    /// How far `first_mm` and `second_mm` may be from points of the two shapes: rounding. Absent in certificates of before it was told, whose points are the middles of the cells.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub off_mm: Option<[f64; 2]>,
     /// The distance of the two cells.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub distance_mm: Interval,

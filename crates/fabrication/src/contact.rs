@@ -151,7 +151,7 @@ fn statement(found: &Contact) -> ContactStatement {
         second: pair.second.as_ref().map(ToString::to_string),
         first_mm: pair.points[0],
         second_mm: pair.points[1],
-        off_mm: pair.off_mm,
+        off_mm: Some(pair.off_mm),
         distance_mm: [pair.distance_mm.low, pair.distance_mm.high],
     };
     let place = |place: &Place| PlaceStatement {

@@ -54,6 +54,8 @@ pub struct CountedPoint {
 
 /// The surface is drawn as finely as this share of its size, or finer.
 const FINENESS: f64 = 1.0 / 256.0;
+/// By no more leaf cells than these, which take about a second.
+const MOST_CELLS: u64 = 200_000;
 
 impl Certificate {
     /// Adds what a closed surface encloses, how often places count in that, and mass, centroid and inertia of it. Nothing of shapes that are no closed surface.
@@ -121,7 +123,7 @@ impl Certificate {
 /// A closed surface as a mesh that encloses a volume above 0, and how far they are from each other; `None` where limits leave no such mesh.
 fn drawn(attractor: &Attractor, bounds: &AxisBox, tolerance: Tolerance, budget: &Budget) -> Result<Option<(TriMesh, f64)>, JobError> {
     let Ok(fine) = Tolerance::new(tolerance.mm().min(FINENESS * bounds.diagonal())) else { return Ok(None) };
-    let drawn = match sampled(attractor, fine, budget) {
+    let drawn = match sampled(attractor, fine, MOST_CELLS, budget) {
         Ok(drawn) => drawn,
         Err(error) if error.kind == Kind::Limit => return Ok(None),
         Err(error) => return Err(error),

@@ -108,7 +108,7 @@ pub struct MappedThickness {
 
 /// Bounds of the smallest box differ by this share of it.
 const RELATIVE: f64 = 1e-3;
-/// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
+/// Leaf cells that the points of a smallest box are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
 const MOST_CELLS: u64 = 30_000;
 
 /// How far a shape, dilated by a radius between two, extends along a direction.
@@ -133,7 +133,7 @@ pub(crate) fn smallest_box(
         _ if is_solid(attractor) => (attractor.surfaces().into_iter().flat_map(|surface| surface.vertices).collect(), 0.0),
         Some((mesh, _)) => (mesh.vertices, 0.0),
         None => {
-            let sample = sampled(attractor, tolerance, budget)?;
+            let sample = sampled(attractor, tolerance, MOST_CELLS, budget)?;
             (sample.vertices, sample.deviation_mm)
         }
     };
@@ -147,9 +147,9 @@ pub(crate) fn smallest_box(
     }))
 }
 
-/// A shape as coarse as its points are few enough.
-pub(crate) fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<Tessellation, JobError> {
-    let limits = Limits { cells: MOST_CELLS.min(budget.limits.cells), ..budget.limits };
+/// A shape as coarse as its leaf cells are few enough.
+pub(crate) fn sampled(attractor: &Attractor, tolerance: Tolerance, most_cells: u64, budget: &Budget) -> Result<Tessellation, JobError> {
+    let limits = Limits { cells: most_cells.min(budget.limits.cells), ..budget.limits };
     let few = Budget { limits, progress: None, ..budget.clone() };
     let mut coarse = tolerance.mm();
     loop {
