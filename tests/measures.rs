@@ -399,8 +399,7 @@ fn groups_of_solids_have_volume_area_and_mass() {
         };
         let parts: Vec<Value> = boxes.iter().map(solid).collect();
         let shape = document(&json!({ "lacuna": 1, "shape": { "family": "group", "parts": parts } }).to_string());
-        let found = measured(Model { name: None, shape }, Params { density_g_cm3: Some(1000.0), ..Params::new(0.01) });
-        found
+        measured(Model { name: None, shape }, Params { density_g_cm3: Some(1000.0), ..Params::new(0.01) })
     };
     let unit = [[0.0; 3], [1.0; 3]];
     let apart = told(&[unit, [[3.0, 0.0, 0.0], [5.0, 2.0, 2.0]]]);
