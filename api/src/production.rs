@@ -1,7 +1,7 @@
 //! From a legal job to finished files: what the service's workers and the command line share.
 
 use std::collections::BTreeMap;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufReader, BufWriter, Seek, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
@@ -209,11 +209,21 @@ fn written(
     Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)
 }
 
-/// Draws plane sections, one at a time.
-fn draw(format: Format, stack: &Stack, metadata: &Metadata<'_>, sink: &mut impl Write, token: &CancelToken) -> Result<(), Problem> {
-    let bounds = stack.frame.bounds(&stack.solid.mesh().vertices).unwrap_or_default();
-    let mut file = SectionFile::start(format, sink, bounds, metadata).map_err(|error| format_problem(&error))?;
+/// Draws plane sections, one at a time; a picture shows them all where they are in space.
+fn draw(
+    format: Format,
+    stack: &Stack,
+    metadata: &Metadata<'_>,
+    sink: &mut (impl Write + Seek),
+    token: &CancelToken,
+) -> Result<(), Problem> {
     let budget = Budget { cancel: token.clone(), ..Budget::default() };
+    if format == Format::Png {
+        let wires = stack.wires(&budget)?;
+        return format::write(format, &wires, metadata, sink).map_err(|error| format_problem(&error));
+    }
+    let bounds = stack.frame.bounds(&stack.solid.mesh().vertices).unwrap_or_default();
+    let mut file = SectionFile::start(format, sink, bounds, &stack.offsets_mm, metadata).map_err(|error| format_problem(&error))?;
     let drawn = stack.each(&budget, &mut |section| file.push(section));
     drawn.map_err(|error| match error {
         StreamError::Job(error) => error.into(),

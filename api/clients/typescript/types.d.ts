@@ -202,9 +202,10 @@ export interface CatmullRomShape {
 export interface CellPairStatement {
   distance_mm: Array<number>;
   /** Address of the first, as `address` takes it. */ first: string;
-  /** Centre of a ball around the first. */ first_mm: Array<number>;
+  /** A point of the first: of a given triangle, segment or point the nearest to the second, of any other cell the one that its address leads to. */ first_mm: Array<number>;
+  /** How far `first_mm` and `second_mm` may be from points of the two shapes: rounding. Absent in certificates of before it was told, whose points are the middles of the cells. */ off_mm?: Array<number> | null;
   /** Address of the second; absent where that is no shape. */ second?: string | null;
-  /** Centre of a ball around the second. */ second_mm: Array<number>;
+  /** A point of the second, likewise; of what is no shape the nearest to the first. */ second_mm: Array<number>;
 }
 
 /** A cell and a ball that contains it. */
@@ -352,6 +353,12 @@ export interface CornerCuttingShape {
   /** The family of the shape. */ family: "corner_cutting";
 }
 
+/** A point around which a closed surface winds neither once nor not at all. */
+export interface CountedPoint {
+  /** The point. */ point_mm: Array<number>;
+  /** How often it counts in the volume; below 0 where it is taken away. */ times: number;
+}
+
 /** How many jobs of a batch stand where. */
 export interface Counts {
   /** Those that were stopped. */ cancelled: number;
@@ -415,6 +422,8 @@ export interface EmbeddedModel {
 
 /** The volume that a closed surface encloses. The surface itself, being a sheet, has none. */
 export interface EnclosedStatement {
+  /** Proven: every point farther than this from the surface is counted once, or not at all. Absent where that is not known; nearer ones are not checked. */ counted_once_beyond_mm?: number | null;
+  counted_otherwise?: CountedPoint | null;
   /** How it was found. */ method: VolumeMethod;
   volume_mm3: Array<number>;
 }

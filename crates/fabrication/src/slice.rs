@@ -3,8 +3,9 @@
 use glam::DVec3;
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::section::{PlaneFrame, Section, SectionError, sections};
+use lacuna_kernel::measure::section::{Grazed, PlaneFrame, Section, SectionError, grazed, sections};
 use lacuna_kernel::solid::{Solid, TriMesh};
+use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::{self, PlaneStatement, SectionsStatement};
@@ -36,11 +37,38 @@ impl Stack {
     pub fn each<E>(&self, budget: &Budget, sink: &mut dyn FnMut(&Section) -> Result<(), E>) -> Result<(), StreamError<E>> {
         sections(&self.solid, &self.frame, &self.offsets_mm, budget, &mut |section| sink(&section).map_err(StreamError::Sink))
     }
+
+    /// All sections where they are in space, as wires to look at.
+    ///
+    /// # Errors
+    /// A stop.
+    pub fn wires(&self, budget: &Budget) -> Result<Tessellation, JobError> {
+        let mut wires = Tessellation::default();
+        let each = self.each::<JobError>(budget, &mut |section| {
+            for points in section.loops() {
+                let (first, count) = (wires.vertices.len() as u32, points.len() as u32);
+                wires.vertices.extend(points.iter().map(|point| self.frame.point(point.to_array(), section.offset_mm)));
+                wires.segments.extend((0..count).map(|k| [first + k, first + (k + 1) % count]));
+            }
+            Ok(())
+        });
+        each.map_err(JobError::from)?;
+        Ok(wires)
+    }
 }
 
 impl<E> From<SectionError> for StreamError<E> {
     fn from(error: SectionError) -> Self {
         Self::Job(error.into())
+    }
+}
+
+impl From<StreamError<Self>> for JobError {
+    fn from(error: StreamError<Self>) -> Self {
+        match error {
+            StreamError::Job(error) | StreamError::Sink(error) => error,
+            StreamError::NotPoints => Self::new(Kind::Defect, "internal", "sections are no points".into()),
+        }
     }
 }
 
@@ -59,6 +87,13 @@ pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<
     certificate.warnings.extend(miscounted(rounded.solid.mesh(), rounded.crossings));
     let offsets_mm = offsets(planes, &rounded.solid.mesh().vertices, &frame)?;
     let stack = Stack { solid: rounded.solid, frame, offsets_mm };
+    if let Some(Grazed { planes, first_mm }) = grazed(stack.solid.mesh(), &stack.frame, &stack.offsets_mm, rounded.moved_mm) {
+        let (count, moved) = (stack.offsets_mm.len(), rounded.moved_mm);
+        certificate.warnings.push(format!(
+            "{planes} of {count} planes, the first at {first_mm} mm, lie in faces that are level but for rounding, by {moved:.1e} mm at most: what of these is cut there means nothing; a plane {:.1e} mm higher or lower cuts the solid above or below such a face",
+            2.0 * moved
+        ));
+    }
     let mut told = Vec::with_capacity(stack.offsets_mm.len());
     let each = stack.each::<JobError>(budget, &mut |section| {
         told.push(PlaneStatement {
@@ -71,10 +106,7 @@ pub(crate) fn slice(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<
         });
         Ok(())
     });
-    each.map_err(|error| match error {
-        StreamError::Job(error) | StreamError::Sink(error) => error,
-        StreamError::NotPoints => JobError::new(Kind::Defect, "internal", "sections are no points".into()),
-    })?;
+    each.map_err(JobError::from)?;
     if told.is_empty() {
         let words = "no sections: the middle of the first layer is beyond the solid; take a smaller step";
         certificate.warnings.push(words.into());
@@ -123,10 +155,10 @@ fn ends(heights: impl Iterator<Item = f64>) -> (f64, f64) {
     heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
-/// Bytes of a point in an SVG drawing (two numbers of up to 17 digits, signs, points and a letter) and in a DXF file, where a point is an entity. Found on spheres and waves of 14,000 to a million
-/// triangles, as is the next.
+/// Bytes of a point in a drawing: two numbers of up to 17 digits, signs, points and a letter, or two codes and line ends in DXF. Found on spheres and waves of 14,000 to a million triangles, as is
+/// the next.
 const SVG_BYTES_PER_POINT: f64 = 38.0;
-const DXF_BYTES_PER_POINT: f64 = 93.0;
+const DXF_BYTES_PER_POINT: f64 = 46.0;
 /// Bytes that a process holds for each triangle of a solid that is cut.
 const BYTES_PER_TRIANGLE: f64 = 700.0;
 

@@ -160,6 +160,7 @@ CellPairStatement = TypedDict('CellPairStatement', {
     'distance_mm': 'list[float]',
     'first': 'str',
     'first_mm': 'list[float]',
+    'off_mm': 'NotRequired[list[float] | None]',
     'second': 'NotRequired[str | None]',
     'second_mm': 'list[float]',
 })
@@ -262,6 +263,8 @@ CornerCuttingShape = TypedDict('CornerCuttingShape', {
     'family': "Literal['corner_cutting']",
 })
 
+CountedPoint = TypedDict('CountedPoint', {'point_mm': 'list[float]', 'times': 'int'})
+
 Counts = TypedDict('Counts', {
     'cancelled': 'int',
     'expired': 'int',
@@ -300,7 +303,12 @@ EmbeddedModel = TypedDict('EmbeddedModel', {
     'units': "NotRequired[Literal['um', 'mm', 'cm', 'm', 'in']]",
 })
 
-EnclosedStatement = TypedDict('EnclosedStatement', {'method': 'VolumeMethod', 'volume_mm3': 'list[float]'})
+EnclosedStatement = TypedDict('EnclosedStatement', {
+    'counted_once_beyond_mm': 'NotRequired[float | None]',
+    'counted_otherwise': 'NotRequired[CountedPoint | None]',
+    'method': 'VolumeMethod',
+    'volume_mm3': 'list[float]',
+})
 
 ExactNumber = TypedDict('ExactNumber', {'exact': 'str', 'value': 'float'})
 
