@@ -161,7 +161,9 @@ fn read_within(bytes: &[u8], format: Option<Format>) {
             assert!(count <= 5000 && file.mesh.triangles.len() <= 5000);
             assert!(file.mesh.triangles.iter().flatten().all(|&index| (index as usize) < count));
             assert!(file.mesh.vertices.iter().all(|vertex| vertex.is_finite()));
-            let corners: usize = file.faces().iter().map(|face| face.len() - 2).sum();
+            assert!(file.segments.len() + file.points.len() <= 5000);
+            assert!(file.segments.iter().flatten().chain(&file.points).all(|&index| (index as usize) < count));
+            let corners: usize = file.faces().iter().map(|face| face.len().saturating_sub(2)).sum();
             assert_eq!(corners, file.mesh.triangles.len());
         }
     }

@@ -1,5 +1,6 @@
 //! Mesh files over HTTP: taken, examined, used in jobs, converted, and refused when they are not what they say.
 
+use std::f64::consts::PI;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::Path;
@@ -45,6 +46,87 @@ fn refused(answer: &Answer, status: u16, named: &str) {
     assert_eq!(answer.header("content-type"), "application/problem+json");
     let words = answer.json().to_string();
     assert!(words.contains(named), "{words} does not name {named:?}");
+}
+
+/// A segment of length 10 in every format that has segments, and a point in those that have points, binary PLY among them.
+fn wires_and_points() -> [Vec<(&'static str, Vec<u8>)>; 2] {
+    let ends = "0 0 0\n6 8 0\n";
+    let coordinates = "property float x\nproperty float y\nproperty float z\n";
+    let edges = format!(
+        "ply\nformat ascii 1.0\nelement vertex 2\n{coordinates}element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n{ends}0 1\n"
+    );
+    let mut binary = format!("ply\nformat binary_little_endian 1.0\nelement vertex 1\n{coordinates}end_header\n").into_bytes();
+    [1.0_f32, 2.0, 3.0].into_iter().for_each(|x| binary.extend(x.to_le_bytes()));
+    let cloud = format!(
+        "ply\nformat ascii 1.0\nelement vertex 1\n{coordinates}element face 0\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n"
+    );
+    let segments = vec![
+        ("wire.obj", b"v 0 0 0\nv 6 8 0\nv 3 4 0\nl 1/1 -1 2\n".to_vec()),
+        ("wire.off", format!("OFF\n2 1 0\n{ends}2 0 1\n").into_bytes()),
+        ("wire.ply", edges.into_bytes()),
+    ];
+    let points = vec![
+        ("point.obj", b"v 1 2 3\np 1\n".to_vec()),
+        ("point.off", b"OFF\n1 1 0\n1 2 3\n1 0\n".to_vec()),
+        ("point.ply", binary),
+        ("cloud.ply", cloud.into_bytes()),
+    ];
+    [segments, points]
+}
+
+#[test]
+fn wires_and_points_of_files_are_thickened() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let ball = 4.0 / 3.0 * PI;
+    let kinds = wires_and_points().into_iter().zip([("segments", ball + 10.0 * PI), ("points", ball)]);
+    for (name, bytes, (kind, volume)) in kinds.flat_map(|(files, kind)| files.into_iter().map(move |(name, bytes)| (name, bytes, kind))) {
+        // By the command, and told by it.
+        let path = scratch.join(name);
+        std::fs::write(&path, &bytes).unwrap();
+        let inspected: Value = serde_json::from_slice(&succeed(["inspect".as_ref(), path.as_os_str()])).unwrap();
+        let expected = if name == "wire.obj" { 2 } else { 1 };
+        assert_eq!(
+            (&inspected[kind], &inspected["triangles"], &inspected["left_out"]),
+            (&json!(expected), &json!(0), &json!({})),
+            "{name}"
+        );
+        let certificate = scratch.join("certificate.json");
+        let options = ["--tolerance", "0.05", "--radius", "1", "--quiet", "--certificate"].map(std::ffi::OsStr::new);
+        let solid = scratch.join("solid.stl");
+        let words = ["solidify".as_ref(), path.as_os_str(), "-o".as_ref(), solid.as_os_str()];
+        succeed(words.into_iter().chain(options).chain([certificate.as_os_str()]));
+        let told: Value = serde_json::from_slice(&std::fs::read(&certificate).unwrap()).unwrap();
+        let between = told["volume_mm3"].as_array().unwrap();
+        assert!(between[0].as_f64().unwrap() <= volume && volume <= between[1].as_f64().unwrap(), "{name}: {between:?} and {volume}");
+        // The same by the service.
+        let view = uploaded(&service, name, &bytes);
+        assert_eq!(view["mesh"][kind], expected, "{view}");
+        let params = json!({ "tolerance_mm": 0.05, "radius_mm": 1 });
+        let order = json!({ "lacuna": 1, "kind": "solidify", "model_ref": view["id"], "params": params, "outputs": ["stl"] });
+        let done = service.done(&order);
+        assert_eq!(done["outputs"][0]["digest"], told["output_digests"]["stl"], "{done}");
+        // Other formats have them, too.
+        let converted = scratch.join("converted.obj");
+        succeed(["convert".as_ref(), path.as_os_str(), converted.as_os_str()]);
+        let words = std::fs::read_to_string(&converted).unwrap();
+        assert_eq!(
+            words.lines().filter(|line| line.starts_with(if kind == "segments" { "l " } else { "p " })).count(),
+            expected,
+            "{words}"
+        );
+    }
+}
+
+#[test]
+fn lines_beside_faces_are_left_out_and_told() {
+    let scratch = Scratch::new();
+    let service = Service::start(scratch.path());
+    let body = cube(0.0, 10.0) + "l 1 2 4 3 1\np 5\n";
+    let view = uploaded(&service, "box.obj", body.as_bytes());
+    let mesh = &view["mesh"];
+    assert_eq!((&mesh["left_out"], &mesh["closed_manifold"]), (&json!({ "segments": 4, "points": 1 }), &json!(true)), "{view}");
+    assert!(mesh["prompts"].as_array().unwrap().iter().any(|prompt| prompt["code"] == "file.left-out"), "{view}");
 }
 
 #[test]
@@ -236,6 +318,9 @@ fn files_that_lie_are_refused_and_leave_nothing() {
     refused(&upload(&service, &[("content-type", "model/obj")], b"v 0 0 0\nf 1 2 9\n"), 422, "line 2");
     refused(&upload(&service, &[("content-type", "model/obj")], b""), 422, "");
     refused(&upload(&service, &[("content-type", "model/obj")], b"v 0 0 0\n"), 422, "upload.empty");
+    refused(&upload(&service, &[("content-type", "model/obj")], b"v 0 0 0\nv 1 0 0\nl 1 3\n"), 422, "line 3");
+    let edge = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement edge 1\nproperty int vertex1\nend_header\n0 0 0\n0\n";
+    refused(&upload(&service, &[("content-type", "application/octet-stream")], edge.as_bytes()), 422, "vertex1 and vertex2");
     refused(&upload(&service, &[("content-type", "application/octet-stream")], b"nothing that is known"), 422, "format.unknown");
     refused(&upload(&service, &[("content-type", "image/png")], b"\x89PNG"), 415, "model/stl");
     refused(&service.request("POST", "/v1/models?format=dwg", &[("content-type", "application/octet-stream")], b"x"), 415, "dwg");

@@ -38,7 +38,7 @@ pub struct MeshReport {
     pub objects: Vec<String>,
     /// Polygons of four corners or more.
     pub polygons_fanned: u64,
-    /// Shapes that hold no polygons and were left out, by kind.
+    /// What holds no polygons and was left out, by kind: shapes, and segments and points beside faces.
     pub left_out: BTreeMap<String, u64>,
     /// The faces as a cage for subdivision.
     pub cage: Cage,
@@ -46,6 +46,12 @@ pub struct MeshReport {
     pub vertices: u64,
     /// Triangles.
     pub triangles: u64,
+    /// Segments, of a file without faces.
+    #[serde(default)]
+    pub segments: u64,
+    /// Points, of a file without faces: of a PLY file that has vertices alone, all of them.
+    #[serde(default)]
+    pub points: u64,
     /// Edges.
     pub edges: u64,
     /// Connected pieces of material: shells that do not look inwards.
@@ -138,16 +144,16 @@ pub struct Examined {
 /// Reads and examines a mesh file that was uploaded.
 ///
 /// # Errors
-/// When it cannot be read within the limits, or holds no faces.
+/// When it cannot be read within the limits, or holds nothing.
 pub fn examine(path: &Path, format: Option<Format>, upload_bytes: u64) -> Result<Examined, Problem> {
     let bytes = std::fs::read(path).map_err(|error| Problem::io("the file that arrived cannot be read", &error))?;
     let file = read(&bytes, format, &limits_of_uploads(upload_bytes))?;
     let (digest, length) = (Digest::of(&bytes), bytes.len() as u64);
     // The report takes memory of its own.
     drop(bytes);
-    if file.mesh.triangles.is_empty() {
+    if file.is_empty() {
         let format = file.facts.format;
-        let detail = format!("the {format} file holds no triangles and no polygons; a mesh is expected");
+        let detail = format!("the {format} file holds no polygons, segments or points; a mesh or wires are expected");
         return Err(Problem::new(ProblemKind::InvalidFile, detail).code("upload.empty"));
     }
     Ok(Examined { digest, report: report(&file, length)? })
@@ -183,6 +189,8 @@ pub fn report(file: &MeshFile, bytes: u64) -> Result<MeshReport, Problem> {
         cage: cage(file),
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
+        segments: file.segments.len() as u64,
+        points: file.points.len() as u64,
         edges: topology.edges,
         components: topology.components,
         shells: topology.shells,
@@ -216,7 +224,8 @@ pub fn unfilled(file: &MeshFile) -> Vec<Finding> {
 }
 
 fn cage(file: &MeshFile) -> Cage {
-    let faces = file.faces();
+    // Segments and points are no faces of a cage.
+    let faces = if file.mesh.triangles.is_empty() { Vec::new() } else { file.faces() };
     let count = faces.len() as u64;
     match HalfEdgeMesh::new(file.mesh.vertices.len(), &faces) {
         Ok(mesh) => {
@@ -285,6 +294,17 @@ fn prompts(file: &MeshFile, volume: f64, topology: &Topology) -> Vec<Prompt> {
     for (word, count) in &file.facts.left_out {
         prompt("file.left-out", format!("{count} shapes of the kind {word} hold no polygons and were left out"));
     }
+    let wires = file.segments.len() + file.points.len();
+    if wires > 0 {
+        prompt(
+            "file.wires",
+            format!(
+                "the file holds {} segments, {} points and no faces: nothing to print before they are thickened (lacuna solidify --radius)",
+                file.segments.len(),
+                file.points.len()
+            ),
+        );
+    }
     if let Some((face, fault)) = file.unfilled.first() {
         prompt(
             fault.code(),
@@ -294,7 +314,7 @@ fn prompts(file: &MeshFile, volume: f64, topology: &Topology) -> Vec<Prompt> {
             ),
         );
     }
-    if !topology.is_closed_manifold() {
+    if wires == 0 && !topology.is_closed_manifold() {
         prompt("mesh.not-manifold", "the mesh is no closed 2-manifold: slicers repair it by guessing; the volume means nothing; lacuna convert --repair mends what leaves no doubt".to_owned());
     } else if volume < 0.0 {
         prompt("mesh.inside-out", format!("the enclosed volume is {volume} mm3: the faces look inwards"));

@@ -795,12 +795,14 @@ export interface MeshReport {
   /** Pairs of neighbours that disagree about the outside. */ flipped_pairs: number;
   /** The format it was read as. */ format: string;
   /** Handles of all pieces, if the mesh is a closed 2-manifold. */ genus?: number | null;
-  /** Shapes that hold no polygons and were left out, by kind. */ left_out: Record<string, number>;
+  /** What holds no polygons and was left out, by kind: shapes, and segments and points beside faces. */ left_out: Record<string, number>;
   /** Edges of three triangles or more. */ nonmanifold_edges: number;
   /** Vertices whose triangles are no single fan. */ nonmanifold_vertices: number;
   /** Names of objects. */ objects: Array<string>;
+  /** Points, of a file without faces: of a PLY file that has vertices alone, all of them. */ points?: number;
   /** Polygons of four corners or more. */ polygons_fanned: number;
   /** What a slicer will ask or suffer from, with the way out. */ prompts: Array<Prompt>;
+  /** Segments, of a file without faces. */ segments?: number;
   /** Connected pieces of surface. */ shells: number;
   /** Triangles. */ triangles: number;
   /** The unit that the file names, or that it names none. */ unit: string;

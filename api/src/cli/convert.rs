@@ -8,6 +8,7 @@ use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
 use lacuna_fabrication::{JobError, repaired_mesh};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{Interior, PolygonMesh};
+use lacuna_kernel::tessellation::Tessellation;
 
 use super::args::ConvertArgs;
 use super::inspect::mesh_file;
@@ -76,8 +77,18 @@ pub(super) fn title(path: &Path, objects: &[String]) -> String {
 fn write(format: Format, file: &MeshFile, title: &str, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
     let metadata = Metadata { title: Some(title), ..Metadata::default() };
     let mut sink = BufWriter::with_capacity(1 << 16, part);
-    let written =
-        guarded(|| format::write(format, Geometry::Polygons { mesh: &file.mesh, polygons: &file.polygons, closed }, &metadata, &mut sink))?;
+    let wires = Tessellation {
+        vertices: if file.mesh.triangles.is_empty() { file.mesh.vertices.clone() } else { Vec::new() },
+        segments: file.segments.clone(),
+        points: file.points.clone(),
+        ..Tessellation::default()
+    };
+    let geometry = if file.mesh.triangles.is_empty() && !file.is_empty() {
+        Geometry::from(&wires)
+    } else {
+        Geometry::Polygons { mesh: &file.mesh, polygons: &file.polygons, closed }
+    };
+    let written = guarded(|| format::write(format, geometry, &metadata, &mut sink))?;
     written.map_err(|error| match error {
         // The file is at fault, not a model.
         format::FormatError::CannotCarry { .. } => Problem { kind: ProblemKind::InvalidFile, ..format_problem(&error) },

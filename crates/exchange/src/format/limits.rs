@@ -12,7 +12,7 @@ pub struct ReadLimits {
     pub file_bytes: u64,
     /// Vertices of the mesh that results. Default 50 million, 1.2 GB of coordinates.
     pub vertices: u64,
-    /// Triangles of the mesh that results, all instances counted. Default 50 million.
+    /// Triangles of the mesh that results, all instances counted, or segments and points of a file without faces. Default 50 million.
     pub triangles: u64,
     /// Entries of an archive. Default 200: a 3MF file has a handful, and one for each part and picture.
     pub archive_entries: u64,
@@ -66,6 +66,9 @@ pub(crate) struct Read {
     pub(crate) polygons: Vec<PolygonRun>,
     /// Polygons that no triangles fill, by the number of their face.
     pub(crate) unfilled: Vec<(u64, PolygonFault)>,
+    /// What has one or two corners.
+    pub(crate) segments: Vec<[u32; 2]>,
+    pub(crate) points: Vec<u32>,
 }
 
 /// A mesh under construction, kept within the limits.
@@ -115,7 +118,7 @@ impl<'a> MeshBuilder<'a> {
     }
 
     /// Adds a polygon, cut into triangles; one that has no inside as a fan, and notes that. Faces with fewer than three corners
-    /// hold no area and are left out.
+    /// are segments and points.
     pub(crate) fn polygon(&mut self, corners: &[i64], place: &dyn Fn() -> Place) -> Result<(), FormatError> {
         self.corners.clear();
         for &index in corners {
@@ -123,7 +126,9 @@ impl<'a> MeshBuilder<'a> {
             self.corners.push(index);
         }
         match *self.corners.as_slice() {
-            [] | [_] | [_, _] => return Ok(()),
+            [] => return Ok(()),
+            [a] => return self.point(a, place),
+            [a, b] => return self.segment([a, b], place),
             [a, b, c] => return self.triangle([a, b, c], place),
             _ => {}
         }
@@ -147,6 +152,47 @@ impl<'a> MeshBuilder<'a> {
         self.read.polygons.push(PolygonRun { first: first as u32, count: count as u32 });
         self.beyond += count as u64 - 1;
         Ok(())
+    }
+
+    /// Adds the segments of a chain of vertices; a point if it is one alone.
+    pub(crate) fn chain(&mut self, corners: &[i64], place: &dyn Fn() -> Place) -> Result<(), FormatError> {
+        if corners.len() < 2 {
+            return self.polygon(corners, place);
+        }
+        corners.windows(2).try_for_each(|ends| self.polygon(ends, place))
+    }
+
+    /// Makes every vertex a point.
+    pub(crate) fn points_alone(&mut self, place: &dyn Fn() -> Place) -> Result<(), FormatError> {
+        let count = self.read.mesh.vertices.len();
+        within(place(), "triangles", count as u64, self.limits.triangles)?;
+        reserve(&mut self.read.points, count, &place())?;
+        self.read.points.extend(0..count as u32);
+        Ok(())
+    }
+
+    fn segment(&mut self, ends: [u32; 2], place: &dyn Fn() -> Place) -> Result<(), FormatError> {
+        self.one_more(place)?;
+        if self.read.segments.len() == self.read.segments.capacity() {
+            reserve(&mut self.read.segments, 1, &place())?;
+        }
+        self.read.segments.push(ends);
+        Ok(())
+    }
+
+    fn point(&mut self, vertex: u32, place: &dyn Fn() -> Place) -> Result<(), FormatError> {
+        self.one_more(place)?;
+        if self.read.points.len() == self.read.points.capacity() {
+            reserve(&mut self.read.points, 1, &place())?;
+        }
+        self.read.points.push(vertex);
+        Ok(())
+    }
+
+    /// Whether there may be one more of whatever is thinner than a triangle.
+    fn one_more(&self, place: &dyn Fn() -> Place) -> Result<(), FormatError> {
+        let count = (self.read.segments.len() + self.read.points.len()) as u64 + 1;
+        if count > self.limits.triangles { Err(FormatError::limit(place(), "triangles", count, self.limits.triangles)) } else { Ok(()) }
     }
 
     fn index(&self, index: i64, place: &dyn Fn() -> Place) -> Result<u32, FormatError> {

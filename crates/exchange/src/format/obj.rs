@@ -1,8 +1,8 @@
 //! Wavefront OBJ: text out and in.
 //!
 //! Format: Wavefront, Advanced Visualizer Manual, appendix B1 (Object Files). Indices count from
-//! 1 through the whole file; negative ones count back from the last vertex. Statements that hold
-//! no mesh (materials, normals, texture coordinates, smoothing) are read over.
+//! 1 through the whole file; negative ones count back from the last vertex. Lines and points are read where there are no
+//! faces. Statements that hold no mesh (materials, normals, texture coordinates, smoothing) are read over.
 
 use super::error::{FormatError, Place};
 use super::geometry::Piece;
@@ -144,6 +144,17 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
                     corners.push(corner(word, builder.vertex_count(), &lines)?);
                 }
                 builder.polygon(&corners, &|| lines.place())?;
+            }
+            Some(word @ (b"l" | b"p")) => {
+                corners.clear();
+                for word in words {
+                    corners.push(corner(word, builder.vertex_count(), &lines)?);
+                }
+                if word == b"l" {
+                    builder.chain(&corners, &|| lines.place())?;
+                } else {
+                    corners.chunks(1).try_for_each(|point| builder.polygon(point, &|| lines.place()))?;
+                }
             }
             Some(b"o" | b"g") => keep_name(&mut facts, line.trim_ascii_start().get(1..).unwrap_or_default()),
             Some(b"#") if line == UNIT_COMMENT.trim_ascii_end() => facts.unit = Some(Unit::Millimetre),

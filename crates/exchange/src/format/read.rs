@@ -52,8 +52,8 @@ pub struct MeshFacts {
     pub unit: Option<Unit>,
     /// Names of objects, at most [`MeshFacts::NAMES`], each cut to [`MeshFacts::NAME_CHARACTERS`].
     pub object_names: Vec<String>,
-    /// Shapes that hold no polygons and were left out, by the word for their kind, with their number; only VRML
-    /// has any.
+    /// What holds no polygons and was left out, by the word for its kind, with its number: shapes of VRML, and `segments` and `points` beside
+    /// faces, which many programs write only to show their edges.
     pub left_out: Vec<(&'static str, u64)>,
 }
 
@@ -78,20 +78,37 @@ pub struct MeshFile {
     /// Polygons that no triangles fill, by the number of their face, in order: in the mesh they are fans that fold. They may be
     /// faces of a cage all the same.
     pub unfilled: Vec<(u64, PolygonFault)>,
+    /// Segments, where there are no faces.
+    pub segments: Vec<[u32; 2]>,
+    /// Points, where there are no faces.
+    pub points: Vec<u32>,
     /// What else the file said.
     pub facts: MeshFacts,
 }
 
 impl MeshFile {
-    pub(crate) fn new(builder: MeshBuilder<'_>, facts: MeshFacts) -> Self {
-        let Read { mesh, polygons, unfilled } = builder.finish();
-        Self { mesh, polygons, unfilled, facts }
+    pub(crate) fn new(builder: MeshBuilder<'_>, mut facts: MeshFacts) -> Self {
+        let Read { mesh, polygons, unfilled, mut segments, mut points } = builder.finish();
+        if !mesh.triangles.is_empty() {
+            let beside = [("segments", segments.len()), ("points", points.len())];
+            facts.left_out.extend(beside.into_iter().filter(|&(_, count)| count > 0).map(|(word, count)| (word, count as u64)));
+            (segments, points) = (Vec::new(), Vec::new());
+        }
+        Self { mesh, polygons, unfilled, segments, points, facts }
     }
 
-    /// The faces as the file has them: its polygons whole, their corners in its order.
+    /// Whether there are no faces, segments or points.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.mesh.triangles.is_empty() && self.segments.is_empty() && self.points.is_empty()
+    }
+
+    /// The faces as the file has them: its polygons whole, their corners in its order. Where there are none, its segments and then its points, as faces with two corners and one.
     #[must_use]
     pub fn faces(&self) -> Vec<Vec<u32>> {
         let mut faces = Vec::with_capacity(face_count(&self.mesh.triangles, &self.polygons) as usize);
+        faces.extend(self.segments.iter().map(|ends| ends.to_vec()));
+        faces.extend(self.points.iter().map(|&point| vec![point]));
         let Ok(()) = each_face(&self.mesh.triangles, &self.polygons, |face| {
             faces.push(face.to_vec());
             Ok::<(), Infallible>(())

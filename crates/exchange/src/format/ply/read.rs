@@ -60,6 +60,8 @@ enum Role {
     Coordinate(usize),
     /// The corners of a face.
     Corners,
+    /// An end of an edge: 0 or 1.
+    End(usize),
     /// Nothing that is read.
     Other,
 }
@@ -74,6 +76,7 @@ struct Property {
 struct Element {
     is_vertex: bool,
     is_face: bool,
+    is_edge: bool,
     count: u64,
     properties: Vec<Property>,
 }
@@ -117,8 +120,8 @@ fn read_header(lines: &mut Lines<'_>) -> Result<Header, FormatError> {
             [b"element", name, count] if elements.len() < MOST_ELEMENTS => {
                 let count = std::str::from_utf8(count).ok().and_then(|count| count.parse().ok());
                 let count = count.ok_or_else(|| malformed(lines.place(), "a number of elements", line))?;
-                let (is_vertex, is_face) = (*name == b"vertex", *name == b"face");
-                elements.push(Element { is_vertex, is_face, count, properties: Vec::new() });
+                let (is_vertex, is_face, is_edge) = (*name == b"vertex", *name == b"face", *name == b"edge");
+                elements.push(Element { is_vertex, is_face, is_edge, count, properties: Vec::new() });
             }
             [b"property", ..] => {
                 let property = property(&parts).ok_or_else(|| malformed(lines.place(), "a property", line))?;
@@ -150,6 +153,8 @@ fn property(parts: &[&[u8]]) -> Option<Property> {
                 b"x" => Role::Coordinate(0),
                 b"y" => Role::Coordinate(1),
                 b"z" => Role::Coordinate(2),
+                b"vertex1" => Role::End(0),
+                b"vertex2" => Role::End(1),
                 _ => Role::Other,
             };
             Some(Property { role, length: None, scalar: Scalar::from_word(scalar)? })
@@ -251,7 +256,7 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
         if element.is_vertex && faces_seen {
             return Err(malformed(place, "vertices before faces", b"vertices after faces"));
         }
-        faces_seen |= element.is_face;
+        faces_seen |= element.is_face || element.is_edge;
         builder.announce(
             if element.is_vertex { element.count } else { 0 },
             if element.is_face { element.count } else { 0 },
@@ -259,6 +264,10 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<MeshFile, Format
             &place,
         )?;
         read_element(element, &mut body, &mut builder)?;
+    }
+    // A cloud of points has vertices alone.
+    if !header.elements.iter().any(|element| (element.is_face || element.is_edge) && element.count > 0) {
+        builder.points_alone(&|| body.place())?;
     }
     let encoding = match header.encoding {
         Encoding::Text => "ascii",
@@ -286,16 +295,22 @@ fn read_element(element: &Element, body: &mut Body<'_>, builder: &mut MeshBuilde
     if element.is_vertex && !(0..3).all(|axis| has(Role::Coordinate(axis))) {
         return Err(malformed(body.place(), "the properties x, y and z", b""));
     }
+    if element.is_edge && !(0..2).all(|end| has(Role::End(end))) {
+        return Err(malformed(body.place(), "the properties vertex1 and vertex2", b""));
+    }
     let mut corners = Vec::new();
     for _ in 0..element.count {
         let place = body.place();
-        let mut position = [0.0; 3];
+        let (mut position, mut ends) = ([0.0; 3], [0; 2]);
         corners.clear();
         for property in &element.properties {
             let Some(length) = property.length else {
-                let value = body.value(property.scalar)?;
-                if let Role::Coordinate(axis) = property.role {
-                    position[axis] = value;
+                match property.role {
+                    Role::Coordinate(axis) => position[axis] = body.value(property.scalar)?,
+                    Role::End(end) if element.is_edge => ends[end] = body.whole(property.scalar)?,
+                    _ => {
+                        body.value(property.scalar)?;
+                    }
                 }
                 continue;
             };
@@ -311,6 +326,8 @@ fn read_element(element: &Element, body: &mut Body<'_>, builder: &mut MeshBuilde
             builder.vertex(DVec3::from_array(position), &|| place.clone())?;
         } else if element.is_face {
             builder.polygon(&corners, &|| place.clone())?;
+        } else if element.is_edge {
+            builder.polygon(&ends, &|| place.clone())?;
         }
     }
     Ok(())
