@@ -1222,9 +1222,10 @@ export interface State {
 
 /** How far a running job has come. */
 export interface Step {
+  /** The error bound, in mm, that is proven of what has been made so far; absent as long as none is. At the end it is the certificate's `achieved_bound_mm`. */ bound_mm?: number | null;
   /** Triangles or cells made so far, by phase. */ count: number;
   /** Share of the phase that is done, in [0, 1]. */ fraction: number;
-  /** `validate`, `refine`, `dilate`, `stitch`, `verify` or `write`. */ phase: string;
+  /** `validate`, `refine`, `dilate`, `stitch`, `verify`, `combine`, `intersect`, `compare`, `section`, `stability`, `certify` or `write`. */ phase: string;
 }
 
 /** The limit surface of a subdivision scheme on a polygon mesh that is a manifold, with or without boundary. */

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lacuna_fabrication::{Certificate, Job};
 use lacuna_kernel::attractor::Address;
-use lacuna_kernel::budget::{Budget, CancelToken};
+use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::Model;
 use serde_json::Value;
 
@@ -54,7 +54,7 @@ pub struct Here;
 
 impl Performer for Here {
     fn certificate(&self, job: &Job) -> Result<Certificate, Problem> {
-        let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
+        let budget = Budget { limits: job.limits, ..Budget::default() };
         let _watchdog = Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
         let outcome = production::compute(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))?;
         Ok(outcome.certificate)

@@ -206,7 +206,9 @@ pub(crate) fn solid_of(source: &Source<'_>, tolerance: Tolerance, budget: &Budge
     let mut operand = operand(source, share(std::slice::from_ref(source), tolerance)?, budget)?;
     operand.join(budget)?;
     let mesh = operand.meshes.pop().unwrap_or_default();
-    Ok((rounded(&mesh, budget)?, operand))
+    let rounded = rounded(&mesh, budget)?;
+    budget.prove(operand.statement.inner_bound_mm.max(operand.statement.outer_bound_mm) + rounded.moved_mm);
+    Ok((rounded, operand))
 }
 
 /// What is counted twice, or taken away, of what a closed mesh bounds, so many pairs of whose triangles meet; nothing of a solid.

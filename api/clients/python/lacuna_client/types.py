@@ -879,7 +879,7 @@ State = TypedDict('State', {
     'transitions': 'list[Transition]',
 })
 
-Step = TypedDict('Step', {'count': 'int', 'fraction': 'float', 'phase': 'str'})
+Step = TypedDict('Step', {'bound_mm': 'NotRequired[float | None]', 'count': 'int', 'fraction': 'float', 'phase': 'str'})
 
 SubdivisionShape = TypedDict('SubdivisionShape', {
     'boundary': "NotRequired[Literal['smooth', 'sharp_corners']]",
