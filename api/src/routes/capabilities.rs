@@ -57,7 +57,7 @@ pub struct LimitCapability {
     seconds: f64,
     /// Most accounted memory of a job, in bytes.
     memory_bytes: u64,
-    /// Most leaf cells of a job.
+    /// Most leaf cells that a job may expand.
     cells: u64,
     /// Most triangles of a result.
     triangles: u64,

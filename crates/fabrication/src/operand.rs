@@ -242,6 +242,7 @@ pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &B
             let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, true, budget)?;
             plan.triangles += prediction.triangles;
             plan.counted_triangles += prediction.counted_triangles;
+            plan.counted_cells = plan.counted_cells.max(prediction.leaf_cells);
             seconds += effort::of_dilated_operand(&prediction);
             // One is made after the other.
             plan.memory_bytes = plan.memory_bytes.max(held_bytes(&prediction, true));

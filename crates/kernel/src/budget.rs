@@ -67,7 +67,8 @@ pub struct Limits {
     pub seconds: f64,
     /// Memory of the results and working sets that grow with the input, in bytes (accounted, not measured).
     pub memory_bytes: u64,
-    /// Leaf cells that an evaluation may produce.
+    /// Leaf cells that may be expanded: all of the shape for an evaluation, and for each dilation those that its surface needs, one again in every block of
+    /// the lattice that needs it, as certificates count them. A search that compares shapes looks at no more nodes than this, and ends there with what it knows.
     pub cells: u64,
     /// Triangles of the result.
     pub triangles: u64,

@@ -332,7 +332,7 @@ impl<'a> Plan<'a> {
     /// Predicts from a sample of the lattice's blocks.
     pub(super) fn predict(&self, budget: &Budget) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
-            limits: crate::budget::Limits { triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
+            limits: crate::budget::Limits { cells: u64::MAX, triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
             progress: None,
             ..budget.clone()
         };
@@ -397,11 +397,7 @@ impl<'a> Plan<'a> {
             let task = Task::Changed(&Changed::new(&new), &blocks);
             let made = self.surfaces(setting, space, &grading, task, budget)?;
             critical = add(setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
-            let total: u64 =
-                blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
-            if total > budget.limits.triangles {
-                return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
-            }
+            self.check(&mut blocks, budget)?;
         }
         let uncertain = uncertain.len() + critical.len();
         let (mut site_error, mut triangles) = (SiteError::default(), 0);
@@ -414,11 +410,30 @@ impl<'a> Plan<'a> {
         self.finish(setting, space, surface, uncertain as u64, Some(setting.lattice.pitch), budget)
     }
 
+    /// Holds all blocks against the limits.
+    fn check(&self, blocks: &mut Blocks, budget: &Budget) -> Result<(), DilationError> {
+        let (mut triangles, mut leaves) = (0, 0);
+        for surface in blocks.values_mut().filter_map(|surface| surface.get_mut().ok()) {
+            triangles += surface.triangles.len() as u64;
+            leaves += surface.leaves;
+        }
+        if triangles > budget.limits.triangles {
+            return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+        }
+        if leaves > budget.limits.cells {
+            return Err(DilationError::LeafCells { tolerance_mm: self.aimed, allowed: budget.limits.cells });
+        }
+        Ok(())
+    }
+
     /// The dilation by the union of polytopes around points and segments, where that serves better than a lattice.
     pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let Some(arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
         let allowed = budget.limits.triangles;
         let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed };
+        if arrangement.leaves() > budget.limits.cells {
+            return Err(DilationError::LeafCells { tolerance_mm: self.aimed, allowed: budget.limits.cells });
+        }
         // What is expected is known to a factor of 2.
         if arrangement.triangles > 2.0 * allowed as f64 {
             return Err(too_many());
