@@ -103,7 +103,7 @@ impl ExpectedDigest {
             return Err("[digest] has no outputs: name at least one, as outputs = {stl = \"sha256:...\"}".into());
         }
         for (name, digest) in &self.outputs {
-            if !Format::from_name(name).is_some_and(|format| format.facts().ending == name) {
+            if Format::from_name(name).is_none_or(|format| format.facts().ending != name) {
                 return Err(format!("[digest] names the output \"{name}\", which is the ending of no format"));
             }
             if digest.parse::<Digest>().is_err() {

@@ -135,6 +135,7 @@ Cage = TypedDict('Cage', {
 })
 
 Capabilities = TypedDict('Capabilities', {
+    'build': 'NotRequired[str | None]',
     'formats': 'list[FormatCapability]',
     'kernel_version': 'str',
     'kinds': 'list[JobKind]',
@@ -699,6 +700,7 @@ PlaceStatement = TypedDict('PlaceStatement', {
 })
 
 Plan = TypedDict('Plan', {
+    'counted_cells': 'NotRequired[float]',
     'counted_triangles': 'NotRequired[float]',
     'cpu_seconds': 'NotRequired[float | None]',
     'exceeds': 'NotRequired[Excess | None]',
