@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use glam::{DVec3, Vec3Swizzles};
 use lacuna_exchange::document::{DocumentLimits, read_job};
 use lacuna_exchange::library;
 use lacuna_tests::support::binary;
@@ -209,6 +210,31 @@ fn what_lies_inside_a_solid_is_not_apart_from_it() {
     let found = contact(&[], &[&outer, &beside]);
     assert_eq!((&found["verdict"], &found["inside"]), (&json!("disjoint"), &Value::Null));
     assert_within(&found["distance_mm"], 27.0_f64.sqrt(), 0.05);
+    // Points of both, as far apart as they are told to be: corners of the cubes; of a ball and a plane the nearest to the cube.
+    let points = |found: &Value| {
+        ["first_mm", "second_mm"].map(|name| DVec3::from_array(serde_json::from_value(found["nearest"][name].clone()).unwrap()))
+    };
+    let [first, second] = points(&found);
+    assert!(first.distance(DVec3::splat(10.0)) < 1e-9 && second.distance(DVec3::splat(13.0)) < 1e-9, "{found}");
+    for (with, exact) in [("ball:16,3,2,1", [15.0, 3.0, 2.0]), ("box:12,1,1,14,3,3", [12.0, 1.0, 1.0]), ("point:11,2,3", [11.0, 2.0, 3.0])]
+    {
+        let [first, second] = points(&contact(&["--with", with], &[&outer]));
+        // Of a side that faces a side any point is as near.
+        assert!(
+            (second.x - exact[0]).abs() < 1e-9 && (first.x - 10.0).abs() < 1e-9 && (first - second).yz().length() < 1e-9,
+            "{with}: {first} {second}"
+        );
+    }
+    let [first, second] = points(&contact(&["--with", "plane:0,0,1,12"], &[&outer]));
+    assert!((second.z - 12.0).abs() < 1e-9 && (first.z - 10.0).abs() < 1e-9, "{first} {second}");
+    // Cells of a smooth curve, the circle of 5 about the origin: the points lie on it.
+    let weight = 0.5_f64.sqrt();
+    let arc = json!({ "family": "bezier_curve", "control_points": [[5, 0, 0], [5, 5, 0], [0, 5, 0]], "weights": [1, weight, 1] });
+    let found = contact(&["--with", "ball:8,8,0,1"], &[&write(&folder, "arc.json", &arc)]);
+    let [first, second] = points(&found);
+    let off: [f64; 2] = serde_json::from_value(found["nearest"]["off_mm"].clone()).unwrap();
+    assert!((first.length() - 5.0).abs() <= off[0] + 1e-12 && off[0] < 1e-9, "{found}");
+    assert!((second.distance(DVec3::new(8.0, 8.0, 0.0)) - 1.0).abs() < 1e-9, "{found}");
     // Dust of which one piece lies within: Cantor's set from 0 to 33 along x, its halves from 0 to 11 and from 22 on.
     let dust = json!({ "family": "ifs", "maps": [
         { "scale": 0.3333333333333333, "translation": [0, 0, 0] }, { "scale": 0.3333333333333333, "translation": [22, 0, 0] }

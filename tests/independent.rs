@@ -274,7 +274,7 @@ fn sections_are_those_of_another_library() {
     ];
     let mut judge = Judge::start();
     let mut found = Findings::default();
-    let (file, drawing) = (scratch.join("part.stl"), scratch.join("part.svg"));
+    let (file, drawing, layers) = (scratch.join("part.stl"), scratch.join("part.svg"), scratch.join("part.dxf"));
     let (mut outlines, mut holes) = (0, 0);
     for (name, model, words, heights) in solids {
         let words = ["solidify"].iter().chain(words).map(std::ffi::OsStr::new);
@@ -285,6 +285,8 @@ fn sections_are_those_of_another_library() {
         slice(&file, heights, &drawing);
         let report = judge.sections(&file, heights, &drawing);
         judge_sections(name, &report, heights.len(), &mut found);
+        slice(&file, heights, &layers);
+        judge_sections(&format!("{name}, DXF"), &judge.sections(&file, heights, &layers), heights.len(), &mut found);
         let most = |what: &str| report["sections"].as_array().unwrap().iter().filter_map(|section| section["ours"][what].as_u64()).max();
         (outlines, holes) = (outlines.max(most("outlines").unwrap()), holes.max(most("holes").unwrap()));
     }

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use lacuna_exchange::document::{DocumentLimits, read_model};
 use lacuna_exchange::library;
 use lacuna_fabrication::certificate::DimensionBasis;
-use lacuna_fabrication::shape_measures::VolumeMethod;
+use lacuna_fabrication::enclosed::VolumeMethod;
 use lacuna_fabrication::{Certificate, Input, Job, JobKind, Params, run};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
@@ -327,6 +327,127 @@ fn what_a_smooth_surface_encloses() {
     let bezier = r#"{"lacuna": 1, "shape": {"family": "bezier_surface", "control_points": [[[0,0,0],[0,1,0]],[[1,0,0],[1,1,1]]]}}"#;
     let found = measured(Model { name: None, shape: document(bezier) }, Params::new(0.01));
     assert!(found.enclosed.is_none() && found.warnings.is_empty(), "{:?}", found.warnings);
+}
+
+/// The cage of a tube of four sides, of half widths 1, around a closed curve in the plane z = 0.
+fn tube(scheme: &str, steps: u32, curve: impl Fn(f64) -> DVec3) -> Shape {
+    let at = |step: u32| curve(f64::from(step) / f64::from(steps) * 2.0 * PI);
+    let ring = |step: u32| {
+        let across = DVec3::Z.cross((at(step + 1) - at(step + steps - 1)).normalize());
+        [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(u, v)| (at(step) + u * across + v * DVec3::Z).to_array())
+    };
+    let corner = |step: u32, k: u32| step % steps * 4 + k % 4;
+    let face = |step: u32, k: u32| [corner(step, k), corner(step, k + 1), corner(step + 1, k + 1), corner(step + 1, k)];
+    let faces: Vec<[u32; 4]> = (0..steps).flat_map(|step| (0..4).map(move |k| face(step, k))).collect();
+    let vertices: Vec<[f64; 3]> = (0..steps).flat_map(ring).collect();
+    let mesh = json!({ "vertices": vertices, "faces": faces });
+    document(&json!({ "lacuna": 1, "shape": { "family": "subdivision", "scheme": scheme, "mesh": mesh } }).to_string())
+}
+
+/// A ring is counted once; an eight whose strands pass through each other twice where they do, which its volume tells to nobody who is not warned.
+#[test]
+fn a_surface_that_passes_through_itself_says_so() {
+    for scheme in ["catmull_clark", "doo_sabin"] {
+        let params = || Params { density_g_cm3: Some(1.0), ..Params::new(0.01) };
+        let ring = measured(Model { name: None, shape: tube(scheme, 12, |t| 8.0 * DVec3::new(t.cos(), t.sin(), 0.0)) }, params());
+        let enclosed = ring.enclosed.unwrap();
+        assert!(enclosed.counted_once_beyond_mm.unwrap() <= 0.02 + 1e-9 && enclosed.counted_otherwise.is_none(), "{enclosed:?}");
+        assert!(ring.warnings[0].contains("no crossing of the surface was found") && ring.warnings[0].contains("not checked"));
+        for axis in ring.centroid_mm.unwrap() {
+            assert_within(axis, 0.0, 2.0);
+        }
+        let eight = |t: f64| DVec3::new(12.0 * t.sin(), 6.0 * (2.0 * t).sin(), 0.0);
+        let found = measured(Model { name: None, shape: tube(scheme, 32, eight) }, params());
+        let enclosed = found.enclosed.unwrap();
+        let counted = enclosed.counted_otherwise.unwrap();
+        // Strands of width 2 at most cross at the origin alone.
+        assert!(counted.times == 2 && DVec3::from(counted.point_mm).length() < 3.0, "{counted:?}");
+        assert!(enclosed.counted_once_beyond_mm.is_none() && found.centroid_mm.is_none());
+        assert!(found.warnings[0].contains("passes through itself: it winds 2 times around the point"), "{:?}", found.warnings);
+        assert_within(found.mass_g.unwrap(), enclosed.volume_mm3[0] * 1e-3, 1e-12);
+    }
+}
+
+/// Doo and Sabin's surface of the unit cube: its volume by the density, its middle by symmetry, of which the interval is as narrow as the triangles are near.
+#[test]
+fn mass_and_centroid_of_what_a_smooth_surface_encloses() {
+    let shape = document(
+        r#"{"lacuna": 1, "shape": {"family": "subdivision", "scheme": "doo_sabin", "mesh": {
+        "vertices": [[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1,1]],
+        "faces": [[0,2,3,1],[4,5,7,6],[0,1,5,4],[2,6,7,3],[0,4,6,2],[1,3,7,5]]}}}"#,
+    );
+    let found = measured(Model { name: None, shape }, Params { density_g_cm3: Some(8.0), ..Params::new(0.001) });
+    assert_within(found.mass_g.unwrap(), 6241.0 / 9920.0 * 8e-3, 1e-14);
+    for axis in found.centroid_mm.unwrap() {
+        assert_within(axis, 0.5, 0.05);
+    }
+    assert!(found.area_mm2.is_none() && found.warnings.iter().any(|words| words.contains("the area of the surface is not known")));
+    // A sheet has no volume, and a mass that is not told is no silence.
+    let sheet = PolygonMesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], faces: vec![vec![0, 1, 2]], interior: Interior::Auto };
+    let found = measured(Model { name: None, shape: Shape::Mesh(sheet) }, Params { density_g_cm3: Some(8.0), ..Params::new(0.001) });
+    assert!(found.mass_g.is_none() && found.warnings[0].contains("no mass is told"), "{:?}", found.warnings);
+}
+
+/// Solids of a group: sums where they are apart, bounds that hold the union where they are not.
+#[test]
+fn groups_of_solids_have_volume_area_and_mass() {
+    let outward = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let told = |boxes: &[[[f64; 3]; 2]]| {
+        let solid = |ends: &[[f64; 3]; 2]| {
+            let vertices: Vec<[f64; 3]> = (0..8).map(|code| [0, 1, 2].map(|axis| ends[code >> axis & 1][axis])).collect();
+            json!({ "shape": { "family": "mesh", "vertices": vertices, "faces": outward } })
+        };
+        let parts: Vec<Value> = boxes.iter().map(solid).collect();
+        let shape = document(&json!({ "lacuna": 1, "shape": { "family": "group", "parts": parts } }).to_string());
+        measured(Model { name: None, shape }, Params { density_g_cm3: Some(1000.0), ..Params::new(0.01) })
+    };
+    let unit = [[0.0; 3], [1.0; 3]];
+    let apart = told(&[unit, [[3.0, 0.0, 0.0], [5.0, 2.0, 2.0]]]);
+    assert_within(apart.volume_mm3.unwrap(), 9.0, 1e-12);
+    assert_within(apart.area_mm2.unwrap(), 30.0, 1e-11);
+    assert_within(apart.mass_g.unwrap(), 9.0, 1e-12);
+    // (1 * 0.5 + 8 * 4) / 9.
+    assert_within(apart.centroid_mm.unwrap()[0], 32.5 / 9.0, 1e-12);
+    assert!(apart.warnings.is_empty(), "{:?}", apart.warnings);
+    // Side by side: 2 of volume, and 10 of area about it.
+    let touching = told(&[unit, [[1.0, 0.0, 0.0], [2.0, 1.0, 1.0]]]);
+    assert_within(touching.volume_mm3.unwrap(), 2.0, 1e-12);
+    assert_within(touching.centroid_mm.unwrap()[0], 1.0, 1e-12);
+    let [low, high] = touching.area_mm2.unwrap();
+    assert!(low <= 10.0 && 10.0 <= high && touching.warnings[0].contains("touch"), "[{low}, {high}] {:?}", touching.warnings);
+    // Cubes of 2 that share one of 1: 15; one in the other: 8; the same twice: 8.
+    for (other, volume, area) in [([1.0, 3.0], 15.0, 42.0), ([0.5, 1.0], 8.0, 24.0), ([0.0, 2.0], 8.0, 24.0)] {
+        let found = told(&[[[0.0; 3], [2.0; 3]], other.map(|end| [end; 3])]);
+        let within = |[low, high]: [f64; 2], exact: f64| low <= exact * (1.0 + 1e-12) && exact <= high;
+        assert!(within(found.volume_mm3.unwrap(), volume) && within(found.area_mm2.unwrap(), area), "{found:?}");
+        assert!(within(found.mass_g.unwrap(), volume) && found.centroid_mm.is_none(), "{found:?}");
+        assert!(found.warnings[0].contains("touch or overlap, or lie in each other"), "{:?}", found.warnings);
+    }
+}
+
+/// Squares of 2 by 2 that share half of each cover 6; the sum of their areas is 8.
+#[test]
+fn sheets_that_lie_on_each_other_say_so() {
+    let sheets = |shifts: &[[f64; 2]]| {
+        let corner = |[x, z]: [f64; 2], [u, v]: [f64; 2]| DVec3::new(x + 2.0 * u, 2.0 * v, z);
+        let square = |&shift: &[f64; 2]| [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|at| corner(shift, at));
+        let faces = (0..shifts.len() as u32).map(|k| (4 * k..4 * k + 4).collect()).collect();
+        let vertices = shifts.iter().flat_map(square).collect();
+        let mesh = PolygonMesh { vertices, faces, interior: Interior::Surface };
+        let found = measured(Model { name: None, shape: Shape::Mesh(mesh) }, Params::new(0.01));
+        (found.area_mm2.unwrap(), found.warnings)
+    };
+    let ([low, high], warnings) = sheets(&[[0.0, 0.0], [1.0, 0.0]]);
+    assert!(low <= 6.0 && 6.0 <= high && low < 7.0, "[{low}, {high}]");
+    assert!(warnings[0].contains("lie on each other") && warnings[0].contains("counts what they share twice"), "{warnings:?}");
+    // The same square twice; one beside the other, and one above.
+    let (area, warnings) = sheets(&[[0.0, 0.0], [0.0, 0.0]]);
+    assert!(area[0] <= 4.0 && 4.0 <= area[1] && warnings.len() == 1, "{area:?} {warnings:?}");
+    for other in [[2.0, 0.0], [0.5, 1e-9]] {
+        let (area, warnings) = sheets(&[[0.0, 0.0], other]);
+        assert_within(area, 8.0, 1e-12);
+        assert!(warnings.is_empty(), "{other:?}: {warnings:?}");
+    }
 }
 
 /// A cube of edge 2 across its diagonal, Koch's curve across its base, and a ball whatever way it is seen.

@@ -1,5 +1,6 @@
 //! Plans beside what jobs take: near the truth, and the same for any number of threads.
 
+use std::f64::consts::PI;
 use std::process::Command;
 
 use lacuna_tests::support::binary::{lacuna, run, succeed};
@@ -266,6 +267,116 @@ fn the_service_refuses_what_a_plan_says_is_beyond_the_limits() {
         // What was refused is no job.
         assert_eq!(service.get("/v1/jobs").json()["items"].as_array().unwrap().len(), before + 1);
     }
+}
+
+/// A ball of radius 30 about the origin as a closed mesh, in so many rings.
+fn ball(rings: u32) -> Value {
+    let around = 2 * rings;
+    let at = |ring: u32, step: u32| {
+        let (polar, turn) = (f64::from(ring) / f64::from(rings) * PI, f64::from(step) / f64::from(around) * 2.0 * PI);
+        [30.0 * polar.sin() * turn.cos(), 30.0 * polar.sin() * turn.sin(), 30.0 * polar.cos()]
+    };
+    let mut vertices = vec![[0.0, 0.0, 30.0]];
+    vertices.extend((1..rings).flat_map(|ring| (0..around).map(move |step| at(ring, step))));
+    vertices.push([0.0, 0.0, -30.0]);
+    let number = |ring: u32, step: u32| match ring {
+        0 => 0,
+        ring if ring == rings => 1 + (rings - 1) * around,
+        ring => 1 + (ring - 1) * around + step % around,
+    };
+    let corners = |ring: u32, step: u32| [number(ring, step), number(ring + 1, step), number(ring + 1, step + 1), number(ring, step + 1)];
+    let mut faces: Vec<Vec<u32>> = (0..rings).flat_map(|ring| (0..around).map(move |step| corners(ring, step).to_vec())).collect();
+    for face in &mut faces {
+        face.dedup();
+        if face.first() == face.last() {
+            face.pop();
+        }
+    }
+    json!({ "lacuna": 1, "name": "ball", "shape": { "family": "mesh", "vertices": vertices, "faces": faces } })
+}
+
+/// A stack of sections of a ball.
+fn stack(step: f64, formats: &[&str], limits: &Value) -> Value {
+    let params = json!({ "tolerance_mm": 0.05, "step_mm": step, "normal": [1, 2, 3] });
+    json!({ "lacuna": 1, "kind": "slice", "model": ball(40), "params": params, "outputs": formats, "limits": limits })
+}
+
+#[test]
+fn the_bytes_of_sections_are_planned_from_what_planes_meet() {
+    let scratch = Scratch::new();
+    let file = scratch.join("job.json");
+    for (step, formats) in [(0.37, &["svg"][..]), (0.011, &["dxf"]), (0.05, &["dxf", "svg"])] {
+        let job = stack(step, formats, &json!({}));
+        let plan = planned(&scratch, &job);
+        std::fs::write(&file, job.to_string()).unwrap();
+        let told = succeed(["run".as_ref(), file.as_os_str(), "-o".as_ref(), scratch.join("made").as_os_str(), "--quiet".as_ref()]);
+        let done: Value = serde_json::from_slice(&told).unwrap();
+        let bytes: u64 = done["outputs"].as_array().unwrap().iter().map(|output| output["bytes"].as_u64().unwrap()).sum();
+        near(&plan["output_bytes"], &json!(bytes), &format!("bytes of {formats:?} with a step of {step}"));
+        assert!(plan["memory_bytes"].as_f64() > Some(18e6), "{plan}");
+    }
+    // Before there is a mesh nobody knows what planes meet.
+    let mut thickened = stack(0.37, &["svg"], &json!({}));
+    thickened["params"]["radius_mm"] = json!(1.0);
+    assert_eq!(planned(&scratch, &thickened)["output_bytes"], Value::Null);
+}
+
+#[test]
+fn a_stack_with_more_bytes_than_allowed_is_refused_by_its_plan_or_ends_alone() {
+    let scratch = Scratch::new();
+    let (folder, kept) = (scratch.join("data"), json!({ "output_bytes": 200_000 }));
+    let service = Service::start_with(&folder, &[("LACUNA_LIMIT_OUTPUT_BYTES", "30000000")]);
+    // By far: refused before the work, with what would pass.
+    let job = stack(0.05, &["svg"], &kept);
+    let problem = service.post("/v1/jobs", &job).json();
+    assert_eq!(
+        (&problem["code"], &problem["limit"], &problem["allowed"]),
+        (&json!("plan-exceeds-limit"), &json!("output_bytes"), &json!(200_000.0)),
+        "{problem}"
+    );
+    let passes = problem["remedy"]["output_bytes"].as_f64().unwrap() as u64;
+    let file = service.done(&stack(0.05, &["svg"], &json!({ "output_bytes": passes })))["outputs"][0]["bytes"].as_u64().unwrap();
+    assert!(200_000 < file && file <= passes, "{file}");
+    // By a byte: the job ends with what is allowed, beside another one, and its file is gone.
+    let narrow = |bytes: u64| service.done(&stack(0.05, &["svg"], &json!({ "output_bytes": bytes })));
+    let refused = narrow(file - 1);
+    let problem = &refused["problem"];
+    assert_eq!(
+        (&refused["state"], &problem["code"], &problem["allowed"]),
+        (&json!("failed"), &json!("limit.output-bytes"), &json!((file - 1) as f64)),
+        "{refused}"
+    );
+    assert!(problem["detail"].as_str().unwrap().contains("allow more output_bytes"), "{problem}");
+    assert_eq!(narrow(file)["state"], "succeeded");
+    let results = std::fs::read_dir(folder.join("results")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(results.filter(|name| name.ends_with(".lacuna-part")).collect::<Vec<_>>(), Vec::<String>::new(), "of a job that failed");
+    // More than the service allows at all.
+    let problem = service.post("/v1/jobs", &stack(0.37, &["svg"], &json!({ "output_bytes": 30_000_001 }))).json();
+    assert_eq!(problem["errors"][0]["pointer"], "/limits/output_bytes", "{problem}");
+    assert_eq!(service.get("/v1/capabilities").json()["limits"]["output_bytes"], 30_000_000);
+}
+
+#[test]
+fn the_command_line_leaves_no_file_that_is_too_long() {
+    let scratch = Scratch::new();
+    let circle = cases::named("curves/circle").model();
+    let made = |limit: &str| {
+        let options = ["--tolerance", "0.02", "--radius", "1", "--limit-output", limit, "-o"];
+        let all = ["solidify".as_ref(), circle.as_os_str()].into_iter().chain(options.iter().map(std::ffi::OsStr::new));
+        let (stl, obj) = (scratch.join("circle.stl"), scratch.join("circle.obj"));
+        let ended = run(all.chain([stl.as_os_str(), "-o".as_ref(), obj.as_os_str()]));
+        (ended.status.code(), String::from_utf8(ended.stderr).unwrap(), stl, obj)
+    };
+    let (code, said, stl, obj) = made("1G");
+    assert_eq!(code, Some(0), "{said}");
+    let lengths = [stl, obj].map(|file| {
+        let length = std::fs::metadata(&file).unwrap().len();
+        std::fs::remove_file(&file).unwrap();
+        length
+    });
+    let (code, said, stl, obj) = made(&(lengths[0] + lengths[1] - 1).to_string());
+    assert!(code == Some(4) && said.contains("[limit.output-bytes]") && !stl.exists() && !obj.exists(), "{said}");
+    assert_eq!(made(&(lengths[0] + lengths[1]).to_string()).0, Some(0));
 }
 
 #[test]

@@ -240,6 +240,28 @@ fn the_service_repairs_uploads_as_the_command_does_files() {
     assert_eq!((evaluated.status, &evaluated.json()["errors"][0]["pointer"]), (422, &json!("/params/repair")));
 }
 
+/// Cubes that share an edge have corners of their own there once they are repaired: each is 1 thick, and no gap is between faces that look past each other.
+#[test]
+fn walls_of_solids_whose_corners_a_repair_doubled() {
+    let scratch = Scratch::new();
+    let (file, map) = (scratch.join("cubes.stl"), scratch.join("map.ply"));
+    let mut boxes = cuboid([0.0; 3], [1.0; 3]);
+    boxes.extend(cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0]));
+    std::fs::write(&file, stl(&boxes)).unwrap();
+    let command = "measure FILE --tolerance 0.01 --repair --thickness --map FILE";
+    let told: Value = serde_json::from_slice(&succeed(words(command, &[&file, &map]))).unwrap();
+    assert_eq!(told["repair"][0]["doubled_vertices"], 2);
+    holds(&told["thickness"]["wall"]["least_mm"], 1.0);
+    assert_eq!(told["thickness"]["gap"], Value::Null, "{told}");
+    assert!(std::fs::read(&map).unwrap().starts_with(b"ply"));
+    // Solids that do cross have no walls, repaired or not.
+    let mut crossing = cuboid([0.0; 3], [2.0; 3]);
+    crossing.extend(cuboid([1.0; 3], [3.0; 3]));
+    std::fs::write(&file, stl(&crossing)).unwrap();
+    let output = run(words("measure FILE --tolerance 0.01 --repair --thickness", &[&file]));
+    assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("walls have no thickness there"), "{output:?}");
+}
+
 #[test]
 fn small_holes_are_closed_and_told() {
     let scratch = Scratch::new();

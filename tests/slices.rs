@@ -56,7 +56,7 @@ fn layers_of_a_ball() {
         assert_eq!((plane["polygons"].as_u64(), plane["holes"].as_u64()), (Some(1), Some(0)));
     }
     let drawing = std::fs::read_to_string(&dxf).unwrap();
-    assert_eq!(drawing.matches("POLYLINE\n").count(), planes.len());
+    assert_eq!(drawing.matches("LWPOLYLINE\n").count(), planes.len());
     assert!(certificate["output_digests"]["svg"].is_string() && certificate["output_digests"]["dxf"].is_string());
 }
 
@@ -137,6 +137,54 @@ fn solids_that_share_a_vertex_are_cut() {
     let bounds = serde_json::from_slice::<Value>(&std::fs::read(&told).unwrap()).unwrap()["volume_mm3"].clone();
     let [low, high] = [0, 1].map(|end| bounds[end].as_f64().unwrap());
     assert!(low <= 3.0 && 3.0 <= high && high - low < 0.01, "{bounds}");
+}
+
+/// The picture beside a drawing shows the sections: it is that of no other planes, and of a drawing without any it says that there is nothing to see.
+#[test]
+fn a_picture_of_sections() {
+    let folder = Scratch::new();
+    let (model, svg, png) = (folder.join("ball.json"), folder.join("ball.svg"), folder.join("ball.png"));
+    write(&model, &serde_json::json!({ "family": "mesh", "vertices": [[10, 20, 30]], "faces": [[0]] }));
+    let words = |planes: [&'static str; 2]| {
+        let words = ["slice", "--tolerance", "0.1", "--radius", "5", planes[0], planes[1], "-o"].map(std::ffi::OsString::from);
+        words.into_iter().chain([svg.clone().into(), "--preview".into(), png.clone().into(), model.clone().into()])
+    };
+    let pictured = |planes| {
+        binary::succeed(words(planes));
+        let bytes = std::fs::read(&png).unwrap();
+        // Width and height stand behind the signature and the name of the first chunk.
+        let side = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
+        assert_eq!((&bytes[..8], side(16), side(20)), (&b"\x89PNG\r\n\x1a\n"[..], 1024, 1024));
+        bytes
+    };
+    let (few, many) = (pictured(["--at", "30"]), pictured(["--step", "1"]));
+    assert!(svg.exists() && few != many);
+    std::fs::remove_file(&png).unwrap();
+    let output = binary::run(words(["--at", "90"]));
+    assert!(output.status.code() == Some(3) && !png.exists(), "{output:?}");
+}
+
+/// The face at the top of the lower cube is tilted by the last bits of its coordinates, as the faces of a boolean's result may be: what a plane at its height cuts is told to be in doubt.
+#[test]
+fn planes_in_faces_that_are_level_but_for_rounding_are_told() {
+    let folder = Scratch::new();
+    let (model, svg, told) = (folder.join("step.json"), folder.join("step.svg"), folder.join("told.json"));
+    let said = |tilt: f64, at: &str| {
+        let mut vertices: Vec<[f64; 3]> = (0..8).map(|code| [0, 1, 2].map(|axis| 5.0 * f64::from(code >> axis & 1))).collect();
+        vertices[7][2] += tilt;
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        write(&model, &serde_json::json!({ "family": "mesh", "vertices": vertices, "faces": faces }));
+        let words = ["slice", "--tolerance", "0.001", "--at", at, "-o"].map(std::ffi::OsStr::new);
+        binary::succeed(words.into_iter().chain([svg.as_os_str(), "--certificate".as_ref(), told.as_os_str(), model.as_os_str()]));
+        certificate(&told)["warnings"].to_string()
+    };
+    // A unit in the last place of single precision at 5 is 4.8e-7.
+    let tilted = said(4.8e-7, "2.5,5");
+    assert!(tilted.contains("1 of 2 planes, the first at 5 mm, lie in faces that are level but for rounding"), "{tilted}");
+    for (tilt, at) in [(0.0, "0,5"), (4.8e-7, "2.5,4.9"), (0.01, "5.005")] {
+        let said = said(tilt, at);
+        assert!(!said.contains("but for rounding"), "{said}");
+    }
 }
 
 #[test]

@@ -344,6 +344,7 @@ impl Config {
                 })?,
                 memory_bytes: reader.positive("LACUNA_LIMIT_MEMORY_BYTES", defaults.memory_bytes)?,
                 triangles: reader.positive("LACUNA_LIMIT_TRIANGLES", 50_000_000)?,
+                output_bytes: reader.positive("LACUNA_LIMIT_OUTPUT_BYTES", 8 << 30)?,
                 ..defaults
             },
             log: reader.take("LACUNA_LOG", None, LevelFilter::INFO, "error, warn, info, debug, trace or off is expected")?,

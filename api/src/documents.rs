@@ -229,7 +229,7 @@ pub fn read_batch_in(bytes: &[u8], most: &Limits, folder: Option<&Path>) -> Resu
 /// # Errors
 /// As [`read_batch_in`].
 pub fn whole_batch(bytes: &[u8], folder: Option<&Path>) -> Result<String, Problem> {
-    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    let most = Limits::MOST;
     let unfit = |error: serde_json::Error| Problem::internal(format!("a job is no JSON: {error}"));
     let of_entry = |(name, job): (Option<String>, Job)| {
         let job: serde_json::Value = serde_json::from_str(&Order::new(job, Vec::new()).document()).map_err(unfit)?;
@@ -427,6 +427,7 @@ pub fn within(default: &Limits, most: &Limits) -> Limits {
         cells: default.cells.min(most.cells),
         triangles: default.triangles.min(most.triangles),
         depth: default.depth.min(most.depth),
+        output_bytes: default.output_bytes.min(most.output_bytes),
     }
 }
 

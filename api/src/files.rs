@@ -1,5 +1,6 @@
 //! Files that are there in full or not at all: written beside their place, synced, then renamed.
 
+use std::cell::Cell;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -136,6 +137,66 @@ impl<S: Seek> Seek for Stoppable<'_, S> {
     }
 }
 
+/// Bytes that several files may have together, and how many of them are left.
+#[derive(Debug)]
+pub struct Allowance {
+    allowed: u64,
+    left: Cell<u64>,
+    /// Bytes that there would have been, once there was no room for some.
+    asked: Cell<Option<u64>>,
+}
+
+impl Allowance {
+    /// So many bytes, all of them left.
+    #[must_use]
+    pub fn new(allowed: u64) -> Self {
+        Self { allowed, left: Cell::new(allowed), asked: Cell::new(None) }
+    }
+
+    /// How many bytes there may be, and how many there would have been at least, if that is more.
+    #[must_use]
+    pub fn exceeded(&self) -> Option<(u64, u64)> {
+        self.asked.get().map(|asked| (self.allowed, asked))
+    }
+
+    fn take(&self, bytes: usize) -> io::Result<()> {
+        let left = self.left.get();
+        let Some(rest) = left.checked_sub(bytes as u64) else {
+            self.asked.set(Some((self.allowed - left).saturating_add(bytes as u64)));
+            return Err(io::Error::other("there are more bytes than the limit of the output allows"));
+        };
+        self.left.set(rest);
+        Ok(())
+    }
+}
+
+/// A stream that fails when it is to hold more than an allowance has left. What is written twice, such as a length that is known at the end, counts twice.
+pub struct Metered<'a, S> {
+    /// The stream.
+    pub stream: S,
+    /// What is left.
+    pub allowance: &'a Allowance,
+}
+
+impl<S: Write> Write for Metered<'_, S> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        self.allowance.take(buffer.len())?;
+        let written = self.stream.write(buffer)?;
+        self.allowance.left.set(self.allowance.left.get() + (buffer.len() - written) as u64);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+impl<S: Seek> Seek for Metered<'_, S> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.stream.seek(position)
+    }
+}
+
 impl Drop for PendingFile {
     fn drop(&mut self) {
         // After a commit nothing has this name any more.
@@ -213,6 +274,18 @@ mod tests {
         assert_eq!(safe_stem("../../etc/passwd"), "etc-passwd");
         assert_eq!(safe_stem("Koch curve \u{e9}"), "Koch-curve");
         assert_eq!(safe_stem("\u{3b1}"), "result");
+    }
+
+    #[test]
+    fn files_share_an_allowance_to_the_last_byte() {
+        let allowance = Allowance::new(10);
+        let mut first = Metered { stream: Vec::new(), allowance: &allowance };
+        first.write_all(b"123456").unwrap();
+        let mut second = Metered { stream: Vec::new(), allowance: &allowance };
+        second.write_all(b"7890").unwrap();
+        assert_eq!((second.stream.as_slice(), allowance.exceeded()), (&b"7890"[..], None));
+        assert!(second.write_all(b"123").is_err());
+        assert_eq!((second.stream.len(), allowance.exceeded()), (4, Some((10, 13))));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! From a legal job to finished files: what the service's workers and the command line share.
 
 use std::collections::BTreeMap;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufReader, BufWriter, Seek, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lacuna_exchange::format::sections::SectionFile;
@@ -13,7 +13,7 @@ use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::model::Model;
 
 use crate::digest::Digest;
-use crate::files::{PendingFile, Stoppable};
+use crate::files::{Allowance, Metered, PendingFile, Stoppable};
 use crate::problem::{Problem, ProblemKind};
 
 /// What is written into a file besides the geometry.
@@ -144,21 +144,45 @@ pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Problem> {
     })
 }
 
-/// Writes a result in a format and reads it back: what is proven of the mesh is proven of the file.
+/// Writes a result in a format and reads it back: what is proven of the mesh is proven of the file. Its bytes are taken from the allowance.
 ///
 /// # Errors
-/// When the format has no room for the geometry, the device fails, or the file differs from the mesh.
+/// When the format has no room for the geometry, the allowance or the device has none for the file, or the file differs from the mesh.
 pub fn write_file(
     format: Format,
     outcome: &Outcome,
     label: &Label<'_>,
     pending: &mut PendingFile,
+    allowance: &Allowance,
+    token: &CancelToken,
+) -> Result<(Digest, u64), Problem> {
+    written(format, outcome, label, pending, allowance, token).map_err(|problem| too_long(allowance).unwrap_or(problem))
+}
+
+/// The refusal of files that do not fit into their allowance.
+#[expect(clippy::cast_precision_loss, reason = "lengths are shown, not computed with")]
+fn too_long(allowance: &Allowance) -> Option<Problem> {
+    let (allowed, asked) = allowance.exceeded()?;
+    let facts = LimitFacts { limit: "output_bytes", asked: asked as f64, allowed: allowed as f64, remedy: None };
+    let detail = format!(
+        "The files of the result have {asked} bytes and more, and {allowed} are allowed; ask for fewer formats or planes or a larger tolerance, or allow more output_bytes"
+    );
+    Some(Problem::new(ProblemKind::Limit, detail).code("limit.output-bytes").limit(&facts))
+}
+
+fn written(
+    format: Format,
+    outcome: &Outcome,
+    label: &Label<'_>,
+    pending: &mut PendingFile,
+    allowance: &Allowance,
     token: &CancelToken,
 ) -> Result<(Digest, u64), Problem> {
     let metadata =
         Metadata { title: label.title, certificate: Some(&outcome.certificate), thumbnail_png: label.thumbnail_png, ..Metadata::default() };
     let failed = |error| Problem::io("the file could not be written", &error);
-    let mut sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: &mut *pending, token });
+    let metered = Metered { stream: &mut *pending, allowance };
+    let mut sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: metered, token });
     let apart = match &outcome.geometry {
         Geometry::Sections(stack) => Some(guarded(|| draw(format, stack, &metadata, &mut sink, token))??),
         Geometry::Thickness(map) => Some(guarded(|| write_map(format, map, &metadata, &mut sink))??),
@@ -185,11 +209,21 @@ pub fn write_file(
     Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)
 }
 
-/// Draws plane sections, one at a time.
-fn draw(format: Format, stack: &Stack, metadata: &Metadata<'_>, sink: &mut impl Write, token: &CancelToken) -> Result<(), Problem> {
-    let bounds = stack.frame.bounds(&stack.solid.mesh().vertices).unwrap_or_default();
-    let mut file = SectionFile::start(format, sink, bounds, metadata).map_err(|error| format_problem(&error))?;
+/// Draws plane sections, one at a time; a picture shows them all where they are in space.
+fn draw(
+    format: Format,
+    stack: &Stack,
+    metadata: &Metadata<'_>,
+    sink: &mut (impl Write + Seek),
+    token: &CancelToken,
+) -> Result<(), Problem> {
     let budget = Budget { cancel: token.clone(), ..Budget::default() };
+    if format == Format::Png {
+        let wires = stack.wires(&budget)?;
+        return format::write(format, &wires, metadata, sink).map_err(|error| format_problem(&error));
+    }
+    let bounds = stack.frame.bounds(&stack.solid.mesh().vertices).unwrap_or_default();
+    let mut file = SectionFile::start(format, sink, bounds, &stack.offsets_mm, metadata).map_err(|error| format_problem(&error))?;
     let drawn = stack.each(&budget, &mut |section| file.push(section));
     drawn.map_err(|error| match error {
         StreamError::Job(error) => error.into(),
@@ -229,7 +263,9 @@ pub fn stream_file(
 ) -> Result<Option<(Outcome, Digest, u64)>, Problem> {
     let metadata = Metadata { title, ..Metadata::default() };
     let failed = |error| Problem::io("the file could not be written", &error);
-    let sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: &mut *pending, token: &budget.cancel });
+    let allowance = Allowance::new(budget.limits.output_bytes);
+    let metered = Metered { stream: &mut *pending, allowance: &allowance };
+    let sink = BufWriter::with_capacity(1 << 16, Stoppable { stream: metered, token: &budget.cancel });
     let streamed = guarded(|| {
         let mut file = PointFile::start(sink, &metadata).map_err(StreamError::Sink)?;
         let certificate = lacuna_fabrication::stream_points(job, budget, &mut |piece| file.push(&piece.vertices))?;
@@ -240,7 +276,7 @@ pub fn stream_file(
         Ok(certificate) => certificate,
         Err(StreamError::NotPoints) => return Ok(None),
         Err(StreamError::Job(error)) => return Err(error.into()),
-        Err(StreamError::Sink(error)) => return Err(format_problem(&error)),
+        Err(StreamError::Sink(error)) => return Err(too_long(&allowance).unwrap_or_else(|| format_problem(&error))),
     };
     check_certificate(&certificate)?;
     let (digest, bytes) = Digest::of_stream(pending.reread().map_err(failed)?).map_err(failed)?;

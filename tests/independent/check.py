@@ -2,8 +2,9 @@
 
     check.py < requests > reports
 
-One JSON document per line: a request is `{"file": PATH, "opinions": true}`, its report follows at once. With `"sections": SVG` and `"heights"`, the
+One JSON document per line: a request is `{"file": PATH, "opinions": true}`, its report follows at once. With `"sections": SVG` or DXF and `"heights"`, the
 drawing of the file's sections across Z is held against those of trimesh, as polygons of shapely.
+DXF files are read, and audited, by ezdxf.
 STL is read by trimesh and 3MF by lib3mf in strict mode, the reader of the 3MF consortium. PLY is read by trimesh, as a map of thickness, which is held
 against rays. Counts come from our
 own page of numpy below; if asked, also from trimesh and from Manifold, and self-intersections from CGAL through libigl
@@ -13,6 +14,7 @@ import json
 import re
 import sys
 
+import ezdxf
 import igl.copyleft.cgal as cgal
 import lib3mf
 import manifold3d
@@ -160,8 +162,26 @@ def second_opinions(vertices, triangles):
     }
 
 
+def drawn_layers(path):
+    """What an odd number of the loops of every layer of a DXF file surrounds. The file must have nothing to mend in it, and be in millimetres; the audit adds Defpoints."""
+    drawing = ezdxf.readfile(path)
+    audit = drawing.audit()
+    remarks = [entry.message for entry in [*audit.errors, *audit.fixes]]
+    if remarks or drawing.units != ezdxf.units.MM:
+        raise ValueError(f"units {drawing.units}, {remarks}")
+    sections = {layer.dxf.name: shapely.MultiPolygon() for layer in drawing.layers if layer.dxf.name not in ("0", "Defpoints")}
+    for loop in drawing.modelspace():
+        if not loop.closed:
+            raise ValueError(f"{loop} is open")
+        name = loop.dxf.layer
+        sections[name] = sections[name].symmetric_difference(shapely.Polygon(loop.get_points("xy")))
+    return list(sections.values())
+
+
 def drawn_sections(path):
     """The polygons of every group of a drawing: a path is one of them, its outline first; v is upwards, SVG's y downwards."""
+    if path.endswith(".dxf"):
+        return drawn_layers(path)
     with open(path, encoding="utf-8") as file:
         groups = file.read().split('<g id="z_')[1:]
     sections = []

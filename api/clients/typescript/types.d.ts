@@ -203,9 +203,10 @@ export interface CatmullRomShape {
 export interface CellPairStatement {
   distance_mm: Array<number>;
   /** Address of the first, as `address` takes it. */ first: string;
-  /** Centre of a ball around the first. */ first_mm: Array<number>;
+  /** A point of the first: of a given triangle, segment or point the nearest to the second, of any other cell the one that its address leads to. */ first_mm: Array<number>;
+  /** How far `first_mm` and `second_mm` may be from points of the two shapes: rounding. Absent in certificates of before it was told, whose points are the middles of the cells. */ off_mm?: Array<number> | null;
   /** Address of the second; absent where that is no shape. */ second?: string | null;
-  /** Centre of a ball around the second. */ second_mm: Array<number>;
+  /** A point of the second, likewise; of what is no shape the nearest to the first. */ second_mm: Array<number>;
 }
 
 /** A cell and a ball that contains it. */
@@ -353,6 +354,12 @@ export interface CornerCuttingShape {
   /** The family of the shape. */ family: "corner_cutting";
 }
 
+/** A point around which a closed surface winds neither once nor not at all. */
+export interface CountedPoint {
+  /** The point. */ point_mm: Array<number>;
+  /** How often it counts in the volume; below 0 where it is taken away. */ times: number;
+}
+
 /** How many jobs of a batch stand where. */
 export interface Counts {
   /** Those that were stopped. */ cancelled: number;
@@ -416,6 +423,8 @@ export interface EmbeddedModel {
 
 /** The volume that a closed surface encloses. The surface itself, being a sheet, has none. */
 export interface EnclosedStatement {
+  /** Proven: every point farther than this from the surface is counted once, or not at all. Absent where that is not known; nearer ones are not checked. */ counted_once_beyond_mm?: number | null;
+  counted_otherwise?: CountedPoint | null;
   /** How it was found. */ method: VolumeMethod;
   volume_mm3: Array<number>;
 }
@@ -430,7 +439,7 @@ export interface ExactNumber {
 export interface Excess {
   /** What is allowed. */ allowed: number;
   /** What is predicted. */ asked: number;
-  /** Its name among the limits of a job: `cells`, `triangles` or `memory_bytes`. */ limit: string;
+  /** Its name among the limits of a job: `cells`, `triangles`, `memory_bytes` or `output_bytes`. */ limit: string;
   /** A parameter of the job, or the limit where no tolerance is enough, and a value that would pass. Empty when the search for one took too long. */ remedy: Record<string, number>;
 }
 
@@ -607,6 +616,7 @@ export interface JobLimits {
   /** Leaf cells that may be expanded: of an evaluation all of the shape's, of each dilation those that its surface needs, one again in every block of its lattice. A comparison of shapes looks at no more nodes than this, and ends there with what it knows. */ cells?: number;
   /** Length of the longest address. */ depth?: number;
   /** Accounted memory in bytes. */ memory_bytes?: number;
+  /** Bytes of all files of the result, the certificate aside. */ output_bytes?: number;
   /** Wall time in seconds. */ seconds?: number;
   /** Triangles of the result. */ triangles?: number;
 }
@@ -713,6 +723,7 @@ export interface LimitCapability {
   /** Hours after that for which an expired job is still known. */ expired_hours: number;
   /** Unfinished jobs that one key may have. */ jobs_per_key: number;
   /** Most accounted memory of a job, in bytes. */ memory_bytes: number;
+  /** Most bytes of all files of a result. */ output_bytes: number;
   /** Jobs that may wait. */ queued_jobs: number;
   /** Hours after which ended jobs expire: what they made is given up. */ retention_hours: number;
   /** Most wall time of a job, in seconds. */ seconds: number;
@@ -972,7 +983,7 @@ export interface Plan {
   /** Edge of the lattice's cubes. `null` where points and segments are thickened without a lattice, and where nothing is thickened. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
   /** Peak memory of the process that does the job, in bytes. 0 where nothing is predicted. */ memory_bytes: number;
-  /** Bytes of a binary STL file with so many `triangles`. */ output_bytes: number;
+  /** Bytes of a binary STL file with so many `triangles`; of sections, those of all drawings that are asked for, or else of one in SVG. `null` for sections of what is thickened first, and where nothing is predicted. */ output_bytes?: number | null;
   /** The result is nowhere thinner than this, in mm: of a dilation 2 (r - tolerance) with the least radius r, and never less than r; of a wall its thickness less the tolerance. The certificate's `thickness_min_mm` is this or more. `null` where nothing is proven before the work: meshes as they are, booleans, levels, closed gaps. */ smallest_feature_mm?: number | null;
   /** Triangles of the result without simplification, which leaves a tenth to a hundredth of them. Of an operation on solids: those of its result. */ triangles: number;
 }

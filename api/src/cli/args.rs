@@ -205,7 +205,7 @@ pub(super) struct FetchArgs {
 }
 
 /// What a computation may use.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct LimitArgs {
     /// Most triangles of the result.
     #[arg(long, value_name = "COUNT", help_heading = "Limits")]
@@ -213,6 +213,9 @@ pub(super) struct LimitArgs {
     /// Most accounted memory, in bytes or with K, M or G (powers of 1024).
     #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = "Limits")]
     pub(super) limit_memory: Option<u64>,
+    /// Most bytes of all files, or with K, M or G (powers of 1024).
+    #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = "Limits")]
+    pub(super) limit_output: Option<u64>,
     /// Most time, in seconds.
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Limits")]
     pub(super) limit_seconds: Option<f64>,

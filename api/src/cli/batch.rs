@@ -43,7 +43,7 @@ pub(super) fn run(bytes: Vec<u8>, args: &RunArgs, manner: Manner<'_>) -> Result<
         let (certificate, written) = remote::run_batch(server, document, &args.folder, &args.limits, manner)?;
         return tell(&certificate, &written);
     }
-    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    let most = Limits::MOST;
     let jobs = documents::read_batch_in(&bytes, &most, folder_of(&args.job))?;
     drop(bytes);
     work::use_threads(args.limits.threads)?;

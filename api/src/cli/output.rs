@@ -9,7 +9,7 @@ use lacuna_kernel::budget::Budget;
 
 use crate::digest::Digest;
 use crate::documents;
-use crate::files::PendingFile;
+use crate::files::{Allowance, PendingFile};
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Label};
 
@@ -80,6 +80,7 @@ pub(super) fn deliver(
         }
         _ => None,
     };
+    let allowance = Allowance::new(budget.limits.output_bytes);
     let mut pending = Vec::with_capacity(targets.len() + 1);
     let mut written = Vec::with_capacity(targets.len() + 1);
     for target in targets {
@@ -87,7 +88,7 @@ pub(super) fn deliver(
         budget.report("write", 0.0, outcome.certificate.triangles);
         let mut file = start(&target.path)?;
         let label = Label { title, thumbnail_png: thumbnail.as_deref() };
-        let (digest, bytes) = production::write_file(target.format, outcome, &label, &mut file, &budget.cancel)?;
+        let (digest, bytes) = production::write_file(target.format, outcome, &label, &mut file, &allowance, &budget.cancel)?;
         pending.push((file, target.path.clone()));
         written.push(Written { file: target.path.clone(), bytes, digest });
     }

@@ -177,7 +177,7 @@ pub(super) fn plan(job: &Path, server: Option<&Server>) -> Result<(), Problem> {
         let document = remote::self_contained(bytes, |bytes| super::work::whole_job(bytes, folder_of(job)));
         return print_json(&remote::plan(server, &document)?);
     }
-    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    let most = Limits::MOST;
     let job = documents::read_job_in(&bytes, &most, folder_of(job))?;
     print_json(&crate::questions::predict(Engine::KERNEL, &job, PLAN_TIME)?)
 }

@@ -190,7 +190,7 @@ pub(super) fn convert(args: &ConvertArgs, server: &Server, manner: Manner<'_>) -
     let model = Model { name: None, shape: Shape::Mesh(PolygonMesh::default()) };
     let given = Given { input: Input { name, model, radius_mm: None }, reference: Some(view.id) };
     let output = OutputArgs { outputs: args.outputs.clone(), format: args.format.clone(), certificate: None, preview: None };
-    let limits = LimitArgs { limit_triangles: None, limit_memory: None, limit_seconds: None, threads: None };
+    let limits = LimitArgs::default();
     // Two units in the last place: rounding takes less.
     let params = Params { repair: args.repair, ..Params::new(2.0 * f64::from(f32::EPSILON) * extent) };
     make(JobKind::Convert, vec![given], params, &output, &limits, manner)
@@ -208,7 +208,7 @@ pub(super) fn run(args: &RunArgs, manner: Manner<'_>) -> Result<(), Problem> {
         return print_json(&serde_json::json!({ "outputs": written, "certificate": certificate }));
     }
     // Whoever sits at the machine may ask for as much of it as there is.
-    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    let most = Limits::MOST;
     let mut job = documents::read_job_in(&bytes, &most, folder_of(&args.job))?;
     job.limits = limits(job.limits, &args.limits);
     use_threads(args.limits.threads)?;
@@ -244,7 +244,7 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<Written, Problem> {
 
 /// The document of a job whose mesh files are in it.
 pub(super) fn whole_job(bytes: &[u8], folder: Option<&Path>) -> Result<String, Problem> {
-    let most = Limits { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX };
+    let most = Limits::MOST;
     documents::read_job_in(bytes, &most, folder).map(|job| Order::new(job, Vec::new()).document())
 }
 
@@ -329,6 +329,7 @@ pub(super) fn limits(asked: Limits, args: &LimitArgs) -> Limits {
         seconds: args.limit_seconds.unwrap_or(asked.seconds),
         memory_bytes: args.limit_memory.unwrap_or(asked.memory_bytes),
         triangles: args.limit_triangles.unwrap_or(asked.triangles),
+        output_bytes: args.limit_output.unwrap_or(asked.output_bytes),
         ..asked
     }
 }
@@ -382,7 +383,8 @@ fn limited<T>(job: &Job, token: &CancelToken, manner: Manner<'_>, work: impl FnO
 /// limit below the usual one, which is there to be met soon. The usual ones are so far away that most jobs would pay for nothing; whoever meets one is told what would pass when the work ends.
 fn refuse_by_plan(job: &Job, budget: &Budget) -> Result<(), Problem> {
     let (asked, usual) = (&job.limits, Limits::default());
-    if asked.triangles >= usual.triangles && asked.memory_bytes >= usual.memory_bytes && asked.cells >= usual.cells {
+    let is_usual = asked.triangles >= usual.triangles && asked.memory_bytes >= usual.memory_bytes && asked.cells >= usual.cells;
+    if is_usual && asked.output_bytes >= usual.output_bytes {
         return Ok(());
     }
     match production::plan(job, &Budget { progress: None, ..budget.clone() }) {

@@ -115,7 +115,7 @@ fn hear(stdin: &mut BufReader<io::Stdin>) -> io::Result<Option<Heard>> {
             let bytes = messages::announced(stdin, head.bytes)?;
             let format = Format::from_name(&head.format).ok_or(io::ErrorKind::InvalidData)?;
             // By which word it is found again is the service's business.
-            Heard::Stored(Some(Stored::Mesh(StoredMesh { name: head.name, format, bytes, reference: String::new() })))
+            Heard::Stored(Some(Stored::Mesh(StoredMesh { name: head.name, format, bytes, reference: head.reference })))
         }
         Told::File(name) => Heard::File(name),
     }))

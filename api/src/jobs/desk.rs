@@ -444,8 +444,8 @@ impl Desk {
 /// Under which name finished work is found again: by the work, by the version that did it, and by the limits that decide how it ends. A job with a lower limit of triangles is refused
 /// what one with a higher one got, and where searches end early for want of cells or memory they say less. The time is left out: what is done already takes none.
 fn work_of(input: Digest, limits: &Limits) -> Digest {
-    let Limits { seconds: _, memory_bytes, cells, triangles, depth } = limits;
-    Digest::of(format!("{input} {} {memory_bytes} {cells} {triangles} {depth}", env!("CARGO_PKG_VERSION")).as_bytes())
+    let Limits { seconds: _, memory_bytes, cells, triangles, depth, output_bytes } = limits;
+    Digest::of(format!("{input} {} {memory_bytes} {cells} {triangles} {depth} {output_bytes}", env!("CARGO_PKG_VERSION")).as_bytes())
 }
 
 fn new_record(submission: Submission, document: Digest) -> JobRecord {

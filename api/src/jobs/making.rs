@@ -9,7 +9,7 @@ use lacuna_kernel::budget::{Budget, Limits};
 use super::record::Output;
 use crate::digest::Digest;
 use crate::documents::{self, Stored};
-use crate::files::PendingFile;
+use crate::files::{Allowance, PendingFile};
 use crate::problem::Problem;
 use crate::production::{self, Compute, Label};
 
@@ -65,6 +65,7 @@ fn write_files(order: &Job, mut outcome: Outcome, budget: &Budget, workshop: &im
         _ => None,
     };
     let mut files = Vec::with_capacity(formats.len() + 1);
+    let allowance = Allowance::new(budget.limits.output_bytes);
     let failed = |error| Problem::io("the result could not be written", &error);
     for (done, &format) in formats.iter().enumerate() {
         if let Some(stopped) = production::why_stopped(budget) {
@@ -75,7 +76,7 @@ fn write_files(order: &Job, mut outcome: Outcome, budget: &Budget, workshop: &im
         let facts = format.facts();
         let mut pending = workshop.new_file().map_err(failed)?;
         let label = Label { title, thumbnail_png: thumbnail.as_deref() };
-        let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending, &budget.cancel)?;
+        let (digest, bytes) = production::write_file(format, &outcome, &label, &mut pending, &allowance, &budget.cancel)?;
         let file_name = format!("{stem}.{}", facts.ending);
         let output = Output { name: facts.ending.to_owned(), file_name, media_type: facts.media_type.to_owned(), bytes, digest };
         files.push((pending, output));

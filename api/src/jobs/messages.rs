@@ -60,6 +60,8 @@ pub(super) struct MeshHead {
     pub(super) name: Option<String>,
     /// As what to read it: the ending of its format.
     pub(super) format: String,
+    /// The word by which a worker finds it again.
+    pub(super) reference: String,
     /// How long it is.
     pub(super) bytes: u64,
 }
@@ -101,19 +103,20 @@ pub(crate) struct Most {
     cells: u64,
     triangles: u64,
     depth: u32,
+    output_bytes: u64,
 }
 
 impl From<Limits> for Most {
     fn from(limits: Limits) -> Self {
-        let Limits { seconds, memory_bytes, cells, triangles, depth } = limits;
-        Self { seconds, memory_bytes, cells, triangles, depth }
+        let Limits { seconds, memory_bytes, cells, triangles, depth, output_bytes } = limits;
+        Self { seconds, memory_bytes, cells, triangles, depth, output_bytes }
     }
 }
 
 impl From<Most> for Limits {
     fn from(most: Most) -> Self {
-        let Most { seconds, memory_bytes, cells, triangles, depth } = most;
-        Self { seconds, memory_bytes, cells, triangles, depth }
+        let Most { seconds, memory_bytes, cells, triangles, depth, output_bytes } = most;
+        Self { seconds, memory_bytes, cells, triangles, depth, output_bytes }
     }
 }
 

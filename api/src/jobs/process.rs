@@ -205,7 +205,7 @@ impl Process {
         match stored {
             Some(Stored::Mesh(mesh)) => {
                 let format = mesh.format.facts().ending.to_owned();
-                let head = MeshHead { name: mesh.name, format, bytes: mesh.bytes.len() as u64 };
+                let head = MeshHead { name: mesh.name, format, reference: mesh.reference, bytes: mesh.bytes.len() as u64 };
                 self.tell(&Told::Mesh(Some(head)), &mesh.bytes);
             }
             Some(Stored::Document(document)) => self.tell(&Told::Model(document.len() as u64), &document),

@@ -66,6 +66,8 @@ pub struct LimitCapability {
     triangles: u64,
     /// Longest address.
     depth: u32,
+    /// Most bytes of all files of a result.
+    output_bytes: u64,
     /// Jobs that may wait.
     queued_jobs: usize,
     /// Unfinished jobs that one key may have.
@@ -109,6 +111,7 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
             cells: config.job_limits.cells,
             triangles: config.job_limits.triangles,
             depth: config.job_limits.depth,
+            output_bytes: config.job_limits.output_bytes,
             queued_jobs: config.queued,
             jobs_per_key: config.jobs_per_key,
             batch_jobs: lacuna_exchange::document::MOST_JOBS,

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::addresses;
 use crate::documents::{self, SolveReport};
-use crate::files::PendingFile;
+use crate::files::{Allowance, PendingFile};
 use crate::jobs::watchdog::Watchdog;
 use crate::problem::{Problem, ProblemKind};
 use crate::production::{self, Label, SolveProblem};
@@ -116,11 +116,12 @@ fn files_of(job: &Job, outcome: &Outcome, budget: &Budget) -> Result<BTreeMap<St
     };
     let title = job.inputs.first().map(|input| input.name.as_str());
     let failed = |error| Problem::io("the result could not be written", &error);
+    let allowance = Allowance::new(budget.limits.output_bytes);
     let mut files = BTreeMap::new();
     for format in formats {
         let mut pending = PendingFile::create_in(&std::env::temp_dir()).map_err(failed)?;
         let label = Label { title, thumbnail_png: thumbnail.as_deref() };
-        production::write_file(format, outcome, &label, &mut pending, &budget.cancel)?;
+        production::write_file(format, outcome, &label, &mut pending, &allowance, &budget.cancel)?;
         let mut bytes = Vec::new();
         pending.reread().and_then(|file| file.read_to_end(&mut bytes)).map_err(failed)?;
         files.insert(format.facts().ending.to_owned(), bytes);

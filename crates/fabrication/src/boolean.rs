@@ -10,6 +10,7 @@ use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::solid::{TriMesh, carried, without_flat_shells};
 use lacuna_kernel::tolerance::Tolerance;
 
+use crate::hull::Hull;
 use crate::operand::{Operand, at_fault, operand, predicted, rounded, share, sources};
 use crate::plan::{Plan, stl_bytes};
 use crate::run::{JobError, Outcome, wrong_inputs};
@@ -61,10 +62,14 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
         let limit = LimitFacts { limit: "triangles", asked, allowed, remedy: Some(("triangles", asked)) };
         return Err(JobError { limit: Some(limit), ..JobError::new(Kind::Limit, "limit.triangles", message) });
     }
+    let hull = match operation {
+        Operation::Hull => Some(Hull::of(&combined, operands.iter().flat_map(|operand| &operand.meshes), budget)?),
+        _ => None,
+    };
     let mut rounded = rounded(&combined, budget)?;
     rounded.moved_mm += left_out_mm;
     budget.report("combine", 1.0, rounded.solid.mesh().triangles.len() as u64);
-    let certificate = certificate::of_operation(operation, ManifoldRust.name(), &operands, &rounded, tolerance);
+    let certificate = certificate::of_operation(operation, ManifoldRust.name(), &operands, &rounded, hull.as_ref(), tolerance);
     Ok(Outcome { geometry: Geometry::Solid(rounded.solid), certificate })
 }
 
@@ -133,7 +138,7 @@ pub(crate) fn plan(
         None
     };
     let triangles = found.unwrap_or(plan.triangles);
-    Ok(Plan { triangles, output_bytes: stl_bytes(triangles), memory_bytes, ..plan })
+    Ok(Plan { triangles, output_bytes: Some(stl_bytes(triangles)), memory_bytes, ..plan })
 }
 
 /// Triangles of the operands that an operation is done with in some tens of milliseconds.

@@ -14,12 +14,14 @@ use lacuna_kernel::solid::{Rounded, Solid, SolidError, Topology, TriMesh};
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{LENGTHS_MM, Radius, Tolerance};
 
+use crate::enclosed::EnclosedStatement;
+use crate::hull::Hull;
 use crate::level::LevelStatement;
 use crate::operand::Operand;
 use crate::preview::PreviewStatement;
 use crate::repair::RepairStatement;
 use crate::run::{JobError, not_carried};
-use crate::shape_measures::{EnclosedStatement, ExtentStatement, OrientedBoxStatement, ThicknessStatement};
+use crate::shape_measures::{ExtentStatement, OrientedBoxStatement, ThicknessStatement};
 use crate::solidify::{ClosingStatement, WallStatement};
 use crate::split::SplitStatement;
 use crate::{Operation, Part};
@@ -170,15 +172,15 @@ pub struct Certificate {
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub area_mm2: Option<Interval>,
-    /// Centroid of the exact shape: of a `measure` alone.
+    /// Centroid of the exact shape, or of what a closed surface encloses: of a `measure` alone.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::vector_schema))]
     pub centroid_mm: Option<[Interval; 3]>,
-    /// Inertia tensor of the exact shape about its centroid, at density 1, row by row: of a `measure` alone.
+    /// Inertia tensor of the same about its centroid, at density 1, row by row: of a `measure` alone.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::matrix_schema))]
     pub inertia_mm5: Option<[[Interval; 3]; 3]>,
-    /// Mass of the exact shape, where the job names a density.
+    /// Mass of the exact shape, or of the volume that a closed surface encloses, where the job names a density.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub mass_g: Option<Interval>,
@@ -233,11 +235,14 @@ pub struct CellPairStatement {
     /// Address of the second; absent where that is no shape.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub second: Option<String>,
-    /// Centre of a ball around the first.
+    /// A point of the first: of a given triangle, segment or point the nearest to the second, of any other cell the one that its address leads to.
     pub first_mm: [f64; 3],
-    /// Centre of a ball around the second.
+    /// A point of the second, likewise; of what is no shape the nearest to the first.
     pub second_mm: [f64; 3],
-    /// Their distance.
+    /// How far `first_mm` and `second_mm` may be from points of the two shapes: rounding. Absent in certificates of before it was told, whose points are the middles of the cells.
+    #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
+    pub off_mm: Option<[f64; 2]>,
+    /// The distance of the two cells.
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub distance_mm: Interval,
 }
@@ -512,10 +517,10 @@ impl From<&CriticalRadius> for CriticalRadiusStatement {
 }
 
 impl Certificate {
-    /// Adds centroid, inertia and mass of the exact shape, which differs from what the mesh encloses by a volume of `difference` at most, within `bounds`.
+    /// Adds centroid and inertia of the exact shape, which differs from what the mesh encloses by a volume of `difference` at most, within `bounds`.
     ///
     /// With the mesh's centroid as the origin, no point of either is farther than R: first moments differ by R `difference` at most, second ones by R^2 times that.
-    pub(crate) fn state_mass(&mut self, mesh: &TriMesh, difference: f64, bounds: &AxisBox, density_g_cm3: Option<f64>) {
+    pub(crate) fn state_moments(&mut self, mesh: &TriMesh, difference: f64, bounds: &AxisBox) {
         let Some(MassProperties { volume, centroid, inertia }) = mass_properties(mesh) else { return };
         let reach = (0..3)
             .map(|axis| (bounds.high[axis].high - centroid[axis].low).max(centroid[axis].high - bounds.low[axis].low).powi(2))
@@ -528,9 +533,13 @@ impl Certificate {
             self.centroid_mm = Some(centroid.map(|x| widened(x, shift * (1.0 + ROUNDING))));
             self.inertia_mm5 = Some(inertia.map(|row| row.map(|x| widened(x, spread * (1.0 + ROUNDING)))));
         }
+    }
+
+    /// Adds the mass of a volume, where a density is given.
+    pub(crate) fn state_mass(&mut self, volume_mm3: Interval, density_g_cm3: Option<f64>) {
         // 1 cm^3 is 1000 mm^3.
-        self.mass_g = self.volume_mm3.zip(density_g_cm3).map(|([low, high], density)| {
-            let [low, high] = [low, high].map(|volume| volume * 1e-3 * density);
+        self.mass_g = density_g_cm3.map(|density| {
+            let [low, high] = volume_mm3.map(|volume| volume * 1e-3 * density);
             [low - 2.0 * f64::EPSILON * low.abs(), high + 2.0 * f64::EPSILON * high.abs()]
         });
     }
@@ -747,6 +756,7 @@ pub(crate) fn of_operation(
     engine: &str,
     operands: &[Operand],
     rounded: &Rounded,
+    hull: Option<&Hull>,
     tolerance: Tolerance,
 ) -> Certificate {
     let warnings = operands.iter().flat_map(|operand| operand.warnings.clone()).collect();
@@ -758,6 +768,8 @@ pub(crate) fn of_operation(
         let (within, beyond) = if taken_away(index) { (beyond, within) } else { (within, beyond) };
         (inner, outer) = (inner.max(within), outer.max(beyond));
     }
+    // The hull is measured before it is rounded.
+    let of_hull = hull.map(|hull| hull.exact_volume(inner, outer));
     let (inner, outer) = (inner + rounded.moved_mm, outer + rounded.moved_mm);
     // What the operations of two families of sets do not share lies in what the sets do not share.
     let difference = operands.iter().map(|operand| operand.volume_error).sum::<f64>() + swept(rounded.solid.mesh(), rounded.moved_mm);
@@ -773,7 +785,7 @@ pub(crate) fn of_operation(
         leaf_cells: operands.iter().map(|operand| operand.leaf_cells).sum(),
         bbox_mm: box_of(operation, operands),
         // Hulls of sets differ by more than the sets do.
-        volume_mm3: (exact[1].is_finite() && operation != Operation::Hull).then_some([exact[0].max(0.0), exact[1]]),
+        volume_mm3: of_hull.or_else(|| exact[1].is_finite().then_some([exact[0].max(0.0), exact[1]])),
         operation: Some(OperationStatement {
             operation,
             engine: engine.to_owned(),

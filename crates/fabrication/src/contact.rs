@@ -149,8 +149,9 @@ fn statement(found: &Contact) -> ContactStatement {
     let pair = |pair: &CellPair| CellPairStatement {
         first: pair.first.to_string(),
         second: pair.second.as_ref().map(ToString::to_string),
-        first_mm: pair.first_cell.centre,
-        second_mm: pair.second_cell.centre,
+        first_mm: pair.points[0],
+        second_mm: pair.points[1],
+        off_mm: Some(pair.off_mm),
         distance_mm: [pair.distance_mm.low, pair.distance_mm.high],
     };
     let place = |place: &Place| PlaceStatement {

@@ -79,5 +79,5 @@ pub(crate) fn plan(mesh: &PolygonMesh) -> Plan {
     // Coordinates twice, triangles, and the edges that are counted.
     let memory_bytes = 48.0 * vertices + 36.0 * count;
     let cpu_seconds = Some(effort::of_conversion(count));
-    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: stl_bytes(count), cpu_seconds, ..Plan::default() }
+    Plan { leaf_cells: count, triangles: count, memory_bytes, output_bytes: Some(stl_bytes(count)), cpu_seconds, ..Plan::default() }
 }

@@ -84,5 +84,12 @@ pub(crate) fn plan(job: &Job, level: u32, budget: &Budget) -> Result<Plan, JobEr
     let predicted = predict(ifs, &bounds, level, budget)?;
     let (triangles, memory_bytes) = (predicted.triangles, predicted.memory_bytes);
     let cpu_seconds = Some(effort::of_level(triangles));
-    Ok(Plan { triangles, counted_triangles: triangles, memory_bytes, output_bytes: stl_bytes(triangles), cpu_seconds, ..Plan::default() })
+    Ok(Plan {
+        triangles,
+        counted_triangles: triangles,
+        memory_bytes,
+        output_bytes: Some(stl_bytes(triangles)),
+        cpu_seconds,
+        ..Plan::default()
+    })
 }

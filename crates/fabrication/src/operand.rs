@@ -1,5 +1,6 @@
 //! Inputs as solids: dilated by a ball, or what their closed surfaces bound.
 
+use glam::DVec3;
 use lacuna_boolean::{BooleanEngine, BooleanError, Fault, ManifoldRust};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
@@ -47,6 +48,11 @@ impl<'a> Source<'a> {
     pub(crate) fn only(job: &'a Job, budget: &Budget) -> Result<Self, JobError> {
         let one = || wrong_inputs(job, "this kind takes one");
         if job.inputs.len() == 1 { sources(job, budget)?.pop().ok_or_else(one) } else { Err(one()) }
+    }
+
+    /// Its surfaces, where it is a solid as it is.
+    pub(crate) fn meshes(&self) -> Option<Vec<TriMesh>> {
+        (self.radius_mm == 0.0 && is_solid(&self.attractor)).then(|| self.attractor.surfaces())
     }
 }
 
@@ -160,14 +166,33 @@ fn closed_surface(name: &str, attractor: &Attractor, tolerance: Tolerance, budge
     }
 }
 
-/// The volume within d of a mesh's triangles is at most this: the sum of Steiner's formula over all of them.
-fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
+/// The volume within d of a mesh's triangles is at most this. Of such a point the nearest one of the mesh is in a triangle, on whose normal the point lies; or on an edge of two triangles, across
+/// which the point is in the sector between their normals, where it is no nearer to either; or it is a vertex. Edges of one triangle, of more, and of thin ones have all directions.
+pub(crate) fn neighbourhood(mesh: &TriMesh, d: f64) -> f64 {
     let corner = |index: u32| mesh.vertices[index as usize];
-    let perimeter = |&[a, b, c]: &[u32; 3]| corner(a).distance(corner(b)) + corner(b).distance(corner(c)) + corner(c).distance(corner(a));
-    let length: f64 = mesh.triangles.iter().map(perimeter).sum();
-    let balls = mesh.triangles.len() as f64 * 4.0 / 3.0 * PI * d.powi(3);
-    2.0 * d * area_within(mesh).high + 0.5 * PI * d * d * length + balls
+    let mut sides: Vec<([u32; 2], DVec3)> = Vec::with_capacity(3 * mesh.triangles.len());
+    for &[a, b, c] in &mesh.triangles {
+        let (p, q) = (corner(b) - corner(a), corner(c) - corner(a));
+        // Of a thinner triangle rounding leaves no direction.
+        let normal = Some(p.cross(q)).filter(|normal| normal.length() > THIN * p.length() * q.length()).unwrap_or_default();
+        sides.extend([[a, b], [b, c], [c, a]].map(|[from, to]| ([from.min(to), from.max(to)], normal)));
+    }
+    sides.sort_by_key(|(ends, _)| *ends);
+    let sectors = sides.chunk_by(|a, b| a.0 == b.0).map(|edge| {
+        let angle = match edge {
+            [(_, m), (_, n)] if m.length_squared() > 0.0 && n.length_squared() > 0.0 => m.cross(*n).length().atan2(m.dot(*n)) + THIN,
+            _ => 2.0 * PI,
+        };
+        angle * corner(edge[0].0[0]).distance(corner(edge[0].0[1]))
+    });
+    let (sectors, balls) = (sectors.sum::<f64>(), mesh.vertices.len() as f64 * 4.0 / 3.0 * PI * d.powi(3));
+    (2.0 * d * area_within(mesh).high + 0.5 * d * d * sectors + balls) * (1.0 + NEIGHBOURHOOD_ROUNDING)
 }
+
+/// Relative rounding of [`neighbourhood`], a sum of up to 2^32 terms.
+const NEIGHBOURHOOD_ROUNDING: f64 = 1e-6;
+/// The sine of a corner below which a triangle's normal is not asked: above it the normal is off by some 1e-9, and angles by less than this.
+const THIN: f64 = 1e-6;
 
 impl Operand {
     /// Makes one mesh of several: what lies in any of them.
@@ -252,7 +277,7 @@ pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &B
             seconds += effort::of_operand(triangles);
         }
     }
-    plan.output_bytes = stl_bytes(plan.triangles);
+    plan.output_bytes = Some(stl_bytes(plan.triangles));
     plan.cpu_seconds = Some(seconds);
     Ok(plan)
 }

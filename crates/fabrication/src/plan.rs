@@ -29,8 +29,8 @@ pub struct Plan {
     pub counted_cells: f64,
     /// Peak memory of the process that does the job, in bytes. 0 where nothing is predicted.
     pub memory_bytes: f64,
-    /// Bytes of a binary STL file with so many `triangles`.
-    pub output_bytes: f64,
+    /// Bytes of a binary STL file with so many `triangles`; of sections, those of all drawings that are asked for, or else of one in SVG. `null` for sections of what is thickened first, and where nothing is predicted.
+    pub output_bytes: Option<f64>,
     /// Edge of the lattice's cubes. `null` where points and segments are thickened without a lattice, and where nothing is thickened.
     pub lattice_pitch_mm: Option<f64>,
     /// Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan
@@ -49,7 +49,7 @@ pub struct Plan {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 pub struct Excess {
-    /// Its name among the limits of a job: `cells`, `triangles` or `memory_bytes`.
+    /// Its name among the limits of a job: `cells`, `triangles`, `memory_bytes` or `output_bytes`.
     pub limit: String,
     /// What is predicted.
     pub asked: f64,
@@ -127,15 +127,17 @@ fn quiet(budget: &Budget) -> Budget {
 }
 
 /// The limits that plans tell of.
-const PLANNED: [&str; 3] = ["cells", "triangles", "memory_bytes"];
+const PLANNED: [&str; 4] = ["cells", "triangles", "memory_bytes", "output_bytes"];
 
 impl Plan {
     /// What is held against limits: their names, what is predicted and what is allowed.
-    fn counts(&self, kind: JobKind, limits: &Limits) -> [(&'static str, f64, f64); 3] {
+    fn counts(&self, kind: JobKind, limits: &Limits) -> [(&'static str, f64, f64); 4] {
         // The triangles of an operation's result are counted, too.
         let triangles = if kind == JobKind::Intersect { self.counted_triangles.max(self.triangles) } else { self.counted_triangles };
-        let asked = [self.counted_cells, triangles, self.memory_bytes];
-        let allowed = [limits.cells as f64, limits.triangles as f64, limits.memory_bytes as f64];
+        // Those of meshes are of one format of many, and of triangles most of which simplification saves.
+        let output_bytes = if kind == JobKind::Slice { self.output_bytes.unwrap_or(0.0) } else { 0.0 };
+        let asked = [self.counted_cells, triangles, self.memory_bytes, output_bytes];
+        let allowed = [limits.cells as f64, limits.triangles as f64, limits.memory_bytes as f64, limits.output_bytes as f64];
         std::array::from_fn(|index| (PLANNED[index], asked[index], allowed[index]))
     }
 
@@ -235,7 +237,7 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         counted_triangles: prediction.counted_triangles,
         counted_cells: prediction.leaf_cells,
         memory_bytes: held_bytes(&prediction, simplify),
-        output_bytes: stl_bytes(prediction.triangles),
+        output_bytes: Some(stl_bytes(prediction.triangles)),
         lattice_pitch_mm: prediction.pitch_mm,
         cpu_seconds: (!searches_more(job)).then(|| effort::of_dilation(&prediction, simplify)),
         smallest_feature_mm: match job.params.wall {

@@ -2,23 +2,21 @@
 
 use lacuna_kernel::attractor::{Attractor, RefineError, refine, refine_with_normals, stream};
 use lacuna_kernel::budget::{Budget, Stopped};
-use lacuna_kernel::dilation::{DilationError, dilate_unsimplified};
+use lacuna_kernel::dilation::DilationError;
 use lacuna_kernel::error::{Kind, LimitFacts};
-use lacuna_kernel::measure::mass::{dilated_difference, mesh_of, volume_within};
-use lacuna_kernel::measure::{AxisBox, Dimension, bounding_box, dimension};
+use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::model::{CutMesh, Finding, Lowered, Model};
-use lacuna_kernel::solid::{Crossings, Solid};
+use lacuna_kernel::solid::Solid;
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{NotPositive, Radius, Tolerance};
 
-use crate::certificate::DimensionStatement;
-use crate::operand::{is_solid, miscounted};
 use crate::plan::with_remedy;
 use crate::repair::repaired;
-use crate::shape_measures::{MappedThickness, enclosed, extent, no_solid, smallest_box, walls_and_gaps};
+use crate::shape_measures::MappedThickness;
 use crate::solve::freedom;
 use crate::{
-    Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, preview, slice, solidify, split,
+    Certificate, Job, JobKind, Operation, Split, Stack, boolean, certificate, contact, convert, level, measure, preview, slice, solidify,
+    split,
 };
 
 /// The geometry of a result.
@@ -236,7 +234,7 @@ fn made(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
         JobKind::Evaluate => evaluate(&lower(job, budget)?.attractor, tolerance, job.params.normals, budget),
         JobKind::Solidify => solidify::solidify(job, tolerance, budget),
         JobKind::Measure if job.inputs.len() > 1 => contact::compare(job, tolerance, budget),
-        JobKind::Measure => measure(job, tolerance, budget),
+        JobKind::Measure => measure::measure(job, tolerance, budget),
         JobKind::Intersect => match job.params.operation {
             Some(Operation::Split) => split::split(job, &split_of(job)?, tolerance, budget),
             Some(operation) => boolean::combine(job, operation, tolerance, budget),
@@ -255,86 +253,6 @@ pub(crate) fn split_of(job: &Job) -> Result<Split, JobError> {
     let missing =
         || JobError::new(Kind::Invalid, "bad-parameter", "split needs volume_mm, the size that parts must fit, or cuts_mm".into());
     job.params.split.clone().ok_or_else(missing)
-}
-
-/// Shapes are measured up to this coordinate, and from the inverse of it on: moments of inertia grow with its fifth power.
-const LARGEST_MM: f64 = 1e50;
-
-fn measure(job: &Job, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
-    let radius = radius(job)?;
-    let attractor = &lower(job, budget)?.attractor;
-    let mut geometry = Geometry::None;
-    // All that there is of a measure to write.
-    let mapped = !job.outputs.is_empty();
-    let Some(radius) = radius else {
-        let bounds = bounding_box(attractor, budget)?;
-        if bounds.extent() > LARGEST_MM {
-            let message = format!(
-                "the shape reaches to {:e} mm, and beyond {LARGEST_MM:e} mm its moments are no numbers; give a smaller shape",
-                bounds.extent()
-            );
-            return Err(JobError::new(Kind::Invalid, "measure.too-large", message));
-        }
-        let has_size = (0..3).any(|axis| bounds.high[axis].low > bounds.low[axis].high);
-        if has_size && bounds.extent() < 1.0 / LARGEST_MM {
-            let message = format!(
-                "the shape lies within {:e} mm of the origin, and below {:e} mm its moments are no numbers; give a larger shape",
-                bounds.extent(),
-                1.0 / LARGEST_MM
-            );
-            return Err(JobError::new(Kind::Invalid, "measure.too-small", message));
-        }
-        let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
-        budget.prove(certificate.achieved_bound_mm);
-        let mut known = dimension(attractor, budget)?;
-        if let Some((mesh, true)) = mesh_of(attractor) {
-            certificate.state_mass(&mesh, 0.0, &bounds, job.params.density_g_cm3);
-            // Its triangles, joined.
-            for surface in attractor.surfaces() {
-                certificate.warnings.extend(miscounted(&surface, Crossings::of(&surface, budget)?.count));
-            }
-        }
-        match enclosed(attractor, budget)? {
-            Ok(found) => certificate.enclosed = found,
-            Err(reason) => certificate.warnings.push(reason),
-        }
-        if certificate.enclosed.as_ref().is_some_and(|found| found.volume_mm3[0] > 0.0 || found.volume_mm3[1] < 0.0) {
-            known = known.parting_space();
-        }
-        certificate.dimension = Some(DimensionStatement::of(known));
-        if job.params.thickness {
-            let surfaces = if is_solid(attractor) { attractor.surfaces() } else { Vec::new() };
-            let [mesh] = surfaces.as_slice() else { return Err(no_solid()) };
-            let (least, map) = walls_and_gaps(mesh, 0.0, mapped, budget)?;
-            certificate.warnings.extend(least.folds(tolerance));
-            (certificate.thickness, geometry) = (Some(least), map);
-        }
-        if let Some(direction) = job.params.direction {
-            certificate.extent = Some(extent(attractor, direction, [0.0; 2], budget)?);
-        }
-        if job.params.oriented_box {
-            certificate.oriented_box = smallest_box(attractor, 0.0, tolerance, budget)?;
-        }
-        return Ok(Outcome { geometry, certificate });
-    };
-    let dilation = dilate_unsimplified(attractor, radius, tolerance, budget)?;
-    let mut certificate = certificate::of_dilation(attractor, &dilation, tolerance);
-    let mesh = dilation.solid.mesh();
-    let difference = dilated_difference(volume_within(mesh), dilation.least_radius_mm, dilation.inner_mm, dilation.outer_mm);
-    certificate.state_mass(mesh, difference, &dilation.bounds.grown(dilation.outer_mm), job.params.density_g_cm3);
-    certificate.dimension = Some(DimensionStatement::of(Dimension::SOLID));
-    if let Some(direction) = job.params.direction {
-        certificate.extent = Some(extent(attractor, direction, attractor.radii(radius.mm()), budget)?);
-    }
-    if job.params.oriented_box {
-        certificate.oriented_box = smallest_box(attractor, radius.mm(), tolerance, budget)?;
-    }
-    if job.params.thickness {
-        let error_mm = dilation.inner_mm.max(dilation.outer_mm);
-        let (least, map) = walls_and_gaps(mesh, error_mm, mapped, budget)?;
-        (certificate.thickness, geometry) = (Some(least), map);
-    }
-    Ok(Outcome { geometry, certificate })
 }
 
 /// The box, and the share of the tolerance that single precision leaves.

@@ -2,14 +2,13 @@
 
 use glam::DVec3;
 use lacuna_kernel::attractor::{Attractor, RefineError, refine};
-use lacuna_kernel::budget::{Budget, Limits};
+use lacuna_kernel::budget::{Budget, Limits, Stopped};
 use lacuna_kernel::error::{Kind, LimitFacts};
 use lacuna_kernel::measure::mass::mesh_of;
 use lacuna_kernel::measure::section::{NoDirection, PlaneFrame};
-use lacuna_kernel::measure::{
-    FOLD, NotEnclosed, Side, Thickness, ThicknessMap, enclosed_volume, extent_along, oriented_box, thickness, thickness_map,
-};
+use lacuna_kernel::measure::{FOLD, Side, Thickness, ThicknessMap, extent_along, oriented_box, thickness, thickness_map};
 use lacuna_kernel::solid::{Crossings, TriMesh};
+use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::Tolerance;
 
 use crate::certificate::Interval;
@@ -50,27 +49,6 @@ pub struct ExtentStatement {
     /// Their difference: the width of the shape along the direction.
     #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
     pub width_mm: Interval,
-}
-
-/// How a volume was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-#[cfg_attr(feature = "wire", serde(rename_all = "snake_case"))]
-pub enum VolumeMethod {
-    /// From trilinear forms of the control points that solve the subdivision's linear systems: exact but for rounding, which the interval holds.
-    TrilinearForms,
-}
-
-/// The volume that a closed surface encloses. The surface itself, being a sheet, has none.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "wire", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-#[cfg_attr(feature = "wire", serde(deny_unknown_fields))]
-pub struct EnclosedStatement {
-    /// The volume; where the surface passes through itself, parts are counted as often as it winds around them.
-    #[cfg_attr(feature = "wire", schema(schema_with = crate::certificate::interval_schema))]
-    pub volume_mm3: Interval,
-    /// How it was found.
-    pub method: VolumeMethod,
 }
 
 /// A least thickness, and where it is.
@@ -130,7 +108,7 @@ pub struct MappedThickness {
 
 /// Bounds of the smallest box differ by this share of it.
 const RELATIVE: f64 = 1e-3;
-/// Leaf cells that the shape's points are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
+/// Leaf cells that the points of a smallest box are taken from at most; with more, a larger tolerance is taken, which the bounds tell.
 const MOST_CELLS: u64 = 30_000;
 
 /// How far a shape, dilated by a radius between two, extends along a direction.
@@ -141,16 +119,6 @@ pub(crate) fn extent(attractor: &Attractor, direction: DVec3, radii_mm: [f64; 2]
     let [from, to] = [[least.low - radii_mm[1], least.high - radii_mm[0]], [largest.low + radii_mm[0], largest.high + radii_mm[1]]];
     let width_mm = [(to[0] - from[1]).next_down().max(0.0), (to[1] - from[0]).next_up()];
     Ok(ExtentStatement { direction: direction.to_array(), from_mm: from, to_mm: to, width_mm })
-}
-
-/// The volume that a closed surface encloses, or why it is not known; neither for shapes that are no closed surface.
-pub(crate) fn enclosed(attractor: &Attractor, budget: &Budget) -> Result<Result<Option<EnclosedStatement>, String>, JobError> {
-    match enclosed_volume(attractor, budget) {
-        Ok(volume) => Ok(Ok(Some(EnclosedStatement { volume_mm3: [volume.low, volume.high], method: VolumeMethod::TrilinearForms }))),
-        Err(NotEnclosed::NoSurface | NotEnclosed::Open(_)) => Ok(Ok(None)),
-        Err(NotEnclosed::Stopped(stopped)) => Err(stopped.into()),
-        Err(reason) => Ok(Err(format!("the enclosed volume is not known: {reason}"))),
-    }
 }
 
 /// The smallest box of a shape dilated by a radius, 0 for the shape itself.
@@ -164,7 +132,10 @@ pub(crate) fn smallest_box(
         // Corners once, and not once for every triangle.
         _ if is_solid(attractor) => (attractor.surfaces().into_iter().flat_map(|surface| surface.vertices).collect(), 0.0),
         Some((mesh, _)) => (mesh.vertices, 0.0),
-        None => sampled(attractor, tolerance, budget)?,
+        None => {
+            let sample = sampled(attractor, tolerance, MOST_CELLS, budget)?;
+            (sample.vertices, sample.deviation_mm)
+        }
     };
     let found = oriented_box(&points, 2.0 * radius_mm, slack, RELATIVE, budget)?;
     Ok(found.map(|found| OrientedBoxStatement {
@@ -176,14 +147,14 @@ pub(crate) fn smallest_box(
     }))
 }
 
-/// Points of a shape, and how far it and they are from each other.
-fn sampled(attractor: &Attractor, tolerance: Tolerance, budget: &Budget) -> Result<(Vec<DVec3>, f64), JobError> {
-    let limits = Limits { cells: MOST_CELLS.min(budget.limits.cells), ..budget.limits };
+/// A shape as coarse as its leaf cells are few enough.
+pub(crate) fn sampled(attractor: &Attractor, tolerance: Tolerance, most_cells: u64, budget: &Budget) -> Result<Tessellation, JobError> {
+    let limits = Limits { cells: most_cells.min(budget.limits.cells), ..budget.limits };
     let few = Budget { limits, progress: None, ..budget.clone() };
     let mut coarse = tolerance.mm();
     loop {
         match refine(attractor, Tolerance::new(coarse)?, &few) {
-            Ok(sample) => return Ok((sample.vertices, sample.deviation_mm)),
+            Ok(sample) => return Ok(sample),
             Err(RefineError::Cells { .. } | RefineError::Memory { .. }) => coarse *= 2.0,
             Err(error) => return Err(error.into()),
         }
@@ -205,7 +176,10 @@ pub(crate) fn walls_and_gaps(
         let limit = Some(LimitFacts { limit: "triangles", asked, allowed, remedy: None });
         return Err(JobError { limit, ..JobError::new(Kind::Limit, "thickness.triangles", message) });
     }
-    let crossings = Crossings::of(mesh, budget)?.count;
+    // Parts that touch have corners of their own there, as a repair leaves them; they are no wall and no gap, and do not cross.
+    let (firsts, mut joined) = (mesh.firsts_by_place(), mesh.clone());
+    joined.triangles.iter_mut().flatten().for_each(|corner| *corner = firsts[*corner as usize]);
+    let crossings = Crossings::of(&joined, budget)?.count;
     if crossings > 0 {
         let message = format!("{crossings} pairs of faces of the solid meet where they are not joined: its walls have no thickness there");
         return Err(JobError::new(Kind::Unreachable, "thickness.crossings", message));
@@ -217,11 +191,16 @@ pub(crate) fn walls_and_gaps(
         })
     };
     if !mapped {
-        let [wall, gap] = [thickness(mesh, Side::Wall, error_mm, budget)?, thickness(mesh, Side::Gap, error_mm, budget)?];
+        let [wall, gap] = [thickness(&joined, Side::Wall, error_mm, budget)?, thickness(&joined, Side::Gap, error_mm, budget)?];
         return Ok((ThicknessStatement { wall: stated(wall), gap: stated(gap) }, Geometry::None));
     }
     // The map tells the least as well.
-    let [wall, gap] = [thickness_map(mesh, Side::Wall, error_mm, budget)?, thickness_map(mesh, Side::Gap, error_mm, budget)?];
+    let mapped = |side: Side| -> Result<ThicknessMap, Stopped> {
+        let map = thickness_map(&joined, side, error_mm, budget)?;
+        let vertices = firsts.iter().map(|&first| map.vertices[first as usize]).collect();
+        Ok(ThicknessMap { vertices, ..map })
+    };
+    let [wall, gap] = [mapped(Side::Wall)?, mapped(Side::Gap)?];
     let least = ThicknessStatement { wall: stated(wall.least), gap: stated(gap.least) };
     Ok((least, Geometry::Thickness(Box::new(MappedThickness { mesh: mesh.clone(), wall, gap }))))
 }

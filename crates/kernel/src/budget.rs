@@ -74,13 +74,21 @@ pub struct Limits {
     pub triangles: u64,
     /// Length of the longest address.
     pub depth: u32,
+    /// Bytes of all that is written of the result. Kept by the caller, who writes it; named here so that errors can say it.
+    pub output_bytes: u64,
 }
 
 impl Default for Limits {
-    /// 300 s, 4 GiB, 10^8 cells, 5 million triangles, addresses of length 256.
+    /// 300 s, 4 GiB of memory, 10^8 cells, 5 million triangles, addresses of length 256, 4 GiB to write.
     fn default() -> Self {
-        Self { seconds: 300.0, memory_bytes: 4 << 30, cells: 100_000_000, triangles: 5_000_000, depth: 256 }
+        Self { seconds: 300.0, memory_bytes: 4 << 30, cells: 100_000_000, triangles: 5_000_000, depth: 256, output_bytes: 4 << 30 }
     }
+}
+
+impl Limits {
+    /// The most that each can be: where limits are only read, or kept by somebody else.
+    pub const MOST: Self =
+        Self { seconds: f64::MAX, memory_bytes: u64::MAX, cells: u64::MAX, triangles: u64::MAX, depth: u32::MAX, output_bytes: u64::MAX };
 }
 
 impl Stopped {

@@ -161,6 +161,7 @@ CellPairStatement = TypedDict('CellPairStatement', {
     'distance_mm': 'list[float]',
     'first': 'str',
     'first_mm': 'list[float]',
+    'off_mm': 'NotRequired[list[float] | None]',
     'second': 'NotRequired[str | None]',
     'second_mm': 'list[float]',
 })
@@ -263,6 +264,8 @@ CornerCuttingShape = TypedDict('CornerCuttingShape', {
     'family': "Literal['corner_cutting']",
 })
 
+CountedPoint = TypedDict('CountedPoint', {'point_mm': 'list[float]', 'times': 'int'})
+
 Counts = TypedDict('Counts', {
     'cancelled': 'int',
     'expired': 'int',
@@ -301,7 +304,12 @@ EmbeddedModel = TypedDict('EmbeddedModel', {
     'units': "NotRequired[Literal['um', 'mm', 'cm', 'm', 'in']]",
 })
 
-EnclosedStatement = TypedDict('EnclosedStatement', {'method': 'VolumeMethod', 'volume_mm3': 'list[float]'})
+EnclosedStatement = TypedDict('EnclosedStatement', {
+    'counted_once_beyond_mm': 'NotRequired[float | None]',
+    'counted_otherwise': 'NotRequired[CountedPoint | None]',
+    'method': 'VolumeMethod',
+    'volume_mm3': 'list[float]',
+})
 
 ExactNumber = TypedDict('ExactNumber', {'exact': 'str', 'value': 'float'})
 
@@ -432,6 +440,7 @@ JobLimits = TypedDict('JobLimits', {
     'cells': 'NotRequired[int]',
     'depth': 'NotRequired[int]',
     'memory_bytes': 'NotRequired[int]',
+    'output_bytes': 'NotRequired[int]',
     'seconds': 'NotRequired[float]',
     'triangles': 'NotRequired[int]',
 })
@@ -516,6 +525,7 @@ LimitCapability = TypedDict('LimitCapability', {
     'expired_hours': 'int',
     'jobs_per_key': 'int',
     'memory_bytes': 'int',
+    'output_bytes': 'int',
     'queued_jobs': 'int',
     'retention_hours': 'int',
     'seconds': 'float',
@@ -707,7 +717,7 @@ Plan = TypedDict('Plan', {
     'lattice_pitch_mm': 'NotRequired[float | None]',
     'leaf_cells': 'float',
     'memory_bytes': 'float',
-    'output_bytes': 'float',
+    'output_bytes': 'NotRequired[float | None]',
     'smallest_feature_mm': 'NotRequired[float | None]',
     'triangles': 'float',
 })

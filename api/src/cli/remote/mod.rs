@@ -49,6 +49,7 @@ fn limited(document: &mut serde_json::Value, args: &LimitArgs) -> Result<(), Pro
         ("seconds", args.limit_seconds.map(serde_json::Value::from)),
         ("memory_bytes", args.limit_memory.map(serde_json::Value::from)),
         ("triangles", args.limit_triangles.map(serde_json::Value::from)),
+        ("output_bytes", args.limit_output.map(serde_json::Value::from)),
     ];
     let jobs: Vec<&mut serde_json::Value> = match document.get("jobs") {
         Some(_) => document["jobs"].as_array_mut().into_iter().flatten().filter_map(|entry| entry.get_mut("job")).collect(),
@@ -175,7 +176,9 @@ fn files_in(server: &Server, view: &JobView, folder: &Path) -> Result<Vec<Writte
 
 /// A document as it is, unless the command line states limits.
 fn with_limits(document: Vec<u8>, args: &LimitArgs) -> Result<Vec<u8>, Problem> {
-    let stated = args.limit_seconds.is_some() || args.limit_memory.is_some() || args.limit_triangles.is_some() || args.threads.is_some();
+    let LimitArgs { limit_triangles, limit_memory, limit_output, limit_seconds, threads } = args;
+    let counts = [limit_triangles, limit_memory, limit_output];
+    let stated = counts.iter().any(|limit| limit.is_some()) || limit_seconds.is_some() || threads.is_some();
     let Some(mut value) = stated.then(|| serde_json::from_slice::<serde_json::Value>(&document).ok()).flatten() else {
         // What cannot be read is refused by the service, with its place.
         return Ok(document);

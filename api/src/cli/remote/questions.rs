@@ -80,14 +80,14 @@ impl<'s> AtServer<'s> {
 impl Performer for AtServer<'_> {
     fn certificate(&self, job: &Job) -> Result<Certificate, Problem> {
         // Limits are those of the service.
-        let limits = LimitArgs { limit_triangles: None, limit_memory: None, limit_seconds: None, threads: None };
+        let limits = LimitArgs::default();
         let document = super::posted(&Order::new(job.clone(), Vec::new()), &[], &limits)?;
         super::followed(self.server, &document, &self.token, None).and_then(super::certified).map_err(Problem::of_model)
     }
 
     fn made(&self, job: &Job) -> Result<Made, Problem> {
         let start = Instant::now();
-        let limits = LimitArgs { limit_triangles: None, limit_memory: None, limit_seconds: None, threads: None };
+        let limits = LimitArgs::default();
         let document = super::posted(&Order::new(job.clone(), Vec::new()), &job.outputs, &limits)?;
         let view = super::followed(self.server, &document, &self.token, None).map_err(Problem::of_model)?;
         let mut files = BTreeMap::new();

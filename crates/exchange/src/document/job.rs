@@ -71,6 +71,8 @@ pub struct RequestedLimits {
     pub triangles: Option<u64>,
     /// Length of the longest address.
     pub depth: Option<u32>,
+    /// Bytes of all files of the result.
+    pub output_bytes: Option<u64>,
 }
 
 impl RequestedLimits {
@@ -85,6 +87,7 @@ impl RequestedLimits {
             cells: self.cells.unwrap_or(default.cells),
             triangles: self.triangles.unwrap_or(default.triangles),
             depth: self.depth.unwrap_or(default.depth),
+            output_bytes: self.output_bytes.unwrap_or(default.output_bytes),
         };
         let excesses = [
             ("seconds", self.seconds.is_some() && limits.seconds > most.seconds, limits.seconds.to_string(), most.seconds.to_string()),
@@ -92,6 +95,7 @@ impl RequestedLimits {
             ("cells", limits.cells > most.cells, limits.cells.to_string(), most.cells.to_string()),
             ("triangles", limits.triangles > most.triangles, limits.triangles.to_string(), most.triangles.to_string()),
             ("depth", limits.depth > most.depth, limits.depth.to_string(), most.depth.to_string()),
+            ("output_bytes", limits.output_bytes > most.output_bytes, limits.output_bytes.to_string(), most.output_bytes.to_string()),
         ];
         let diagnostics: Vec<_> = excesses
             .into_iter()
@@ -745,6 +749,7 @@ fn limits(walker: &mut Walker<'_>, place: Place<'_>) -> Option<RequestedLimits> 
     let cells = count("cells", u64::MAX);
     let triangles = count("triangles", u64::MAX);
     let depth = count("depth", u64::from(u32::MAX));
+    let output_bytes = count("output_bytes", u64::MAX);
     // why: the outer option says whether the member is there, the inner whether it is legal
     Some(RequestedLimits {
         seconds: stated(seconds)?,
@@ -752,6 +757,7 @@ fn limits(walker: &mut Walker<'_>, place: Place<'_>) -> Option<RequestedLimits> 
         cells: stated(cells)?,
         triangles: stated(triangles)?,
         depth: stated(depth)?.and_then(|depth| u32::try_from(depth).ok()),
+        output_bytes: stated(output_bytes)?,
     })
 }
 

@@ -350,7 +350,8 @@ object! {
         .put("triangles", &limits.triangles)?
         .put("cells", &limits.cells)?
         .put("memory_bytes", &limits.memory_bytes)?
-        .put("depth", &limits.depth)?;
+        .put("depth", &limits.depth)?
+        .put("output_bytes", &limits.output_bytes)?;
     Ifs: |ifs, members| members
         .put("family", &"ifs")?
         .put("maps", &list(&ifs.maps))?

@@ -71,6 +71,12 @@ pub enum FormatError {
         /// The format that was asked.
         format: Format,
     },
+    /// A section of a plane that the drawing was not started with.
+    #[error("the drawing has no plane at {offset_mm} mm; start it with all offsets")]
+    UnknownPlane {
+        /// Where the plane is along the normal.
+        offset_mm: f64,
+    },
     /// A table of addresses was asked of a shape whose cells have none.
     #[error(
         "there are no addresses to write: the shape, or a part of it, has no B-rep; addresses are known for curves between vertices and for faces with edges"
@@ -214,7 +220,7 @@ impl FormatError {
                 std::io::ErrorKind::StorageFull | std::io::ErrorKind::OutOfMemory => Kind::Limit,
                 _ => Kind::Defect,
             },
-            Self::Differs { .. } | Self::Picture(_) | Self::Certificate(_) => Kind::Defect,
+            Self::Differs { .. } | Self::UnknownPlane { .. } | Self::Picture(_) | Self::Certificate(_) => Kind::Defect,
         }
     }
 
@@ -226,6 +232,7 @@ impl FormatError {
             Self::CannotRead { .. } => "format.cannot-read",
             Self::CannotVerify { .. } => "format.cannot-verify",
             Self::CannotDraw { .. } => "format.cannot-draw",
+            Self::UnknownPlane { .. } => "format.unknown-plane",
             Self::NoAddresses => "format.no-addresses",
             Self::UnknownFormat(_) => "format.unknown",
             Self::Empty => "format.empty-geometry",

@@ -73,7 +73,7 @@ pub enum Format {
     Addresses,
     /// Scalable Vector Graphics 1.1: plane sections.
     Svg,
-    /// Drawing exchange file of AutoCAD release 12: plane sections.
+    /// Drawing exchange file of AutoCAD 2000: plane sections.
     Dxf,
 }
 

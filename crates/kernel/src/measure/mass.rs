@@ -155,11 +155,16 @@ pub fn dilated_volume(mesh_volume: Interval, radius: f64, inner: f64, outer: f64
 /// Area of the boundary of D_r, from an interval of its volume.
 ///
 /// S(s) / s^2 does not increase (Kneser again, S = V'; where radii differ, V' = the integral of the radii over the boundary is at most 3 V and at least r S), so V(r) >= integral of S(r) (s / r)^2 = S(r) r / 3; and no
-/// set of volume V has less area than the ball: S >= (36 pi V^2)^(1/3).
+/// set of volume V has less area than the ball ([`isoperimetric`]).
 #[must_use]
 pub fn dilated_area(volume: Interval, radius: f64) -> Interval {
-    let low = (36.0 * std::f64::consts::PI * volume.low * volume.low).cbrt() * (1.0 - ROUNDING);
-    Interval { low, high: 3.0 * volume.high / radius * (1.0 + ROUNDING) }
+    Interval { low: isoperimetric(volume.low), high: 3.0 * volume.high / radius * (1.0 + ROUNDING) }
+}
+
+/// The least area of the boundary of a set with this volume or a larger one: that of a ball.
+#[must_use]
+pub fn isoperimetric(volume: f64) -> f64 {
+    (36.0 * std::f64::consts::PI * volume * volume).cbrt() * (1.0 - ROUNDING)
 }
 
 /// The volume between D_r and a mesh M with D(r - inner) in M in D(r + outer) is at most this, in mm^3; infinite when inner reaches r.

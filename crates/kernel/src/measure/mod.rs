@@ -10,10 +10,12 @@ mod functional;
 pub mod hausdorff;
 pub mod mass;
 pub mod oriented_box;
+pub mod overlaps;
 pub mod section;
 mod support;
 pub mod thickness;
 pub mod triangle;
+pub mod windings;
 
 pub use bounds::{AxisBox, bounding_box, extent_along};
 pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive, intersect_self};
@@ -21,7 +23,9 @@ pub use dimension::{Dimension, DimensionKnowledge, dimension};
 pub use enclosed::{NotEnclosed, enclosed_volume};
 pub use hausdorff::{Directed, Hausdorff, hausdorff};
 pub use oriented_box::{OrientedBox, oriented_box};
+pub use overlaps::Overlaps;
 pub use thickness::{FOLD, Side, Thickness, ThicknessMap, thickness, thickness_map};
+pub use windings::Windings;
 
 /// [low, high]: the exact value lies between. Invariant: low <= high, no NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]

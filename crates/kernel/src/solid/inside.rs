@@ -2,7 +2,9 @@
 
 use super::TriMesh;
 use super::box_tree::{Box32, BoxTree};
+use crate::measure::triangle::closest_on_triangle;
 use glam::DVec3;
+use rayon::prelude::*;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 /// A closed mesh that tells which points it encloses.
@@ -29,6 +31,34 @@ impl<'a> Inside<'a> {
     #[must_use]
     pub fn winding(&self, x: DVec3) -> i64 {
         self.winding_of(x, |_| true)
+    }
+
+    /// How far a point is from what the surface encloses: 0 inside, else the distance of the nearest triangle, up to a few roundings of the coordinates. Cost: log n or so.
+    #[must_use]
+    pub fn distance(&self, x: DVec3) -> f64 {
+        if self.mesh.triangles.is_empty() || self.winding(x) > 0 {
+            return 0.0;
+        }
+        let mut nearest = f64::INFINITY;
+        let entry = |around: &Box32| {
+            let [low, high] = [around.low, around.high].map(|end| end.as_dvec3());
+            // The box of nothing is nowhere.
+            (low.x <= high.x).then(|| x.distance(x.clamp(low, high)))
+        };
+        self.tree.nearest(f64::INFINITY, entry, |leaf| {
+            for &triangle in self.tree.items(leaf) {
+                let [a, b, c] = self.mesh.triangles[triangle as usize].map(|corner| self.mesh.vertices[corner as usize].to_array());
+                nearest = nearest.min(x.distance(closest_on_triangle(&x.to_array(), &a, &b, &c).into()));
+            }
+            nearest
+        });
+        nearest
+    }
+
+    /// The largest distance of some points, as [`Inside::distance`] tells them.
+    #[must_use]
+    pub fn farthest(&self, points: &[DVec3]) -> f64 {
+        points.par_iter().map(|&point| self.distance(point)).reduce(|| 0.0, f64::max)
     }
 
     /// That of the triangles that are counted.
@@ -85,5 +115,10 @@ mod tests {
         let inside = Inside::new(&mesh);
         let windings = [5.0, 1.5, 1.0 + f64::EPSILON, 1.0 - f64::EPSILON, 0.9, f64::MIN_POSITIVE].map(|x| inside.winding(DVec3::splat(x)));
         assert_eq!(windings, [0, 0, 0, 1, 1, 1]);
+        // Inside, at a corner, beyond a face, beyond the slope x + y + z = 3.
+        let distances = [DVec3::splat(0.5), DVec3::X * 3.0, DVec3::new(1.0, 1.0, -2.0), DVec3::splat(2.0)].map(|x| inside.distance(x));
+        for (found, exact) in distances.into_iter().zip([0.0, 0.0, 2.0, 3.0_f64.sqrt()]) {
+            assert!((found - exact).abs() < 1e-12, "{distances:?}");
+        }
     }
 }

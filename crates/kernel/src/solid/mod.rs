@@ -4,6 +4,7 @@ pub(crate) mod box_tree;
 pub(crate) mod contact;
 mod crossings;
 pub(crate) mod fans;
+mod flat;
 pub(crate) mod half_edges;
 pub(crate) mod inside;
 pub(crate) mod mend;
@@ -15,10 +16,11 @@ pub(crate) mod topology;
 use crate::budget::{Budget, Stopped};
 use crate::measure::mass::{volume, volume_within};
 pub use crossings::Crossings;
+pub use flat::without_flat_shells;
 use glam::DVec3;
 pub use inside::Inside;
 pub use repair::{Repair, RepairError, Repaired, Unfilled, repair};
-pub use shells::{MisplacedShell, misplaced_shell, without_flat_shells};
+pub use shells::{MisplacedShell, misplaced_shell};
 pub use topology::Topology;
 
 /// Triangles over shared vertices, in mm. Nothing is proven of it.
@@ -36,6 +38,20 @@ impl TriMesh {
         let first = self.vertices.len() as u32;
         self.vertices.extend(&other.vertices);
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+    }
+
+    /// For every vertex the first one at the same place, itself where there is none before; coordinates are compared as numbers. Cost: n log n.
+    #[must_use]
+    pub fn firsts_by_place(&self) -> Vec<u32> {
+        // Minus zero is zero.
+        let place = |vertex: u32| self.vertices[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
+        let mut order: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        order.sort_unstable_by_key(|&vertex| (place(vertex), vertex));
+        let mut firsts = vec![0; order.len()];
+        for group in order.chunk_by(|&a, &b| place(a) == place(b)) {
+            group.iter().for_each(|&vertex| firsts[vertex as usize] = group[0]);
+        }
+        firsts
     }
 
     /// Turns every triangle around: what was outside is inside.

@@ -92,74 +92,12 @@ pub fn misplaced_shell(mesh: &TriMesh) -> Option<MisplacedShell> {
     })
 }
 
-/// The mesh without shells that lie between two planes as far apart as `width_mm`, if there are such: where solids share parts of faces, what they have in common is flat, and has no volume but by
-/// rounding.
-///
-/// What such a shell encloses holds no ball with a diameter above `width_mm`, and lies within that of its surface. So with M the solid and M' what is left, M' holds every point whose ball of
-/// radius `width_mm` is in M, and lies within `width_mm` of M. Triangles that share a vertex belong to one shell. Cost: linear.
-#[must_use]
-pub fn without_flat_shells(mesh: &TriMesh, width_mm: f64) -> Option<TriMesh> {
-    let shells = Shells::of(mesh);
-    // Each one's direction across: the normal of its largest triangle.
-    let mut across = vec![DVec3::ZERO; shells.firsts.len()];
-    for corners in &mesh.triangles {
-        let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize]);
-        let normal = (b - a).cross(c - a);
-        let largest = &mut across[shells.with(corners[0])];
-        if normal.length_squared() > largest.length_squared() {
-            *largest = normal;
-        }
-    }
-    let across: Vec<DVec3> = across.into_iter().map(DVec3::normalize_or_zero).collect();
-    let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY]; across.len()];
-    for &corner in mesh.triangles.iter().flatten() {
-        let shell = shells.with(corner);
-        let height = (mesh.vertices[corner as usize] - mesh.vertices[shells.firsts[shell] as usize]).dot(across[shell]);
-        spans[shell] = [spans[shell][0].min(height), spans[shell][1].max(height)];
-    }
-    let is_flat = |shell: usize| spans[shell][1] - spans[shell][0] <= width_mm;
-    if !(0..across.len()).any(is_flat) {
-        return None;
-    }
-    let mut rest = TriMesh::default();
-    let mut numbers = vec![u32::MAX; mesh.vertices.len()];
-    for corners in mesh.triangles.iter().filter(|corners| !is_flat(shells.with(corners[0]))) {
-        rest.triangles.push(corners.map(|corner| {
-            let number = &mut numbers[corner as usize];
-            if *number == u32::MAX {
-                *number = rest.vertices.len() as u32;
-                rest.vertices.push(mesh.vertices[corner as usize]);
-            }
-            *number
-        }));
-    }
-    Some(rest)
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::measure::mass::volume;
-
-    #[test]
-    fn flat_shells_are_left_out() {
-        let flatten = |mut mesh: TriMesh, from: usize, height: f64| {
-            mesh.vertices[from..].iter_mut().for_each(|point| point.z = 3.0 + height * point.z);
-            mesh
-        };
-        // A cube, and one beside it that is pressed to a height of 2e-7.
-        let mesh = flatten(cubes(&[[0.0, 1.0], [2.0, 3.0]]), 8, 2e-7);
-        assert_eq!(without_flat_shells(&mesh, 1e-7), None);
-        let rest = without_flat_shells(&mesh, 3e-7).unwrap_or_default();
-        assert_eq!((rest.vertices.len(), rest.triangles.len(), volume(&rest)), (8, 12, 1.0));
-        // It alone, and turned inside out; nothing is left.
-        for ends in [[2.0, 3.0], [3.0, 2.0]] {
-            assert!(without_flat_shells(&flatten(cubes(&[ends]), 0, 0.0), 0.0).is_some_and(|rest| rest.triangles.is_empty()));
-        }
-    }
 
     /// Cubes from and to these corners; those whose ends are exchanged face inwards.
-    fn cubes(ends: &[[f64; 2]]) -> TriMesh {
+    pub(in super::super) fn cubes(ends: &[[f64; 2]]) -> TriMesh {
         let mut mesh = TriMesh::default();
         for &[low, high] in ends {
             let start = mesh.vertices.len() as u32;

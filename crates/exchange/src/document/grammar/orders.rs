@@ -250,6 +250,7 @@ pub(in super::super) const JOB_LIMITS: Object = Object {
         ),
         optional("memory_bytes", "Accounted memory in bytes.", count),
         optional("depth", "Length of the longest address.", || json!({ "type": "integer", "minimum": 1, "maximum": u32::MAX })),
+        optional("output_bytes", "Bytes of all files of the result, the certificate aside.", count),
     ],
 };
 

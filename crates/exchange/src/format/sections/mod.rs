@@ -14,7 +14,7 @@
 //! let triangle = Polygon { outer: vec![DVec2::ZERO, DVec2::X, DVec2::Y], holes: vec![] };
 //! let section = Section { offset_mm: 0.25, polygons: vec![triangle], unmatched: vec![] };
 //! let mut bytes = Vec::new();
-//! let mut file = SectionFile::start(Format::Svg, &mut bytes, [DVec3::ZERO, DVec3::ONE], &Metadata::default())?;
+//! let mut file = SectionFile::start(Format::Svg, &mut bytes, [DVec3::ZERO, DVec3::ONE], &[0.25], &Metadata::default())?;
 //! file.push(&section)?;
 //! file.finish()?;
 //! assert!(String::from_utf8_lossy(&bytes).contains("<g id=\"z_0.250\">\n<path d=\"M0 0L1 0L0 -1z\"/>\n</g>"));
@@ -42,34 +42,53 @@ pub struct SectionFile<W> {
     text: Vec<u8>,
     /// The number of each height's name, and how many sections have had it.
     names: BTreeMap<String, [usize; 2]>,
+    /// Of a DXF file.
+    handles: Option<dxf::Handles>,
     points: u64,
 }
 
 impl<W: Write> SectionFile<W> {
-    /// Starts a drawing of sections between the lower and the upper corner (u, v, offset), as
+    /// Starts a drawing of sections at some offsets, in any order, between the lower and the upper corner (u, v, offset), as
     /// [`PlaneFrame::bounds`](lacuna_kernel::measure::section::PlaneFrame::bounds) gives them, in mm. What lies beyond is written too.
     ///
     /// # Errors
-    /// [`FormatError::CannotDraw`] for a format that is no drawing, [`FormatError::NotFinite`] for the corners, [`FormatError::Stream`] when the sink fails.
-    pub fn start(format: Format, sink: W, bounds: [DVec3; 2], metadata: &Metadata<'_>) -> Result<Self, FormatError> {
+    /// [`FormatError::CannotDraw`] for a format that is no drawing, [`FormatError::NotFinite`] for the corners and offsets, [`FormatError::Stream`] when the sink fails.
+    pub fn start(
+        format: Format,
+        mut sink: W,
+        bounds: [DVec3; 2],
+        offsets_mm: &[f64],
+        metadata: &Metadata<'_>,
+    ) -> Result<Self, FormatError> {
         if !format.is_drawing() {
             return Err(FormatError::CannotDraw { format });
         }
-        for value in bounds.iter().flat_map(DVec3::to_array) {
+        for value in bounds.iter().flat_map(DVec3::to_array).chain(offsets_mm.iter().copied()) {
             check(value, Place::File)?;
         }
-        let mut text = Vec::with_capacity(CHUNK_BYTES + 4096);
-        match format {
-            Format::Svg => svg::start(bounds, metadata, &mut text),
-            _ => dxf::start(bounds, metadata, &mut text),
+        let (mut names, mut layers) = (BTreeMap::new(), Vec::new());
+        for name in offsets_mm.iter().map(|&offset| height_name(offset)) {
+            let number = names.len() + 1;
+            names.entry(name).or_insert_with_key(|name| {
+                layers.push(dxf::layer(name, number));
+                [number, 0]
+            });
         }
-        Ok(Self { format, sink, text, names: BTreeMap::new(), points: 0 })
+        let mut text = Vec::with_capacity(CHUNK_BYTES + 4096);
+        let handles = match format {
+            Format::Svg => {
+                svg::start(bounds, metadata, &mut text);
+                None
+            }
+            _ => Some(dxf::start(bounds, &layers, metadata, &mut Out { text: &mut text, sink: &mut sink })?),
+        };
+        Ok(Self { format, sink, text, names, handles, points: 0 })
     }
 
-    /// Adds a section. One that is empty has an empty group in SVG, and nothing in DXF.
+    /// Adds a section at one of the offsets. One that is empty has an empty group in SVG, and nothing but its layer in DXF.
     ///
     /// # Errors
-    /// [`FormatError::NotFinite`] for a coordinate, its place being the number of the point among all; [`FormatError::Stream`] when the
+    /// [`FormatError::UnknownPlane`] for another offset, [`FormatError::NotFinite`] for a coordinate, its place being the number of the point among all; [`FormatError::Stream`] when the
     /// sink fails.
     pub fn push(&mut self, section: &Section) -> Result<(), FormatError> {
         check(section.offset_mm, Place::File)?;
@@ -79,13 +98,13 @@ impl<W: Write> SectionFile<W> {
         }
         self.points += section.loops().map(|points| points.len() as u64).sum::<u64>();
         let name = height_name(section.offset_mm);
-        let next = self.names.len() + 1;
-        let [number, uses] = self.names.entry(name.clone()).or_insert([next, 0]);
+        let unknown = FormatError::UnknownPlane { offset_mm: section.offset_mm };
+        let [number, uses] = self.names.get_mut(&name).ok_or(unknown)?;
         *uses += 1;
         let mut out = Out { text: &mut self.text, sink: &mut self.sink };
-        match self.format {
-            Format::Svg => svg::section(section, &name, *uses, &mut out),
-            _ => dxf::section(section, &dxf::layer(&name, *number), &mut out),
+        match &mut self.handles {
+            None => svg::section(section, &name, *uses, &mut out),
+            Some(handles) => dxf::section(section, &dxf::layer(&name, *number), handles, &mut out),
         }
     }
 

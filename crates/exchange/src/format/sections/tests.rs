@@ -14,7 +14,8 @@ fn square(centre: [f64; 2], half: f64, turn: f64) -> Vec<DVec2> {
 
 fn written(format: Format, bounds: [DVec3; 2], title: Option<&str>, all: &[Section]) -> String {
     let mut bytes = Vec::new();
-    let mut file = SectionFile::start(format, &mut bytes, bounds, &Metadata { title, ..Metadata::default() }).unwrap();
+    let offsets: Vec<f64> = all.iter().map(|section| section.offset_mm).collect();
+    let mut file = SectionFile::start(format, &mut bytes, bounds, &offsets, &Metadata { title, ..Metadata::default() }).unwrap();
     all.iter().for_each(|section| file.push(section).unwrap());
     file.finish().unwrap();
     String::from_utf8(bytes).unwrap()
@@ -79,24 +80,28 @@ fn polylines(text: &str) -> Vec<(String, Vec<DVec3>)> {
     let mut found: Vec<(String, Vec<DVec3>)> = Vec::new();
     let pairs = pairs(text);
     let entities = pairs.iter().position(|pair| *pair == (2, "ENTITIES")).unwrap();
-    let mut kind = "";
+    let (mut kind, mut count, mut height) = ("", 0, 0.0);
     for &(code, value) in &pairs[entities + 1..] {
         let last = found.last_mut();
         match (code, kind) {
             (0, _) => {
                 kind = value;
-                match kind {
-                    "POLYLINE" => found.push(Default::default()),
-                    "VERTEX" => last.unwrap().1.push(DVec3::ZERO),
-                    _ => assert!(["SEQEND", "ENDSEC", "EOF"].contains(&kind), "{kind}"),
+                if kind == "ENDSEC" {
+                    break;
                 }
+                assert_eq!(kind, "LWPOLYLINE");
+                found.push(Default::default());
             }
-            (8, "POLYLINE") => last.unwrap().0 = value.to_owned(),
-            (8, _) => assert_eq!(last.unwrap().0, value),
-            (70, "POLYLINE") => assert_eq!(value, "1", "not closed"),
-            (10, "VERTEX") => last.unwrap().1.last_mut().unwrap().x = value.parse().unwrap(),
-            (20, "VERTEX") => last.unwrap().1.last_mut().unwrap().y = value.parse().unwrap(),
-            (30, "VERTEX") => last.unwrap().1.last_mut().unwrap().z = value.parse().unwrap(),
+            (8, _) => last.unwrap().0 = value.to_owned(),
+            (70, _) => assert_eq!(value, "1", "not closed"),
+            (90, _) => count = value.parse().unwrap(),
+            (38, _) => height = value.parse().unwrap(),
+            (10, _) => last.unwrap().1.push(DVec3::new(value.parse().unwrap(), 0.0, height)),
+            (20, _) => {
+                let points = &mut last.unwrap().1;
+                points.last_mut().unwrap().y = value.parse().unwrap();
+                assert!(points.len() <= count);
+            }
             _ => {}
         }
     }
@@ -156,7 +161,15 @@ fn dxf_carries_every_loop_bit_for_bit() {
     }
     let layers: Vec<&str> = found.iter().map(|(layer, _)| layer.as_str()).collect();
     assert_eq!(layers, ["Z_-0_700", "Z_0_100", "Z_0_100", "Z_0_000", "SECTION_5", "SECTION_5", "SECTION_5", "SECTION_5"]);
-    assert!(text.is_ascii() && text.contains("$ACADVER\n1\nAC1009\n"));
+    assert!(text.is_ascii() && text.contains("$ACADVER\n1\nAC1015\n") && text.contains("$INSUNITS\n70\n4\n"));
+    // Every layer is listed once, and every handle is one thing's.
+    let pairs_of = |code: u32| pairs(&text).into_iter().filter(move |pair| pair.0 == code).map(|pair| pair.1);
+    let listed: Vec<&str> = pairs_of(2).filter(|name| layers.contains(name) || name.starts_with("SECTION_")).collect();
+    assert_eq!(listed, ["Z_-0_700", "Z_0_100", "Z_0_000", "SECTION_5"]);
+    let mut handles: Vec<u64> =
+        pairs_of(5).filter(|handle| *handle != "FFFFFFFF").map(|handle| u64::from_str_radix(handle, 16).unwrap()).collect();
+    handles.sort_unstable();
+    assert!(handles.windows(2).all(|pair| pair[0] < pair[1]), "{handles:?}");
     let high = pairs(&text).into_iter().skip_while(|pair| pair.1 != "$EXTMAX").nth(1).unwrap();
     assert_eq!((high.0, high.1.parse::<f64>().unwrap()), (10, bounds[1].x));
 }
@@ -177,10 +190,10 @@ fn titles_cannot_leave_their_place() {
         let dxf = written(Format::Dxf, bounds, Some(title), &[]);
         let (code, words) = pairs(&dxf)[0];
         assert!(code == 999 && words.starts_with(start) && words.len() <= 255 && dxf.is_ascii(), "{words:?}");
-        assert_eq!(
-            pairs(&dxf).iter().filter(|pair| pair.0 == 0).map(|pair| pair.1).collect::<Vec<_>>(),
-            ["SECTION", "ENDSEC", "SECTION", "ENDSEC", "EOF"]
-        );
+        let rest = |text: &str| {
+            pairs(text).iter().skip_while(|pair| pair.0 == 999).map(|&(code, value)| (code, value.to_owned())).collect::<Vec<_>>()
+        };
+        assert_eq!(rest(&dxf), rest(&written(Format::Dxf, bounds, None, &[])));
     }
 }
 
@@ -188,7 +201,7 @@ fn titles_cannot_leave_their_place() {
 fn what_is_no_number_is_refused() {
     let (bounds, all) = examples();
     for format in [Format::Svg, Format::Dxf] {
-        let start = |bounds| SectionFile::start(format, Vec::new(), bounds, &Metadata::default());
+        let start = |bounds| SectionFile::start(format, Vec::new(), bounds, &[all[5].offset_mm], &Metadata::default());
         assert!(matches!(start([bounds[0], DVec3::NAN]), Err(FormatError::NotFinite { place: Place::File, .. })));
         let mut file = start(bounds).unwrap();
         file.push(&all[5]).unwrap();
@@ -198,6 +211,7 @@ fn what_is_no_number_is_refused() {
         assert!(matches!(file.push(&wrong), Err(FormatError::NotFinite { place: Place::Vertex(25), .. })));
         let wrong = Section { offset_mm: f64::NAN, ..Section::default() };
         assert!(matches!(file.push(&wrong), Err(FormatError::NotFinite { place: Place::File, .. })));
+        assert!(matches!(file.push(&Section { offset_mm: 1.0, ..Section::default() }), Err(FormatError::UnknownPlane { offset_mm: 1.0 })));
         assert_eq!(file.text, before);
     }
 }
@@ -220,7 +234,7 @@ fn long_loops_are_handed_on_while_they_are_written() {
     let section = Section { offset_mm: 0.0, polygons: vec![Polygon { outer, holes: vec![] }], unmatched: vec![] };
     for format in [Format::Svg, Format::Dxf] {
         let run = |writes| {
-            let mut file = SectionFile::start(format, Narrow(writes), [DVec3::NEG_ONE, DVec3::ONE], &Metadata::default())?;
+            let mut file = SectionFile::start(format, Narrow(writes), [DVec3::NEG_ONE, DVec3::ONE], &[0.0], &Metadata::default())?;
             file.push(&section)?;
             file.finish()
         };

@@ -107,9 +107,31 @@ impl Body {
 
     /// The middle of the closest points of the sites of both, up to rounding.
     pub(super) fn middle(&self, other: &Self) -> Point {
+        let (x, y) = self.closest(other);
+        between(&x, &y, 0.5)
+    }
+
+    /// The closest points of the sites of both, up to rounding.
+    pub(super) fn closest(&self, other: &Self) -> (Point, Point) {
         let pairs = self.sites.iter().flat_map(|mine| other.sites.iter().map(move |its| closest_pair(mine, its)));
         let closest = pairs.min_by(|a, b| distance_squared(&a.0, &a.1).total_cmp(&distance_squared(&b.0, &b.1)));
-        closest.map_or(self.ball.centre, |(x, y)| between(&x, &y, 0.5))
+        closest.unwrap_or((self.ball.centre, other.ball.centre))
+    }
+
+    /// Whether it is its sites, grown and filled as it may be: all points of these are its own.
+    pub(super) fn is_its_sites(&self) -> bool {
+        self.error == 0.0
+    }
+
+    /// The point of its sites that is nearest to x, grown and filled as it may be; up to rounding.
+    pub(super) fn nearest(&self, x: &Point) -> Point {
+        if self.nature == Nature::Filled {
+            return std::array::from_fn(|axis| x[axis].clamp(self.low[axis], self.high[axis]));
+        }
+        let sites = self.sites.iter().map(|site| site.closest(x));
+        let closest = sites.min_by(|a, b| distance_squared(a, x).total_cmp(&distance_squared(b, x))).unwrap_or(self.ball.centre);
+        let length = distance_squared(&closest, x).sqrt();
+        if length > self.grown { between(&closest, x, self.grown / length) } else { *x }
     }
 
     /// The corners of the triangle that it is exactly; `None` for anything else, and for a triangle without area.

@@ -41,6 +41,11 @@ pub struct CellPair {
     pub first_cell: Ball,
     /// A ball that contains the second, or the part of a primitive that the shape may come near to.
     pub second_cell: Ball,
+    /// A point of each. Of given triangles, segments and points, and of primitives, it is the nearest to the other cell's; of other cells it is the one that their address leads to,
+    /// wherever in the cell that is.
+    pub points: [Point; 2],
+    /// How far these may be off, in mm: rounding.
+    pub off_mm: [f64; 2],
     /// Their distance lies in this interval, in mm.
     pub distance_mm: Interval,
 }

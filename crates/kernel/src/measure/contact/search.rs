@@ -18,7 +18,7 @@ use super::pieces::{Pieces, Relation};
 use super::place::{Found, places};
 use super::tree::{NodeId, Tree};
 use super::{CellPair, Contact, ContactError, ContactQuery};
-use crate::attractor::cell::Ball;
+use crate::attractor::cell::{Ball, Point};
 use crate::budget::Budget;
 use crate::measure::Interval;
 use crate::order::ordered_by;
@@ -306,12 +306,32 @@ impl<'a> Search<'a> {
             let ball = self.tree(side).node(pair.nodes[side]).body.ball;
             Ball { radius: ball.radius + self.slack, ..ball }
         };
+        let (points, off_mm) = self.witnesses(pair);
         CellPair {
             first: self.tree(0).address(pair.nodes[0]).unwrap_or_default(),
             second: self.tree(1).address(pair.nodes[1]),
             first_cell: ball(0),
             second_cell: ball(1),
+            points,
+            off_mm,
             distance_mm: pair.distance_mm,
         }
+    }
+
+    /// A point of each of two cells, and how far each may be off.
+    fn witnesses(&self, pair: &Found) -> ([Point; 2], [f64; 2]) {
+        let bodies = [0, 1].map(|side| &self.tree(side).node(pair.nodes[side]).body);
+        let (x, y) = bodies[0].closest(bodies[1]);
+        let located = [0, 1].map(|side| if bodies[side].is_its_sites() { None } else { self.tree(side).some_point(pair.nodes[side]) });
+        // Where no point is found of a cell whose sites are only near to it, one of them is told with how near.
+        let off = |side: usize| located[side].map_or(bodies[side].error + self.slack, |(_, off)| off);
+        let points = match located.map(|found| found.map(|(point, _)| point)) {
+            [Some(first), Some(second)] => [first, second],
+            [Some(first), None] => [first, bodies[1].nearest(&first)],
+            [None, Some(second)] => [bodies[0].nearest(&second), second],
+            [None, None] if bodies[0].is_its_sites() => [x, bodies[1].nearest(&x)],
+            [None, None] => [x, y],
+        };
+        (points, [off(0), off(1)])
     }
 }

@@ -2,7 +2,7 @@
 
 use super::body::{Body, Nature, ball_of_box, least, most};
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, dot};
-use crate::attractor::{Address, Attractor, StateBound, rounding};
+use crate::attractor::{Address, Attractor, StateBound, point_at, rounding};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
 use std::collections::VecDeque;
@@ -206,6 +206,13 @@ impl<'a> Tree<'a> {
             id = children.start;
         }
         id
+    }
+
+    /// A point of the shape in a cell, and how far it may be off; none where rounding leaves none, and of what is no cell.
+    pub(super) fn some_point(&self, id: NodeId) -> Option<(Point, f64)> {
+        // The work follows the length of the address, which is bounded.
+        let found = point_at(self.attractor?, &self.address(id)?, &Budget::default()).ok()?;
+        Some((found.point, found.bound_mm))
     }
 
     /// The address of a cell; none of what is no cell.

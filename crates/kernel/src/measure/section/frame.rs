@@ -63,6 +63,12 @@ impl PlaneFrame {
         point.dot(self.normal)
     }
 
+    /// The point of space with these coordinates in the plane of an offset.
+    #[must_use]
+    pub fn point(&self, [u, v]: [f64; 2], offset: f64) -> DVec3 {
+        self.u * u + self.v * v + self.normal * offset
+    }
+
     /// Least and greatest coordinates (u, v, offset) of points: every section of a mesh lies between those of its vertices, up to
     /// rounding. `None` without points.
     #[must_use]

@@ -29,11 +29,13 @@
 //! ```
 
 mod frame;
+mod level;
 mod nesting;
 mod ring;
 mod stabbing;
 
 pub use frame::{NoDirection, PlaneFrame};
+pub use level::{Grazed, grazed};
 
 use crate::budget::{Budget, Stopped};
 use crate::error::Kind;
