@@ -12,6 +12,7 @@
 //! | `independent` | do other people's libraries find in the files what the cases and the certificates say? |
 //! | `levels` | are levels of systems the solids that closed forms say? |
 //! | `measures` | are dimensions, centroids and inertia those of closed forms? |
+//! | `progress` | is the error bound that was reached told while a job runs? |
 //! | `properties` | do the laws of dilation hold on random sets, against brute force? |
 //! | `regression` | do other repositories learn when their parts change? |
 //! | `remote` | does the command line at a service leave what it leaves here? |
@@ -61,6 +62,7 @@ mod plans;
 mod polygons;
 mod previews;
 mod processes;
+mod progress;
 mod properties;
 mod regression;
 mod remote;

@@ -139,6 +139,8 @@ fn beyond() -> Vec<(Value, &'static str)> {
         limited("solidify", "meshes/cube_open", &lattice, &triangles(40_000), "tolerance_mm"),
         limited("evaluate", "nurbs/torus", &evaluated(0.0005), &json!({ "cells": 20_000 }), "tolerance_mm"),
         limited("evaluate", "ifs/sierpinski_tetrahedron", &evaluated(0.05), &json!({ "cells": 5000 }), "tolerance_mm"),
+        limited("solidify", "ifs/sierpinski_tetrahedron", &plain(0.33, 2.0), &json!({ "cells": 10 }), "cells"),
+        limited("solidify", "curves/circle", &plain(0.002, 1.0), &json!({ "cells": 10_000 }), "tolerance_mm"),
         limited("evaluate", "nurbs/torus", &evaluated(0.0002), &json!({ "memory_bytes": 4_000_000 }), "tolerance_mm"),
     ]
 }

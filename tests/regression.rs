@@ -94,6 +94,141 @@ fn a_repository_blesses_its_parts_and_learns_when_they_change() {
     ends_with(&at(folder, None, &["verify", "parts"]), 1, "blessed.json");
 }
 
+/// The rows of the one case of a report.
+fn rows(output: &Output) -> Vec<Value> {
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {}", words(output)));
+    report["cases"][0]["rows"].as_array().unwrap().clone()
+}
+
+#[track_caller]
+fn row<'r>(rows: &'r [Value], field: &str) -> &'r Value {
+    rows.iter().find(|row| row["field"] == field).unwrap_or_else(|| panic!("{field} is not among {rows:?}"))
+}
+
+/// A part in a folder of its own, with its expectations, and what its text is made of it.
+fn rewrite(path: &Path, change: impl FnOnce(String) -> String) {
+    let before = fs::read_to_string(path).unwrap();
+    let after = change(before.clone());
+    assert_ne!(before, after);
+    fs::write(path, after).unwrap();
+}
+
+#[test]
+fn shapes_bytes_and_times_are_stated_where_that_is_asked_for() {
+    let scratch = repository();
+    let folder = scratch.path();
+    let expected = folder.join("parts/rail/expected.toml");
+    let before = fs::read_to_string(&expected).unwrap();
+    let bless = |more: &[&str]| at(folder, None, &[&["bless", "parts", "--filter", "rail", "--reason", "as \"drawn\""], more].concat());
+    ends_with(&bless(&[]), 1, "1 of 1");
+    assert_eq!(fs::read_to_string(&expected).unwrap(), before, "nobody asked for more");
+    ends_with(&bless(&["--digest", "xyz"]), 2, "xyz");
+    ends_with(&bless(&["--shape", "0"]), 2, "--shape");
+    ends_with(&bless(&["--shape", "0.8", "--digest", "stl", "--digest", "3mf", "--perf", "600"]), 1, "[shape], [digest], [perf] written");
+    let stated = fs::read_to_string(&expected).unwrap();
+    assert!(stated.starts_with(&before), "{stated}");
+    let read: toml::Table = toml::from_str(&stated).unwrap();
+    for table in ["shape", "digest", "perf"] {
+        assert_eq!(read[table]["reason"].as_str(), Some("as \"drawn\""), "{stated}");
+        assert!(read[table]["source"].as_str().unwrap().contains("kernel 0.1.0, 20"), "{stated}");
+    }
+    assert_eq!(read["perf"]["gating"].as_bool(), Some(false));
+    let output = at(folder, None, &["verify", "parts", "--filter", "rail", "--json"]);
+    ends_with(&output, 0, "");
+    let all = rows(&output);
+    for field in ["shape", "digest stl", "digest 3mf"] {
+        assert_eq!((&row(&all, field)["standing"], &row(&all, field)["passed"]), (&json!("passed"), &json!(true)));
+    }
+    // The coarse reference is as far as its tolerance at most, and not the part itself.
+    let distance = row(&all, "shape")["difference"].as_f64().unwrap();
+    assert!(distance > 0.01 && distance <= 0.8, "{distance}");
+    assert_eq!(row(&all, "perf seconds")["standing"], "reported");
+    // Asked for once more they take the place of what was there.
+    ends_with(&bless(&["--digest", "stl", "--perf", "700"]), 1, "[digest], [perf] written");
+    let again: toml::Table = toml::from_str(&fs::read_to_string(&expected).unwrap()).unwrap();
+    assert_eq!((again["perf"]["seconds"].as_float(), &again["shape"]), (Some(700.0), &read["shape"]));
+    assert_eq!(again["digest"]["outputs"].as_table().unwrap().len(), 1);
+}
+
+/// The tables of one part, blessed, to be changed.
+fn stated() -> (Scratch, std::path::PathBuf) {
+    let scratch = repository();
+    let words = ["bless", "parts", "--filter", "rail", "--reason", "r", "--shape", "0.8", "--digest", "stl", "--perf", "600"];
+    ends_with(&at(scratch.path(), None, &words), 1, "written");
+    let expected = scratch.join("parts/rail/expected.toml");
+    (scratch, expected)
+}
+
+#[test]
+fn another_shape_other_bytes_and_another_version_are_told_apart() {
+    let (scratch, expected) = stated();
+    let folder = scratch.path();
+    let verify = |more: &[&str]| at(folder, None, &[&["verify", "parts", "--filter", "rail"], more].concat());
+    let original = fs::read_to_string(&expected).unwrap();
+    let digest = original.split("stl = \"sha256:").nth(1).unwrap()[..64].to_owned();
+    // Other bytes by the same version.
+    rewrite(&expected, |text| text.replace(&digest, &"0".repeat(64)));
+    ends_with(&verify(&["--junit", "report.xml"]), 1, "digest stl");
+    let report = fs::read_to_string(scratch.join("report.xml")).unwrap();
+    assert!(report.contains("failures=\"1\"") && report.contains("digest stl"), "{report}");
+    // By another version they are not compared, which is neither a pass nor a failure, and is told by every kind of report.
+    rewrite(&expected, |text| text.replace("kernel_version = \"0.1.0\"", "kernel_version = \"0.0.9\""));
+    let output = verify(&["--json", "--junit", "report.xml"]);
+    ends_with(&output, 0, "");
+    let all = rows(&output);
+    let told = row(&all, "digest stl");
+    assert_eq!((&told["standing"], &told["passed"]), (&json!("not_compared"), &json!(false)), "{told}");
+    ends_with(&verify(&[]), 0, "1 comparisons not made");
+    ends_with(&verify(&[]), 0, "not compared: made by kernel 0.1.0, and the digest is of 0.0.9");
+    let report = fs::read_to_string(scratch.join("report.xml")).unwrap();
+    assert!(report.contains("failures=\"0\"") && report.contains("<system-out>") && report.contains("not compared"), "{report}");
+    // Nearer than the reference is, and another part than the one that was approved of.
+    fs::write(&expected, original.replace("within_mm = 0.8", "within_mm = 0.0001")).unwrap();
+    ends_with(&verify(&[]), 1, "within 0.0001 mm of reference.stl");
+    fs::write(&expected, original.replace("radius_mm = 2", "radius_mm = 3")).unwrap();
+    let output = verify(&["--json"]);
+    ends_with(&output, 1, "");
+    let all = rows(&output);
+    let shape = row(&all, "shape");
+    assert_eq!(shape["standing"], "failed");
+    assert!(shape["difference"].as_f64().unwrap() > 0.8 && shape["got"].as_str().unwrap().starts_with('['), "{shape}");
+    // What is not there has not passed.
+    fs::write(&expected, &original).unwrap();
+    fs::remove_file(scratch.join("parts/rail/reference.stl")).unwrap();
+    ends_with(&verify(&[]), 1, "reference.stl");
+}
+
+#[test]
+fn time_decides_only_where_the_file_says_so_and_tables_are_held_to_their_grammar() {
+    let (scratch, expected) = stated();
+    let verify = || at(scratch.path(), None, &["verify", "parts", "--filter", "rail"]);
+    let original = fs::read_to_string(&expected).unwrap();
+    // No machine does it in so short a time.
+    let hurried = original.replace("seconds = 600.0", "seconds = 1e-9");
+    fs::write(&expected, &hurried).unwrap();
+    ends_with(&verify(), 0, "OVER THE BUDGET");
+    fs::write(&expected, hurried.replace("gating = false", "gating = true")).unwrap();
+    ends_with(&verify(), 1, "perf seconds");
+    // Whether it does is kept by a blessing, which never makes it so.
+    let words = ["bless", "parts", "--filter", "rail", "--reason", "r", "--perf", "500"];
+    ends_with(&at(scratch.path(), None, &words), 1, "[perf] written");
+    assert!(fs::read_to_string(&expected).unwrap().contains("gating = true"));
+    ends_with(&verify(), 0, "0 failed");
+    for (from, to, word) in [
+        ("seconds = 600.0", "seconds = nan", "a time above zero"),
+        ("within_mm = 0.8", "within_mm = inf", "a length in mm above zero"),
+        ("within_mm = 0.8", "within = 0.8", "within"),
+        ("reference = \"reference.stl\"", "reference = \"../reference.stl\"", "beside expected.toml"),
+        ("[shape]", "[shapes]", "shapes"),
+        ("sha256:", "md5:", "64 hex digits"),
+        ("gating = false", "gating = \"no\"", "gating"),
+    ] {
+        fs::write(&expected, original.replacen(from, to, 1)).unwrap();
+        assert_ne!(original, fs::read_to_string(&expected).unwrap(), "{from}");
+        ends_with(&verify(), 1, word);
+    }
+}
+
 #[test]
 fn a_service_verifies_as_this_machine_does() {
     let (scratch, data) = (repository(), Scratch::new());
@@ -106,13 +241,15 @@ fn a_service_verifies_as_this_machine_does() {
     edit(&scratch.join("parts/rail/blessed.json"), |value| value["certificate"]["genus"] = json!(7));
     ends_with(&at(scratch.path(), Some(&service), &["verify", "parts"]), 1, "blessed genus");
     // Refusals, solutions, points at addresses and jobs with files, from our own cases.
-    for case in ["malformed", "bcifs/free", "curves/beta_spline", "meshes", "jobs/boxes"] {
+    for case in ["malformed", "bcifs/free", "curves/beta_spline", "meshes", "jobs/boxes", "jobs/bracket"] {
         let here = at(&root(), None, &["verify", "fixtures", "--filter", case, "--json"]);
         let there = at(&root(), Some(&service), &["verify", "fixtures", "--filter", case, "--json"]);
         assert!(here.status.success() && there.status.success(), "{case}: {}\n{}", words(&here), String::from_utf8_lossy(&there.stderr));
         let rows = |output: &Output| -> Vec<Value> {
             let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-            report["cases"].as_array().unwrap().iter().map(|case| case["rows"].clone()).collect()
+            let rows = report["cases"].as_array().unwrap().iter().flat_map(|case| case["rows"].as_array().unwrap().clone());
+            // How long it takes is another number every time.
+            rows.filter(|row| row["field"] != "perf seconds").collect()
         };
         assert_eq!(rows(&here), rows(&there), "{case}");
     }

@@ -2,9 +2,10 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use lacuna_tests::support::binary::{run, succeed};
+use lacuna_tests::support::binary::{lacuna, run, succeed};
 use lacuna_tests::support::cases::model;
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::{Service, until};
@@ -184,6 +185,9 @@ fn what_trades_know_has_sources() {
     assert_eq!(service.get("/v1/profiles/knitting").status, 404);
     assert_eq!(run(["profiles", "knitting"]).status.code(), Some(2));
     let capabilities = service.get("/v1/capabilities").json();
+    // What `sha256sum` says of the program is what the service says of itself.
+    let told = Command::new("sha256sum").arg(lacuna()).output().unwrap().stdout;
+    assert_eq!(capabilities["build"], json!(format!("sha256:{}", &String::from_utf8(told).unwrap()[..64])));
     assert_eq!(capabilities["profiles"], json!(["cast", "panels", "sla"]));
     assert!(capabilities["kinds"].as_array().unwrap().contains(&json!("convert")) && capabilities["limits"]["upload_bytes"] == 256 << 20);
 }
@@ -230,6 +234,12 @@ fn a_file_is_told_in_parts_and_by_its_tag() {
     let ranged = |name: &str, value: &str| service.get_with(&path, &[("range", "bytes=0-9"), (name, value)]).status;
     assert_eq!((ranged("if-range", &tag), ranged("if-range", "\"another\""), ranged("if-range", &format!("W/{tag}"))), (206, 200, 200));
     assert_eq!((ranged("if-none-match", &tag), ranged("if-none-match", "\"another\"")), (304, 206));
+    // What is not sent has a length that is not 0, so none is told; the connection goes on all the same.
+    for method in ["GET", "HEAD"] {
+        let unsent = service.request(method, &path, &[("if-none-match", &tag)], b"");
+        assert_eq!((unsent.status, unsent.header("etag"), unsent.header("content-length")), (304, tag.as_str(), ""), "{method}");
+        assert_eq!(unsent.header("transfer-encoding"), "", "{method}");
+    }
     assert_eq!((ranged("if-match", &tag), ranged("if-match", "*"), ranged("if-match", "\"another\"")), (206, 206, 412));
     assert_eq!(ranged("range", "bytes=20-29"), 200, "of two ranges neither is the one that is meant");
     let refused = service.get_with(&path, &[("if-match", "\"another\"")]).json();

@@ -22,6 +22,7 @@ pub mod openapi;
 pub mod orders;
 pub mod problem;
 pub mod production;
+pub mod program;
 pub mod questions;
 pub mod routes;
 pub mod store;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lacuna_fabrication::Plan;
-use lacuna_kernel::budget::{Budget, CancelToken, Limits};
+use lacuna_kernel::budget::{Budget, Limits};
 use serde::{Deserialize, Serialize};
 
 use crate::addresses;
@@ -110,7 +110,7 @@ fn text(answer: &impl Serialize) -> Result<String, Problem> {
 /// The work's own, or that there is no thread to watch the time.
 pub fn watched<T, E: From<Problem>>(time: Duration, work: impl FnOnce(&Budget) -> Result<T, E>) -> Result<T, E> {
     let limits = Limits { seconds: time.as_secs_f64(), ..Limits::default() };
-    let budget = Budget { limits, cancel: CancelToken::new(), progress: None };
+    let budget = Budget { limits, ..Budget::default() };
     let _watchdog = Watchdog::start(&budget.cancel, limits.seconds).map_err(|error| Problem::io("no thread", &error))?;
     work(&budget)
 }
@@ -120,7 +120,7 @@ pub fn watched<T, E: From<Problem>>(time: Duration, work: impl FnOnce(&Budget) -
 /// # Errors
 /// The kernel's refusal, with pointers into the job document.
 pub fn predict(engine: Engine, job: &lacuna_fabrication::Job, time: Duration) -> Result<Plan, Problem> {
-    let budget = Budget { limits: job.limits, cancel: CancelToken::new(), progress: None };
+    let budget = Budget { limits: job.limits, ..Budget::default() };
     let _watchdog = Watchdog::start(&budget.cancel, time.as_secs_f64()).map_err(|error| Problem::io("no thread", &error))?;
     (engine.plan)(job, &budget).map_err(|problem| production::why_stopped(&budget).unwrap_or_else(|| problem.under_model()))
 }

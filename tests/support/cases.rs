@@ -115,6 +115,12 @@ pub struct Expected {
     pub point: BTreeMap<String, Point>,
     /// The refusal instead.
     pub refused: Option<Refused>,
+    /// The distance from a reference mesh.
+    pub shape: Option<toml::Value>,
+    /// The bytes of outputs.
+    pub digest: Option<toml::Value>,
+    /// The budget of time.
+    pub perf: Option<toml::Value>,
     /// Values chosen for free parameters.
     #[serde(default)]
     pub values: BTreeMap<String, f64>,

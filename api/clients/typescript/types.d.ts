@@ -172,6 +172,7 @@ export interface Cage {
 
 /** What the service can do. */
 export interface Capabilities {
+  /** `sha256:` digest of the program that answers: services that tell the same run the same build. Absent where the system does not let it be read. */ build?: string | null;
   /** Output formats. */ formats: Array<FormatCapability>;
   /** The kernel's version: the same input and version give the same bytes. */ kernel_version: string;
   /** Kinds of jobs. */ kinds: Array<JobKind>;
@@ -612,7 +613,7 @@ export type JobKind = "evaluate" | "solidify" | "measure" | "intersect" | "slice
 
 /** What a job may use. Each limit that is absent is the service's default. */
 export interface JobLimits {
-  /** Leaf cells that the evaluation may produce. */ cells?: number;
+  /** Leaf cells that may be expanded: of an evaluation all of the shape's, of each dilation those that its surface needs, one again in every block of its lattice. A comparison of shapes looks at no more nodes than this, and ends there with what it knows. */ cells?: number;
   /** Length of the longest address. */ depth?: number;
   /** Accounted memory in bytes. */ memory_bytes?: number;
   /** Bytes of all files of the result, the certificate aside. */ output_bytes?: number;
@@ -717,7 +718,7 @@ export interface LimitCapability {
   /** Jobs that a batch may have. */ batch_jobs: number;
   /** Bytes of a JSON body. */ body_bytes: number;
   /** Other calls per minute and key. */ calls_per_minute: number;
-  /** Most leaf cells of a job. */ cells: number;
+  /** Most leaf cells that a job may expand. */ cells: number;
   /** Longest address. */ depth: number;
   /** Hours after that for which an expired job is still known. */ expired_hours: number;
   /** Unfinished jobs that one key may have. */ jobs_per_key: number;
@@ -977,6 +978,7 @@ export interface PlaceStatement {
 
 /** What a job is predicted to cost. */
 export interface Plan {
+  /** Leaf cells against which the limit of cells is held: of an evaluation all of the shape's, of a dilation those that its surface needs, one again in every block of the lattice that needs it. Of several solids those of the largest, as each is held against the limit by itself. */ counted_cells?: number;
   /** Triangles against which the limit of triangles is held: those of the lattices as they are first made. */ counted_triangles?: number;
   /** Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan takes as long for, are not in it. `null` where they are not predicted: comparisons, sections, and what is searched for besides (`stability`, `thickness`, `oriented_box`, the other surface of a wall, the closing of gaps). */ cpu_seconds?: number | null;
   exceeds?: Excess | null;
@@ -1235,9 +1237,10 @@ export interface State {
 
 /** How far a running job has come. */
 export interface Step {
+  /** The error bound, in mm, that is proven of what has been made so far; absent as long as none is. At the end it is the certificate's `achieved_bound_mm`. */ bound_mm?: number | null;
   /** Triangles or cells made so far, by phase. */ count: number;
   /** Share of the phase that is done, in [0, 1]. */ fraction: number;
-  /** `validate`, `refine`, `dilate`, `stitch`, `verify` or `write`. */ phase: string;
+  /** `validate`, `refine`, `dilate`, `stitch`, `verify`, `combine`, `intersect`, `compare`, `section`, `stability`, `certify` or `write`. */ phase: string;
 }
 
 /** The limit surface of a subdivision scheme on a polygon mesh that is a manifold, with or without boundary. */

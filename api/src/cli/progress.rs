@@ -72,13 +72,17 @@ fn bar_line(progress: &Progress, elapsed: Duration) -> String {
     let filled = (fraction * WIDTH as f64) as usize;
     let bar = format!("{}{}", "#".repeat(filled), "-".repeat(WIDTH - filled));
     let (phase, count) = (progress.phase, progress.count);
-    format!("\r\x1b[K{phase:>9} [{bar}] {:3.0} %  {count}  {:.1} s", fraction * 100.0, elapsed.as_secs_f64())
+    let bound = progress.bound_mm.map(|bound| format!("  within {bound:.3e} mm")).unwrap_or_default();
+    format!("\r\x1b[K{phase:>9} [{bar}] {:3.0} %  {count}{bound}  {:.1} s", fraction * 100.0, elapsed.as_secs_f64())
 }
 
 fn json_line(progress: &Progress, elapsed: Duration) -> String {
-    let value = serde_json::json!({
+    let mut value = serde_json::json!({
         "phase": progress.phase, "fraction": progress.fraction, "count": progress.count, "elapsed_s": elapsed.as_secs_f64(),
     });
+    if let Some(bound_mm) = progress.bound_mm {
+        value["bound_mm"] = bound_mm.into();
+    }
     format!("{value}\n")
 }
 
@@ -88,10 +92,14 @@ mod tests {
 
     #[test]
     fn lines_say_phase_share_and_count() {
-        let progress = Progress { phase: "dilate", fraction: 0.5, count: 12 };
+        let progress = Progress { phase: "dilate", fraction: 0.5, count: 12, bound_mm: None };
         let bar = bar_line(&progress, Duration::from_secs(2));
         assert!(bar.contains("dilate") && bar.contains("############------------") && bar.contains("50 %") && bar.contains("12"));
-        assert!(json_line(&progress, Duration::ZERO).ends_with("}\n"));
-        assert!(bar_line(&Progress { phase: "x", fraction: 7.0, count: 0 }, Duration::ZERO).contains("100 %"));
+        assert!(!bar.contains("within") && !json_line(&progress, Duration::ZERO).contains("bound_mm"), "nothing is proven yet");
+        let proven = Progress { bound_mm: Some(0.125), ..progress };
+        assert!(bar_line(&proven, Duration::ZERO).contains("within 1.250e-1 mm"));
+        let line = json_line(&proven, Duration::ZERO);
+        assert!(line.contains(r#""bound_mm":0.125"#) && line.ends_with("}\n"), "{line}");
+        assert!(bar_line(&Progress { phase: "x", fraction: 7.0, count: 0, bound_mm: None }, Duration::ZERO).contains("100 %"));
     }
 }

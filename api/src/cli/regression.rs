@@ -15,7 +15,7 @@ use super::{DOCUMENT_BYTES, print, print_json, read_input};
 use crate::digest::Digest;
 use crate::problem::{Problem, ProblemKind};
 use crate::verify::difference::{self, Difference, Verdict};
-use crate::verify::{self, Here, Performer};
+use crate::verify::{self, Here, Performer, Wanted};
 use crate::{documents, files};
 
 /// The Hausdorff distance of two meshes is found to this share of what it may be.
@@ -50,7 +50,11 @@ pub(super) fn verify(args: &VerifyArgs, manner: Manner<'_>) -> Result<(), Proble
 
 /// `lacuna bless`. It never succeeds: whoever has just written what is expected has verified nothing.
 pub(super) fn bless(args: &BlessArgs, manner: Manner<'_>) -> Result<(), Problem> {
-    let cases = at_work(manner, |performer| verify::bless(&args.folder, args.filter.as_deref(), &args.reason, performer))?;
+    let wanted = Wanted { shape_mm: args.shape, digests: args.digest.clone(), perf_seconds: args.perf };
+    for name in &wanted.digests {
+        documents::format(name).map_err(|problem| Problem { kind: ProblemKind::Usage, ..problem })?;
+    }
+    let cases = at_work(manner, |performer| verify::bless(&args.folder, args.filter.as_deref(), &args.reason, &wanted, performer))?;
     if args.json {
         print_json(&json!({ "cases": cases }))?;
     } else {
@@ -66,6 +70,10 @@ pub(super) fn bless(args: &BlessArgs, manner: Manner<'_>) -> Result<(), Problem>
                 (None, Some(differences)) => {
                     let _ = write!(text, "blessed      {}\n{}", case.case, difference::table(differences));
                 }
+            }
+            if !case.stated.is_empty() {
+                let tables: Vec<String> = case.stated.iter().map(|name| format!("[{name}]")).collect();
+                let _ = writeln!(text, "             {} written into expected.toml", tables.join(", "));
             }
         }
         print(text.as_bytes())?;

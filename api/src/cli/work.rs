@@ -371,7 +371,7 @@ fn watched<T>(
 /// Works within the limits of a job, until its token is fired.
 fn limited<T>(job: &Job, token: &CancelToken, manner: Manner<'_>, work: impl FnOnce(&Budget) -> Result<T, Problem>) -> Result<T, Problem> {
     let reporter = Reporter::new(manner.progress, manner.quiet);
-    let budget = Budget { limits: job.limits, cancel: token.clone(), progress: reporter.sink() };
+    let budget = Budget { limits: job.limits, cancel: token.clone(), progress: reporter.sink(), ..Budget::default() };
     let _watchdog =
         Watchdog::start(&budget.cancel, job.limits.seconds).map_err(|error| Problem::io("no thread to watch the time", &error))?;
     work(&budget).map_err(|problem| production::why_stopped(&budget).unwrap_or(problem))

@@ -1,7 +1,9 @@
 //! Headers and queries with a meaning of their own: `Prefer`, `Idempotency-Key`, `If-None-Match`, pages.
 
+use std::convert::Infallible;
 use std::time::Duration;
 
+use axum::body::{Body, Bytes};
 use axum::extract::{FromRequestParts, Query};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, header};
@@ -69,6 +71,11 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<Digest>, Problem> {
         return refused(format!("the Idempotency-Key has {} characters; it has 1 to 255", value.len()));
     }
     Ok(Some(Digest::of(value.as_bytes())))
+}
+
+/// No body, and nothing about its length: the length of what is not sent is not 0, and an empty body of known length would be announced so to a `HEAD`.
+pub fn untold() -> Body {
+    Body::from_stream(futures_util::stream::empty::<Result<Bytes, Infallible>>())
 }
 
 /// Whether the client has this already (`If-None-Match`).

@@ -4,7 +4,7 @@ use axum::body::Body;
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::headers::{check_match, is_known};
+use super::headers::{check_match, is_known, untold};
 use crate::jobs::record::Output;
 use crate::problem::{Problem, ProblemKind};
 use crate::store::{File, Store};
@@ -58,6 +58,7 @@ pub async fn answer(request: &HeaderMap, store: &Store, file: File, output: &Out
     immutable_headers(response.headers_mut(), output, &etag)?;
     if is_known(request, &etag) {
         *response.status_mut() = StatusCode::NOT_MODIFIED;
+        *response.body_mut() = untold();
         return Ok(response);
     }
     // A range of another version must not be glued to this one.

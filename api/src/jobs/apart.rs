@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use lacuna_exchange::format::Format;
-use lacuna_kernel::budget::{Budget, CancelToken, Limits, Progress};
+use lacuna_kernel::budget::{Budget, Limits, Progress};
 
 use super::making::{self, Task, Workshop};
 use super::memory;
@@ -177,7 +177,7 @@ impl Workshop for Desk {
         self.say(&begun).map_err(|error| Problem::io("stdout", &error))?;
         let said = Arc::clone(&self.said);
         let sink = move |progress: &Progress| tell(&said, progress);
-        Ok(Budget { limits, cancel: CancelToken::new(), progress: Some(Arc::new(sink)) })
+        Ok(Budget { limits, progress: Some(Arc::new(sink)), ..Budget::default() })
     }
 
     fn new_file(&self) -> io::Result<PendingFile> {

@@ -138,7 +138,8 @@ impl LiveJob {
         let mut last = crate::locked(&self.last_progress);
         let mut record = crate::locked(&self.record);
         let same_phase = record.view.progress.as_ref().is_some_and(|known| known.phase == step.phase);
-        if same_phase && last.is_some_and(|last| now.duration_since(last) < PROGRESS_EVERY) {
+        let first_bound = step.bound_mm.is_some() && record.view.progress.as_ref().is_none_or(|known| known.bound_mm.is_none());
+        if same_phase && !first_bound && last.is_some_and(|last| now.duration_since(last) < PROGRESS_EVERY) {
             return;
         }
         *last = Some(now);

@@ -83,17 +83,20 @@ pub struct Output {
 /// How far a running job has come.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Step {
-    /// `validate`, `refine`, `dilate`, `stitch`, `verify` or `write`.
+    /// `validate`, `refine`, `dilate`, `stitch`, `verify`, `combine`, `intersect`, `compare`, `section`, `stability`, `certify` or `write`.
     pub phase: String,
     /// Share of the phase that is done, in [0, 1].
     pub fraction: f64,
     /// Triangles or cells made so far, by phase.
     pub count: u64,
+    /// The error bound, in mm, that is proven of what has been made so far; absent as long as none is. At the end it is the certificate's `achieved_bound_mm`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub bound_mm: Option<f64>,
 }
 
 impl From<&Progress> for Step {
     fn from(progress: &Progress) -> Self {
-        Self { phase: progress.phase.to_owned(), fraction: progress.fraction, count: progress.count }
+        Self { phase: progress.phase.to_owned(), fraction: progress.fraction, count: progress.count, bound_mm: progress.bound_mm }
     }
 }
 
@@ -275,4 +278,20 @@ pub struct Answer {
     pub outputs: Vec<Output>,
     /// What is proven of them.
     pub certificate: Certificate,
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn steps_of_earlier_versions_are_read_and_bounds_come_through() {
+        let before = r#"{"phase":"dilate","fraction":0.5,"count":3}"#;
+        let read: Step = serde_json::from_str(before).unwrap();
+        assert_eq!(read.bound_mm, None);
+        assert_eq!(serde_json::to_string(&read).unwrap(), before, "what is not known is not told");
+        let told = Step::from(&Progress { phase: "certify", fraction: 1.0, count: 3, bound_mm: Some(0.1) });
+        assert_eq!(serde_json::from_str::<Step>(&serde_json::to_string(&told).unwrap()).unwrap(), told);
+    }
 }

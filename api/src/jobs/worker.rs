@@ -176,7 +176,7 @@ impl Workshop for Here<'_> {
         *self.watchdog.borrow_mut() = Some(Watchdog::start(&self.job.cancel, limits.seconds).map_err(failed)?);
         let listener = Arc::clone(self.job);
         let sink = move |progress: &Progress| listener.progress(Step::from(progress), std::process::id());
-        Ok(Budget { limits, cancel: self.job.cancel.clone(), progress: Some(Arc::new(sink)) })
+        Ok(Budget { limits, cancel: self.job.cancel.clone(), progress: Some(Arc::new(sink)), ..Budget::default() })
     }
 
     fn new_file(&self) -> io::Result<PendingFile> {

@@ -27,6 +27,9 @@ pub struct Capabilities {
     profiles: Vec<&'static str>,
     /// The kernel's version: the same input and version give the same bytes.
     kernel_version: &'static str,
+    /// `sha256:` digest of the program that answers: services that tell the same run the same build. Absent where the system does not let it be read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    build: Option<String>,
 }
 
 /// An output format.
@@ -57,7 +60,7 @@ pub struct LimitCapability {
     seconds: f64,
     /// Most accounted memory of a job, in bytes.
     memory_bytes: u64,
-    /// Most leaf cells of a job.
+    /// Most leaf cells that a job may expand.
     cells: u64,
     /// Most triangles of a result.
     triangles: u64,
@@ -87,6 +90,8 @@ pub struct LimitCapability {
 )]
 pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
     let config = &state.config;
+    // The first who asks waits for it, and nobody else.
+    let build = tokio::task::spawn_blocking(crate::program::digest).await.ok().flatten().map(|digest| digest.to_string());
     let formats = FORMATS.iter().map(|row| {
         let carries =
             [(row.carries.solid, "solid"), (row.carries.surface, "surface"), (row.carries.wires, "wires"), (row.carries.points, "points")];
@@ -118,5 +123,6 @@ pub async fn capabilities(State(state): State<Shared>) -> Json<Capabilities> {
         library: CLASSICS.iter().map(|classic| classic.name).collect(),
         profiles: PROFILES.iter().map(|profile| profile.name).collect(),
         kernel_version: env!("CARGO_PKG_VERSION"),
+        build,
     })
 }

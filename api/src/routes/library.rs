@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 
 use super::models::MEDIA_TYPE;
 use crate::digest::Digest;
-use crate::http::headers::is_known;
+use crate::http::headers::{is_known, untold};
 use crate::openapi::Model;
 use crate::problem::{Problem, ProblemKind};
 
@@ -70,7 +70,7 @@ pub async fn fetch(Path(name): Path<String>, headers: HeaderMap) -> Result<Respo
     let etag = format!("\"{}\"", Digest::of(document.as_bytes()));
     let shared = [(header::ETAG, etag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
     if is_known(&headers, &etag) {
-        return Ok((StatusCode::NOT_MODIFIED, shared).into_response());
+        return Ok((StatusCode::NOT_MODIFIED, shared, untold()).into_response());
     }
     Ok((shared, [(header::CONTENT_TYPE, MEDIA_TYPE)], document).into_response())
 }

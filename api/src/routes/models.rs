@@ -14,7 +14,7 @@ use crate::documents;
 use crate::files;
 use crate::http::auth::Owner;
 use crate::http::body::{JsonBody, is_json};
-use crate::http::headers::{QueryOf, check_match, is_known, page_cursor, page_length};
+use crate::http::headers::{QueryOf, check_match, is_known, page_cursor, page_length, untold};
 use crate::http::range;
 use crate::http::state::{AppState, Shared};
 use crate::jobs::record::Output;
@@ -134,7 +134,7 @@ pub async fn fetch(
     check_match(&headers, &etag)?;
     let shared = [(header::ETAG, etag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
     if is_known(&headers, &etag) {
-        return Ok((StatusCode::NOT_MODIFIED, shared).into_response());
+        return Ok((StatusCode::NOT_MODIFIED, shared, untold()).into_response());
     }
     Ok((shared, [(header::CONTENT_TYPE, MEDIA_TYPE)], document).into_response())
 }

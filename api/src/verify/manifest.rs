@@ -7,6 +7,8 @@ use std::path::Path;
 use lacuna_fabrication::JobKind;
 use serde::Deserialize;
 
+use super::classes::{Classes, ExpectedDigest, ExpectedPerf, ExpectedShape};
+
 /// A case.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,6 +29,9 @@ pub(super) struct Manifest {
     #[serde(default)]
     pub(super) point: BTreeMap<String, ExpectedPoint>,
     pub(super) refused: Option<Refused>,
+    pub(super) shape: Option<ExpectedShape>,
+    pub(super) digest: Option<ExpectedDigest>,
+    pub(super) perf: Option<ExpectedPerf>,
     /// Values chosen for free parameters.
     #[serde(default)]
     pub(super) values: BTreeMap<String, f64>,
@@ -146,6 +151,11 @@ impl Manifest {
         manifest.check(blessed).map(|()| manifest)
     }
 
+    /// The tables that look at files and at time.
+    pub(super) fn classes(&self) -> Classes<'_> {
+        Classes { shape: self.shape.as_ref(), digest: self.digest.as_ref(), perf: self.perf.as_ref() }
+    }
+
     fn check(&self, blessed: bool) -> Result<(), String> {
         if self.about.trim().is_empty() {
             return Err("`about` is empty".into());
@@ -171,10 +181,17 @@ impl Manifest {
         if of_solve && !solves || solves && (self.bounding_box.is_some() || !self.point.is_empty()) {
             return Err("[values], [entry.*] and refused.pointers belong to `solve`, which has no [box] and no [point.*]".into());
         }
-        let measured = self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some();
+        let classes = self.classes();
+        classes.check()?;
+        if (solves || self.refused.is_some()) && !classes.is_empty() {
+            return Err("[shape], [digest] and [perf] are of results with files: not of `solve`, and not beside [refused]".into());
+        }
+        let measured = classes.state_a_result() || self.exact.is_some() || !self.scalar.is_empty() || self.bounding_box.is_some();
         let states = measured || !self.entry.is_empty() || !self.point.is_empty();
         if states && self.refused.is_some() || !(states || blessed) && self.refused.is_none() {
-            return Err("either [refused], or at least one of [exact], [scalar.*], [entry.*], [point.*] and [box], or a blessing".into());
+            return Err(
+                "either [refused], or at least one of [exact], [scalar.*], [entry.*], [point.*], [shape] and [box], or a blessing".into()
+            );
         }
         let number = |point: &ExpectedPoint| point.relative >= 0.0 && point.value.iter().all(|x| x.is_finite());
         if let Some((address, _)) = self.point.iter().find(|(_, point)| !number(point)) {
@@ -240,6 +257,37 @@ mod tests {
             "stability = true\n[refused]\ncode = \"c\"",
         ] {
             assert!(read(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn tables_of_files_and_time() {
+        let read = |rest: &str| Manifest::read(&format!("{HEAD}[exact]\ngenus = 0\nsource = \"s\"\n{rest}"), false);
+        let why = "source = \"s\"\nreason = \"r\"\n";
+        let shape = format!("[shape]\nreference = \"a.stl\"\nwithin_mm = 0.5\n{why}");
+        let digest = format!("[digest]\nkernel_version = \"1\"\noutputs = {{stl = \"sha256:{}\"}}\n{why}", "0".repeat(64));
+        let perf = format!("[perf]\nseconds = 1\ngating = true\n{why}");
+        assert!(read(&format!("{shape}{digest}{perf}")).is_ok());
+        assert!(Manifest::read(&format!("{HEAD}{shape}"), false).is_ok(), "a shape is a result");
+        for bad in [
+            shape.replace("0.5", "0"),
+            shape.replace("0.5", "nan"),
+            shape.replace("a.stl", "../a.stl"),
+            shape.replace("reference", "file"),
+            shape.replace(why, "source = \"s\"\n"),
+            format!("{shape}format = \"svg\"\n"),
+            digest.replace("sha256:0", "sha256:"),
+            digest.replace("{stl", "{png5"),
+            digest.replace("kernel_version", "version"),
+            perf.replace("seconds = 1", "seconds = inf"),
+            perf.replace("seconds = 1", "seconds = -1"),
+            perf.replace("gating", "gate"),
+        ] {
+            assert!(read(&bad).is_err(), "{bad}");
+        }
+        for alone in [digest, perf] {
+            assert!(Manifest::read(&format!("{HEAD}{alone}"), false).is_err(), "{alone}");
+            assert!(Manifest::read(&format!("{HEAD}{alone}[refused]\ncode = \"c\""), false).is_err());
         }
     }
 

@@ -3,12 +3,14 @@
 //! The rules are those of `fixtures/README.md`. Verifying never changes a case; [`bless`] is the one that does.
 
 mod blessing;
+mod classes;
 mod compare;
 pub mod difference;
 mod manifest;
 mod performer;
 mod report;
 mod solve;
+mod stating;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,8 +25,9 @@ use crate::problem::{Problem, ProblemKind};
 use blessing::Blessing;
 use difference::Difference;
 use manifest::{CaseKind, Manifest, Refused};
-pub use performer::{Here, Performer, Solution};
-pub use report::{CaseReport, Report, Row};
+pub use performer::{Here, Made, Performer, Solution};
+pub use report::{CaseReport, Report, Row, Standing};
+pub use stating::Wanted;
 
 /// Deepest folder in which cases are looked for.
 const DEEPEST: usize = 16;
@@ -50,22 +53,31 @@ pub struct Blessed {
     /// How the certificate differs from the one that was blessed before; absent if there was none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub differences: Option<Vec<Difference>>,
+    /// The tables that were written into `expected.toml`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stated: Vec<&'static str>,
 }
 
 /// Does every case below a folder whose path contains `filter`, and writes the certificates of those that hold what they state
-/// from sources of their own beside them, with the reason, the time and the version.
+/// from sources of their own beside them, with the reason, the time and the version; into `expected.toml` only the tables that are wanted.
 ///
 /// # Errors
 /// When the reason is empty, the folder cannot be read or holds no case, or a file cannot be written.
-pub fn bless(folder: &Path, filter: Option<&str>, reason: &str, performer: &dyn Performer) -> Result<Vec<Blessed>, Problem> {
+pub fn bless(
+    folder: &Path,
+    filter: Option<&str>,
+    reason: &str,
+    wanted: &Wanted,
+    performer: &dyn Performer,
+) -> Result<Vec<Blessed>, Problem> {
     if reason.trim().is_empty() {
         return Err(Problem::new(ProblemKind::Usage, "--reason is empty: whoever reads the case later must learn why its result is right"));
     }
-    cases(folder, filter)?.iter().map(|case| bless_case(case, name_of(case, folder), reason.trim(), performer)).collect()
+    cases(folder, filter)?.iter().map(|case| bless_case(case, name_of(case, folder), reason.trim(), wanted, performer)).collect()
 }
 
-fn bless_case(folder: &Path, case: String, reason: &str, performer: &dyn Performer) -> Result<Blessed, Problem> {
-    let refused = |why: String| Ok(Blessed { case: case.clone(), refused: Some(why), differences: None });
+fn bless_case(folder: &Path, case: String, reason: &str, wanted: &Wanted, performer: &dyn Performer) -> Result<Blessed, Problem> {
+    let refused = |why: String| Ok(Blessed { case: case.clone(), refused: Some(why), differences: None, stated: Vec::new() });
     let manifest = match Manifest::of(folder, true) {
         Ok(manifest) => manifest,
         Err(error) => return refused(format!("expected.toml: {error}")),
@@ -75,8 +87,8 @@ fn bless_case(folder: &Path, case: String, reason: &str, performer: &dyn Perform
             "only results with a certificate are blessed; a refusal and a solution are stated in full in expected.toml".to_owned(),
         );
     }
-    let (rows, certificate) = rows_of(folder, &manifest, performer);
-    if let Some(row) = rows.iter().find(|row| !row.passed) {
+    let (rows, certificate) = rows_of(folder, &wanted.apart_from(&manifest), performer);
+    if let Some(row) = rows.iter().find(|row| row.failed()) {
         return refused(format!(
             "{} is {}, and {} is expected: what a case states itself no blessing changes",
             row.field, row.got, row.expected
@@ -87,8 +99,18 @@ fn bless_case(folder: &Path, case: String, reason: &str, performer: &dyn Perform
     let before = Blessing::of(folder).ok().flatten();
     let blessing = Blessing::now(reason, certificate);
     let differences = before.map(|before| Ok::<_, Problem>(difference::differences(&before.value()?, &blessing.value()?))).transpose()?;
+    let stated = wanted.tables();
+    if !stated.is_empty() {
+        let job = match job_in(folder, &manifest) {
+            Ok((_, job)) => job,
+            Err(row) => return refused(row.got),
+        };
+        if let Err(why) = wanted.write(folder, &manifest, &job, reason, performer)? {
+            return refused(why);
+        }
+    }
     blessing.keep(folder)?;
-    Ok(Blessed { case, refused: None, differences })
+    Ok(Blessed { case, refused: None, differences, stated })
 }
 
 /// The folders with cases below a folder.
@@ -154,29 +176,50 @@ fn blessing_rows(blessing: Result<Option<Blessing>, String>, certificate: Option
 
 /// The comparisons of a case with what it states itself, and its certificate if it has one.
 fn rows_of(folder: &Path, manifest: &Manifest, performer: &dyn Performer) -> (Vec<Row>, Option<Certificate>) {
-    let name = if manifest.kind == CaseKind::Job { "job.json" } else { "model.json" };
-    let document = match fs::read(folder.join(name)) {
-        Ok(document) => document,
-        Err(error) => return (vec![Row::failure(name, "a readable file", &error.to_string())], None),
+    let (document, job) = match document_of(folder, manifest) {
+        Ok(document) if manifest.kind == CaseKind::Solve => return (solve::rows(&document, manifest, performer), None),
+        Ok(document) => {
+            let job = read_job(folder, &document, manifest);
+            (document, job)
+        }
+        Err(row) => return (vec![row], None),
     };
-    let job = match (manifest.kind, manifest.kind.job()) {
-        (CaseKind::Job, _) => documents::read_job_in(&document, &Limits::default(), Some(folder)),
-        (_, Some(kind)) => job_of(folder, &document, kind, manifest),
-        (_, None) => return (solve::rows(&document, manifest, performer), None),
-    };
-    let result = job.and_then(|job| done(&job, performer));
+    let mut of_classes = Vec::new();
+    let result = job.and_then(|job| done(folder, &job, manifest, performer, &mut of_classes));
     match (&manifest.refused, result) {
         (Some(refused), result) => (vec![compare_refusal(refused, result.map(drop))], None),
         (None, Ok(certificate)) => match serde_json::to_value(&certificate) {
             Ok(got) => {
                 let mut rows = compare::rows(manifest, &got);
                 rows.extend(point_rows(folder, &document, manifest, performer));
+                rows.append(&mut of_classes);
                 (rows, Some(certificate))
             }
             Err(error) => (vec![Row::failure("result", "JSON", &error.to_string())], None),
         },
         (None, Err(problem)) => (vec![Row::failure("result", "a certificate", &told(&problem))], None),
     }
+}
+
+/// The document of a case: its model, or its whole job.
+fn document_of(folder: &Path, manifest: &Manifest) -> Result<Vec<u8>, Row> {
+    let name = if manifest.kind == CaseKind::Job { "job.json" } else { "model.json" };
+    fs::read(folder.join(name)).map_err(|error| Row::failure(name, "a readable file", &error.to_string()))
+}
+
+/// The job of a case that is no `solve`.
+fn read_job(folder: &Path, document: &[u8], manifest: &Manifest) -> Result<Job, Problem> {
+    match manifest.kind.job() {
+        Some(kind) => job_of(folder, document, kind, manifest),
+        None => documents::read_job_in(document, &Limits::default(), Some(folder)),
+    }
+}
+
+/// Both.
+fn job_in(folder: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Job), Row> {
+    let document = document_of(folder, manifest)?;
+    let job = read_job(folder, &document, manifest).map_err(|problem| Row::failure("job", "a job", &told(&problem)))?;
+    Ok((document, job))
 }
 
 /// The case as a job, as any door would make it.
@@ -196,9 +239,16 @@ fn job_of(folder: &Path, document: &[u8], kind: JobKind, manifest: &Manifest) ->
     })
 }
 
-/// Does a job. Its certificate is that of the work alone, whatever files a service makes besides.
-fn done(job: &Job, performer: &dyn Performer) -> Result<Certificate, Problem> {
-    let certificate = performer.certificate(job)?;
+/// Does a job. Its certificate is that of the work alone, whatever files are made besides; those are looked at where the case has something to say of them.
+fn done(folder: &Path, job: &Job, manifest: &Manifest, performer: &dyn Performer, rows: &mut Vec<Row>) -> Result<Certificate, Problem> {
+    let classes = manifest.classes();
+    let certificate = if classes.is_empty() {
+        performer.certificate(job)?
+    } else {
+        let made = performer.made(&classes.with_outputs(job))?;
+        rows.extend(classes.rows(folder, &made, performer));
+        made.certificate
+    };
     Ok(Certificate { input_digest: documents::job_digest(job).to_string(), output_digests: Default::default(), ..certificate })
 }
 

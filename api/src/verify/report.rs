@@ -5,6 +5,20 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+/// What became of a comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Standing {
+    /// It holds.
+    Passed,
+    /// It does not hold.
+    Failed,
+    /// There was nothing to compare with: no pass, and no failure.
+    NotCompared,
+    /// It is told, and decides nothing.
+    Reported,
+}
+
 /// One comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
@@ -20,15 +34,43 @@ pub struct Row {
     /// How much it may differ, if that is a number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub allowed: Option<f64>,
-    /// Whether it holds.
+    /// Whether it holds: false, too, of what was not compared or is only told.
     pub passed: bool,
+    /// What became of it.
+    pub standing: Standing,
 }
 
 impl Row {
     /// A comparison that holds or not, without a distance.
     #[must_use]
     pub fn verdict(field: &str, expected: &str, got: &str, passed: bool) -> Self {
-        Self { field: field.to_owned(), expected: expected.to_owned(), got: got.to_owned(), difference: None, allowed: None, passed }
+        Self::standing(field, expected, got, if passed { Standing::Passed } else { Standing::Failed })
+    }
+
+    /// A comparison and what became of it.
+    #[must_use]
+    pub fn standing(field: &str, expected: &str, got: &str, standing: Standing) -> Self {
+        let passed = standing == Standing::Passed;
+        Self {
+            field: field.to_owned(),
+            expected: expected.to_owned(),
+            got: got.to_owned(),
+            difference: None,
+            allowed: None,
+            passed,
+            standing,
+        }
+    }
+
+    /// Whether it speaks against the case.
+    #[must_use]
+    pub fn failed(&self) -> bool {
+        self.standing == Standing::Failed
+    }
+
+    /// Whether it is to be told though it speaks neither for nor against the case.
+    fn is_noted(&self) -> bool {
+        matches!(self.standing, Standing::NotCompared | Standing::Reported)
     }
 
     /// A comparison that does not hold.
@@ -47,7 +89,7 @@ impl Row {
 
     /// How bad it is: shares of the allowance, and what cannot be measured above all.
     fn badness(&self) -> f64 {
-        match (self.passed, self.difference, self.allowed) {
+        match (!self.failed(), self.difference, self.allowed) {
             (true, Some(difference), Some(allowed)) if allowed > 0.0 => difference / allowed,
             (true, ..) => 0.0,
             (false, Some(difference), Some(allowed)) => 1.0 + difference / allowed.max(f64::MIN_POSITIVE),
@@ -77,8 +119,14 @@ impl CaseReport {
     pub fn new(case: String, about: String, mut rows: Vec<Row>, time: Duration) -> Self {
         rows.sort_by(|a, b| b.badness().total_cmp(&a.badness()));
         // A case that compared nothing has shown nothing.
-        let passed = !rows.is_empty() && rows.iter().all(|row| row.passed);
+        let passed = rows.iter().any(|row| row.passed) && !rows.iter().any(Row::failed);
         Self { case, about, passed, seconds: time.as_secs_f64(), rows }
+    }
+
+    /// What was not compared and what is only told, as a table; nothing without such.
+    fn noted(&self) -> String {
+        let mut noted = self.rows.iter().filter(|row| row.is_noted()).peekable();
+        if noted.peek().is_none() { String::new() } else { compared(noted) }
     }
 }
 
@@ -97,15 +145,20 @@ impl Report {
         for case in &self.cases {
             if case.passed {
                 if !brief {
-                    let _ = writeln!(text, "ok    {} ({} checks, {:.2} s)", case.case, case.rows.len(), case.seconds);
+                    let passed = case.rows.iter().filter(|row| row.passed).count();
+                    let _ = writeln!(text, "ok    {} ({passed} checks, {:.2} s)", case.case, case.seconds);
+                    text.push_str(&case.noted());
                 }
                 continue;
             }
             let _ = writeln!(text, "FAIL  {}: {}", case.case, case.about);
-            text.push_str(&compared(case.rows.iter().filter(|row| !row.passed)));
+            text.push_str(&compared(case.rows.iter().filter(|row| row.failed())));
+            text.push_str(&case.noted());
         }
         let failed = self.cases.iter().filter(|case| !case.passed).count();
-        let _ = writeln!(text, "{} cases, {failed} failed", self.cases.len());
+        let not_compared = self.cases.iter().flat_map(|case| &case.rows).filter(|row| row.standing == Standing::NotCompared).count();
+        let rest = if not_compared > 0 { format!(", {not_compared} comparisons not made") } else { String::new() };
+        let _ = writeln!(text, "{} cases, {failed} failed{rest}", self.cases.len());
         text
     }
 
@@ -121,12 +174,20 @@ impl Report {
         for case in &self.cases {
             let (folder, name) = case.case.rsplit_once('/').unwrap_or(("", &case.case));
             let _ = write!(text, "  <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\"", escaped(folder), escaped(name), case.seconds);
-            if case.passed {
+            let noted = escaped(&case.noted());
+            if case.passed && noted.is_empty() {
                 text.push_str("/>\n");
-            } else {
-                let table = escaped(&compared(case.rows.iter().filter(|row| !row.passed)));
-                let _ = writeln!(text, ">\n    <failure message=\"{}\">\n{table}</failure>\n  </testcase>", escaped(&case.about));
+                continue;
             }
+            text.push_str(">\n");
+            if !case.passed {
+                let table = escaped(&compared(case.rows.iter().filter(|row| row.failed())));
+                let _ = writeln!(text, "    <failure message=\"{}\">\n{table}</failure>", escaped(&case.about));
+            }
+            if !noted.is_empty() {
+                let _ = writeln!(text, "    <system-out>\n{noted}</system-out>");
+            }
+            text.push_str("  </testcase>\n");
         }
         text.push_str("</testsuite>\n");
         text
@@ -193,6 +254,23 @@ mod tests {
         assert_eq!(lines[2].find("expected"), lines[4].find("1 "));
         assert_eq!(lines.last(), Some(&"2 cases, 1 failed"));
         assert!(!report().table(true).contains("fine"));
+    }
+
+    #[test]
+    fn what_was_not_compared_is_told_and_is_no_pass() {
+        let fine = || Row::verdict("f", "1", "1", true);
+        let stale = || Row::standing("digest stl", "a", "not compared: < 2", Standing::NotCompared);
+        let case = |rows| CaseReport::new("a/case".into(), "x".into(), rows, Duration::ZERO);
+        assert!(!case(vec![stale()]).passed, "nothing was compared");
+        let report = Report { cases: vec![case(vec![fine(), stale()])] };
+        assert!(report.cases[0].passed);
+        let table = report.table(false);
+        assert!(table.contains("(1 checks") && table.contains("digest stl") && table.contains("1 comparisons not made"), "{table}");
+        assert!(report.junit().contains("<system-out>") && report.junit().contains("not compared: &lt; 2"));
+        let failed = Report { cases: vec![case(vec![Row::failure("g", "1", "2"), stale()])] };
+        let junit = failed.junit();
+        let failure = &junit[junit.find("<failure").unwrap()..junit.find("</failure>").unwrap()];
+        assert!(!failure.contains("digest") && junit.contains("<system-out>"), "{junit}");
     }
 
     #[test]

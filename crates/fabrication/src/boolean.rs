@@ -27,8 +27,13 @@ pub(crate) fn combine(job: &Job, operation: Operation, tolerance: Tolerance, bud
     let sources = sources(job, budget)?;
     let share = share(&sources, tolerance)?;
     let mut operands = Vec::with_capacity(sources.len());
+    let mut reached_mm = 0.0_f64;
     for (index, source) in sources.iter().enumerate() {
-        operands.push(operand(source, share, budget).map_err(|error| error.of_input(job, index))?);
+        let made = operand(source, share, &budget.aside()).map_err(|error| error.of_input(job, index))?;
+        // That of the solids made so far, in double precision.
+        reached_mm = reached_mm.max(made.statement.inner_bound_mm).max(made.statement.outer_bound_mm);
+        budget.prove(reached_mm);
+        operands.push(made);
     }
     drop(sources);
     budget.report("combine", 0.0, 0);

@@ -86,7 +86,7 @@ pub(crate) fn contact(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
 /// stays within d / 3 of the shape, so it does not meet the surface, and the vertex is inside if and only if the point is.
 fn samples(shape: &Attractor, found: &Contact, budget: &Budget) -> Result<Vec<DVec3>, JobError> {
     let fine = (found.distance_mm.low / 3.0).clamp(*LENGTHS_MM.start(), *LENGTHS_MM.end());
-    Ok(refine(shape, Tolerance::new(fine)?, budget)?.vertices)
+    Ok(refine(shape, Tolerance::new(fine)?, &budget.aside())?.vertices)
 }
 
 /// A point of what a shape is held against, where it is bounded: it is connected, and what is not bounded is not within a solid.

@@ -32,6 +32,7 @@ fn of_shape(job: &Job, attractor: &Attractor, tolerance: Tolerance, budget: &Bud
     let (mut geometry, density) = (Geometry::None, job.params.density_g_cm3);
     let bounds = measurable_box(attractor, budget)?;
     let mut certificate = certificate::of_shape(attractor, &bounds, tolerance);
+    budget.prove(certificate.achieved_bound_mm);
     let mut known = dimension(attractor, budget)?;
     certificate.state_meshes(attractor, &bounds, density, budget)?;
     certificate.state_enclosed(attractor, &bounds, tolerance, density, budget)?;

@@ -231,7 +231,9 @@ pub(crate) fn solid_of(source: &Source<'_>, tolerance: Tolerance, budget: &Budge
     let mut operand = operand(source, share(std::slice::from_ref(source), tolerance)?, budget)?;
     operand.join(budget)?;
     let mesh = operand.meshes.pop().unwrap_or_default();
-    Ok((rounded(&mesh, budget)?, operand))
+    let rounded = rounded(&mesh, budget)?;
+    budget.prove(operand.statement.inner_bound_mm.max(operand.statement.outer_bound_mm) + rounded.moved_mm);
+    Ok((rounded, operand))
 }
 
 /// What is counted twice, or taken away, of what a closed mesh bounds, so many pairs of whose triangles meet; nothing of a solid.
@@ -265,6 +267,7 @@ pub(crate) fn predicted(sources: &[Source<'_>], tolerance: Tolerance, budget: &B
             let prediction = predict(&source.attractor, Radius::new(source.radius_mm)?, share, true, budget)?;
             plan.triangles += prediction.triangles;
             plan.counted_triangles += prediction.counted_triangles;
+            plan.counted_cells = plan.counted_cells.max(prediction.leaf_cells);
             seconds += effort::of_dilated_operand(&prediction);
             // One is made after the other.
             plan.memory_bytes = plan.memory_bytes.max(held_bytes(&prediction, true));

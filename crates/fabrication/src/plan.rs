@@ -23,6 +23,10 @@ pub struct Plan {
     /// Triangles against which the limit of triangles is held: those of the lattices as they are first made.
     #[cfg_attr(feature = "wire", serde(default))]
     pub counted_triangles: f64,
+    /// Leaf cells against which the limit of cells is held: of an evaluation all of the shape's, of a dilation those that its surface needs, one again in every block of the lattice that
+    /// needs it. Of several solids those of the largest, as each is held against the limit by itself.
+    #[cfg_attr(feature = "wire", serde(default))]
+    pub counted_cells: f64,
     /// Peak memory of the process that does the job, in bytes. 0 where nothing is predicted.
     pub memory_bytes: f64,
     /// Bytes of a binary STL file with so many `triangles`; of sections, those of all drawings that are asked for, or else of one in SVG. `null` for sections of what is thickened first, and where nothing is predicted.
@@ -128,13 +132,11 @@ const PLANNED: [&str; 4] = ["cells", "triangles", "memory_bytes", "output_bytes"
 impl Plan {
     /// What is held against limits: their names, what is predicted and what is allowed.
     fn counts(&self, kind: JobKind, limits: &Limits) -> [(&'static str, f64, f64); 4] {
-        // Other kinds of jobs expand only the cells that they need.
-        let cells = if matches!(kind, JobKind::Evaluate | JobKind::Convert) { self.leaf_cells } else { 0.0 };
         // The triangles of an operation's result are counted, too.
         let triangles = if kind == JobKind::Intersect { self.counted_triangles.max(self.triangles) } else { self.counted_triangles };
         // Those of meshes are of one format of many, and of triangles most of which simplification saves.
         let output_bytes = if kind == JobKind::Slice { self.output_bytes.unwrap_or(0.0) } else { 0.0 };
-        let asked = [cells, triangles, self.memory_bytes, output_bytes];
+        let asked = [self.counted_cells, triangles, self.memory_bytes, output_bytes];
         let allowed = [limits.cells as f64, limits.triangles as f64, limits.memory_bytes as f64, limits.output_bytes as f64];
         std::array::from_fn(|index| (PLANNED[index], asked[index], allowed[index]))
     }
@@ -224,7 +226,7 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         let memory_bytes = counted * if joined { BYTES_PER_FACE } else { BYTES_PER_CELL };
         let evaluated = matches!(job.kind, JobKind::Evaluate | JobKind::Convert);
         let cpu_seconds = evaluated.then(|| effort::of_cells(leaf_cells, joined));
-        return Ok(Plan { leaf_cells, memory_bytes, cpu_seconds, ..Plan::default() });
+        return Ok(Plan { leaf_cells, counted_cells: counted, memory_bytes, cpu_seconds, ..Plan::default() });
     }
     let Some(radius) = radius else { return Err(JobError::new(Kind::Defect, "internal", "a radius was there".into())) };
     let simplify = job.kind == JobKind::Solidify && job.params.simplify;
@@ -233,6 +235,7 @@ fn planned(job: &Job, budget: &Budget) -> Result<Plan, JobError> {
         leaf_cells,
         triangles: prediction.triangles,
         counted_triangles: prediction.counted_triangles,
+        counted_cells: prediction.leaf_cells,
         memory_bytes: held_bytes(&prediction, simplify),
         output_bytes: Some(stl_bytes(prediction.triangles)),
         lattice_pitch_mm: prediction.pitch_mm,

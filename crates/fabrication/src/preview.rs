@@ -52,7 +52,7 @@ pub(crate) fn preview(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
         // No dilation is coarser than half of its ball.
         let coarse = Tolerance::new(tolerance.mm().max(0.5 * radius.mm()))?;
         let limits = Limits { triangles: budget.limits.triangles.min(TRIANGLES), ..budget.limits };
-        match dilate_unsimplified(attractor, radius, coarse, &Budget { limits, ..budget.clone() }) {
+        match dilate_unsimplified(attractor, radius, coarse, &Budget { limits, ..budget.aside() }) {
             Ok(dilation) => {
                 let mut certificate = certificate::of_dilation(attractor, &dilation, coarse);
                 certificate.state_preview(statement(tolerance, coarse, false));

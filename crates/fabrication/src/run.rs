@@ -211,7 +211,14 @@ pub fn run(job: &Job, budget: &Budget) -> Result<Outcome, JobError> {
     let (job, repairs) = repaired(job, budget)?;
     let mut outcome = made(&job, budget).map_err(|error| with_remedy(&job, error, budget))?;
     outcome.certificate.state_repairs(repairs);
+    certified(&outcome.certificate, budget);
     Ok(outcome)
+}
+
+/// Tells, last of all, what the certificate says.
+fn certified(certificate: &Certificate, budget: &Budget) {
+    budget.prove(certificate.achieved_bound_mm);
+    budget.report("certify", 1.0, certificate.triangles);
 }
 
 /// Does a job whose meshes are as they shall be.
@@ -330,7 +337,9 @@ pub fn stream_points<E>(
         points += piece.vertices.len() as u64;
         sink(&piece).map_err(StreamError::Sink)
     })?;
-    Ok(certificate::of_points(attractor, points, streamed, &bounds, tolerance))
+    let certificate = certificate::of_points(attractor, points, streamed, &bounds, tolerance);
+    certified(&certificate, budget);
+    Ok(certificate)
 }
 
 /// Says what is wrong with a model, and what its unknown operators leave open.

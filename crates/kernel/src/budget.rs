@@ -4,7 +4,7 @@
 //! of the kernel asks the token at least every few milliseconds of work.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 
 /// Why a computation was asked to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +67,8 @@ pub struct Limits {
     pub seconds: f64,
     /// Memory of the results and working sets that grow with the input, in bytes (accounted, not measured).
     pub memory_bytes: u64,
-    /// Leaf cells that an evaluation may produce.
+    /// Leaf cells that may be expanded: all of the shape for an evaluation, and for each dilation those that its surface needs, one again in every block of
+    /// the lattice that needs it, as certificates count them. A search that compares shapes looks at no more nodes than this, and ends there with what it knows.
     pub cells: u64,
     /// Triangles of the result.
     pub triangles: u64,
@@ -113,12 +114,40 @@ impl Stopped {
 /// How far a computation has come.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
-    /// Name of the phase: `validate`, `refine`, `dilate`, `stitch`, `verify`, `section`, `write`.
+    /// Name of the phase: one of [`PHASES`].
     pub phase: &'static str,
     /// Share of the phase that is done, in [0, 1].
     pub fraction: f64,
     /// Triangles or cells made so far, by phase.
     pub count: u64,
+    /// The error bound, in mm, that is proven of what has been made so far, as far as any is: 0 or more, and no wish. It may grow when more has been made.
+    pub bound_mm: Option<f64>,
+}
+
+/// The phases, in the order in which a job may have them.
+pub const PHASES: [&str; 12] =
+    ["validate", "refine", "dilate", "stitch", "verify", "combine", "intersect", "compare", "section", "stability", "certify", "write"];
+
+/// The error bound that is proven of what a computation has made so far. Cloning shares it.
+#[derive(Clone, Debug, Default)]
+pub struct Reached {
+    /// One more than the bound's digits in binary, 0 for none: those of numbers that are not negative are in their order.
+    bits: Arc<AtomicU64>,
+    /// How far what is made is from what the computation is asked for, in mm, by what was done before.
+    beyond_mm: f64,
+    /// Whether what is made is no part of the result.
+    is_aside: bool,
+}
+
+impl Reached {
+    fn mm(&self) -> Option<f64> {
+        self.bits.load(Ordering::Relaxed).checked_sub(1).map(f64::from_bits)
+    }
+
+    fn set(&self, bound_mm: f64) {
+        let known = Some(bound_mm + self.beyond_mm).filter(|bound| bound.is_finite() && *bound >= 0.0);
+        self.bits.store(known.map_or(0, |bound| (bound + 0.0).to_bits() + 1), Ordering::Relaxed);
+    }
 }
 
 /// Who is told about progress.
@@ -133,13 +162,75 @@ pub struct Budget {
     pub cancel: CancelToken,
     /// Who is told.
     pub progress: Option<ProgressSink>,
+    /// The bound that is told with the progress.
+    pub reached: Reached,
 }
 
 impl Budget {
     /// Tells the sink, if there is one.
     pub fn report(&self, phase: &'static str, fraction: f64, count: u64) {
         if let Some(sink) = &self.progress {
-            sink(&Progress { phase, fraction, count });
+            sink(&Progress { phase, fraction, count, bound_mm: self.reached.mm() });
         }
+    }
+
+    /// Takes note of the error bound, in mm, that is proven of all that has been made so far. It is told with the progress from then on, until another takes its place;
+    /// one that is not finite is none.
+    pub fn prove(&self, bound_mm: f64) {
+        if self.progress.is_some() && !self.reached.is_aside {
+            self.reached.set(bound_mm);
+        }
+    }
+
+    /// The same for a stage whose result is off by so much more, in mm, than the stage can know.
+    #[must_use]
+    pub fn beyond(&self, beyond_mm: f64) -> Self {
+        Self { reached: Reached { beyond_mm: self.reached.beyond_mm + beyond_mm, ..self.reached.clone() }, ..self.clone() }
+    }
+
+    /// The same for work whose bounds are not those of the result: it tells of its progress beside the bound that is known without it.
+    #[must_use]
+    pub fn aside(&self) -> Self {
+        Self { reached: Reached { is_aside: true, ..self.reached.clone() }, ..self.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    /// A budget and what it told: phases and bounds.
+    fn overheard() -> (Budget, Arc<Mutex<Vec<Option<f64>>>>) {
+        let heard: Arc<Mutex<Vec<Option<f64>>>> = Arc::default();
+        let listener = Arc::clone(&heard);
+        let sink = move |progress: &Progress| listener.lock().unwrap().push(progress.bound_mm);
+        (Budget { progress: Some(Arc::new(sink)), ..Budget::default() }, heard)
+    }
+
+    #[test]
+    fn a_bound_is_told_once_it_is_proven_and_until_it_is_replaced() {
+        let (budget, heard) = overheard();
+        let tell = |budget: &Budget| budget.report("refine", 0.0, 0);
+        tell(&budget);
+        budget.prove(0.0);
+        tell(&budget);
+        budget.beyond(0.25).beyond(0.25).prove(0.5);
+        tell(&budget);
+        budget.aside().prove(7.0);
+        tell(&budget.aside());
+        budget.beyond(1.0).aside().beyond(1.0).prove(7.0);
+        tell(&budget);
+        budget.prove(f64::INFINITY);
+        tell(&budget);
+        assert_eq!(*heard.lock().unwrap(), [None, Some(0.0), Some(1.0), Some(1.0), Some(1.0), None]);
+    }
+
+    #[test]
+    fn what_nobody_listens_to_leaves_no_bound_behind() {
+        let (budget, heard) = overheard();
+        Budget { progress: None, ..budget.clone() }.prove(3.0);
+        budget.report("validate", 0.0, 0);
+        assert_eq!(*heard.lock().unwrap(), [None]);
     }
 }

@@ -135,6 +135,7 @@ Cage = TypedDict('Cage', {
 })
 
 Capabilities = TypedDict('Capabilities', {
+    'build': 'NotRequired[str | None]',
     'formats': 'list[FormatCapability]',
     'kernel_version': 'str',
     'kinds': 'list[JobKind]',
@@ -711,6 +712,7 @@ PlaceStatement = TypedDict('PlaceStatement', {
 })
 
 Plan = TypedDict('Plan', {
+    'counted_cells': 'NotRequired[float]',
     'counted_triangles': 'NotRequired[float]',
     'cpu_seconds': 'NotRequired[float | None]',
     'exceeds': 'NotRequired[Excess | None]',
@@ -891,7 +893,7 @@ State = TypedDict('State', {
     'transitions': 'list[Transition]',
 })
 
-Step = TypedDict('Step', {'count': 'int', 'fraction': 'float', 'phase': 'str'})
+Step = TypedDict('Step', {'bound_mm': 'NotRequired[float | None]', 'count': 'int', 'fraction': 'float', 'phase': 'str'})
 
 SubdivisionShape = TypedDict('SubdivisionShape', {
     'boundary': "NotRequired[Literal['smooth', 'sharp_corners']]",

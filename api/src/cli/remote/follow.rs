@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use lacuna_kernel::budget::{CancelToken, Progress, ProgressSink};
+use lacuna_kernel::budget::{CancelToken, PHASES, Progress, ProgressSink};
 use ureq::http::{Method, StatusCode};
 
 use super::server::Server;
@@ -105,12 +105,10 @@ fn listen(server: &Server, id: &str, last: &mut u64, tell: &mut dyn FnMut(&Event
 
 /// Passes progress on to the bar.
 pub(super) fn report(event: &Event, sink: Option<&ProgressSink>) {
-    const PHASES: [&str; 10] =
-        ["validate", "refine", "dilate", "stitch", "verify", "combine", "intersect", "section", "stability", "write"];
     let (Some(sink), "progress") = (sink, event.name.as_str()) else { return };
     let Ok(step) = serde_json::from_str::<Step>(&event.data) else { return };
     let phase = PHASES.iter().find(|phase| **phase == step.phase).copied().unwrap_or("work");
-    sink(&Progress { phase, fraction: step.fraction, count: step.count });
+    sink(&Progress { phase, fraction: step.fraction, count: step.count, bound_mm: step.bound_mm });
 }
 
 /// Stops the job at the service once the token is fired.

@@ -237,6 +237,17 @@ fn deliver(server: &Server, named: &[(Output, PathBuf)]) -> Result<Vec<Written>,
     Ok(written)
 }
 
+/// The bytes of a file.
+fn fetched(server: &Server, output: &Output) -> Result<Vec<u8>, Problem> {
+    let failed = |error: std::io::Error| Problem::io(&output.file_name, &error);
+    let mut part = PendingFile::create_in(&std::env::temp_dir()).map_err(failed)?;
+    let file = part.reread().map_err(failed)?;
+    download::complete(server, output, file)?;
+    let mut bytes = Vec::new();
+    part.reread().and_then(|file| std::io::Read::read_to_end(file, &mut bytes)).map_err(failed)?;
+    Ok(bytes)
+}
+
 /// The document of a model whose mesh files are in it.
 pub(super) fn whole_model(bytes: &[u8], folder: Option<&Path>) -> Result<String, Problem> {
     documents::read_model_in(bytes, folder).map(|model| documents::model_document(&model))

@@ -1,6 +1,7 @@
 //! Questions about models that a service answers at once.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use lacuna_exchange::document::Sought;
 use lacuna_fabrication::{Certificate, Job, SolutionSpace};
@@ -16,7 +17,7 @@ use crate::cli::args::LimitArgs;
 use crate::cli::stop;
 use crate::documents::{self, Order, SolveReport};
 use crate::problem::{Problem, ProblemKind};
-use crate::verify::{Performer, Solution};
+use crate::verify::{Made, Performer, Solution};
 
 /// A model as the member of a request.
 fn member(model: &Model) -> Result<Value, Problem> {
@@ -82,6 +83,19 @@ impl Performer for AtServer<'_> {
         let limits = LimitArgs::default();
         let document = super::posted(&Order::new(job.clone(), Vec::new()), &[], &limits)?;
         super::followed(self.server, &document, &self.token, None).and_then(super::certified).map_err(Problem::of_model)
+    }
+
+    fn made(&self, job: &Job) -> Result<Made, Problem> {
+        let start = Instant::now();
+        let limits = LimitArgs::default();
+        let document = super::posted(&Order::new(job.clone(), Vec::new()), &job.outputs, &limits)?;
+        let view = super::followed(self.server, &document, &self.token, None).map_err(Problem::of_model)?;
+        let mut files = BTreeMap::new();
+        for name in &job.outputs {
+            files.insert(name.clone(), super::fetched(self.server, super::output(&view, name)?)?);
+        }
+        let seconds = (!view.reused).then(|| start.elapsed().as_secs_f64());
+        Ok(Made { certificate: super::certified(view)?, files, seconds })
     }
 
     fn solution(&self, model: &Model, values: &BTreeMap<String, f64>) -> Result<Solution, Problem> {

@@ -81,6 +81,7 @@ struct Cell {
 pub(crate) fn split(job: &Job, split: &Split, tolerance: Tolerance, budget: &Budget) -> Result<Outcome, JobError> {
     let source = Source::only(job, budget)?;
     let mut operand = operand(&source, share(std::slice::from_ref(&source), tolerance)?, budget)?;
+    budget.prove(operand.statement.inner_bound_mm.max(operand.statement.outer_bound_mm));
     operand.join(budget)?;
     let whole = operand.meshes.pop().unwrap_or_default();
     let key = split.key.map(|key| Key::new(key.width_mm, key.clearance_mm));

@@ -130,6 +130,8 @@ fn refine_whole(
     whole.tessellation.normals = whole.tessellation.normals.take().filter(|normals| normals.triangles.len() == triangles);
     whole.tessellation.leaf_cells = extent.leaf_cells;
     whole.tessellation.deviation_mm = extent.deviation_mm + rounding_mm(largest_coordinate(&whole.tessellation.vertices));
+    budget.prove(whole.tessellation.deviation_mm);
+    budget.report("refine", 1.0, extent.leaf_cells);
     Ok(whole.tessellation)
 }
 
@@ -168,7 +170,10 @@ pub fn stream<E: From<RefineError>>(
         largest = largest.max(largest_coordinate(&part.tessellation.vertices));
         sink(part.tessellation)
     })?;
-    Ok(Streamed { leaf_cells: extent.leaf_cells, deviation_mm: extent.deviation_mm + rounding_mm(largest) })
+    let deviation_mm = extent.deviation_mm + rounding_mm(largest);
+    budget.prove(deviation_mm);
+    budget.report("refine", 1.0, extent.leaf_cells);
+    Ok(Streamed { leaf_cells: extent.leaf_cells, deviation_mm })
 }
 
 /// Products of depth 60 lose less than 1e-12 relative; the bound declares ten times that.

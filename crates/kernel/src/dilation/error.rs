@@ -19,6 +19,14 @@ pub enum DilationError {
         /// The limit. How many were made when it was hit is a matter of chance.
         allowed: u64,
     },
+    /// More leaf cells than allowed.
+    #[error("the tolerance of {tolerance_mm} mm needs more than the {allowed} leaf cells that are allowed near the surface")]
+    LeafCells {
+        /// What was asked.
+        tolerance_mm: f64,
+        /// The limit. How many were expanded when it was hit is a matter of chance.
+        allowed: u64,
+    },
     /// Single precision cannot carry the tolerance at these coordinates.
     #[error(
         "single-precision files cannot carry a tolerance of {tolerance_mm} mm at coordinates up to {extent_mm:.1} mm; {reachable_mm:.6} mm can be carried, or a shape nearer to the origin"
@@ -98,7 +106,7 @@ impl DilationError {
         match self {
             Self::Stopped(stopped) => stopped.kind(),
             Self::Drawn { error, .. } => error.kind(),
-            Self::Triangles { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
+            Self::Triangles { .. } | Self::LeafCells { .. } | Self::Depth { .. } | Self::Cells { .. } => Kind::Limit,
             Self::Precision { .. } | Self::NoHollow { .. } => Kind::Unreachable,
             Self::Inside => Kind::Invalid,
             Self::Defect(_) => Kind::Defect,
@@ -116,7 +124,7 @@ impl DilationError {
             Self::Inside => "mesh.inside-undefined",
             Self::NoHollow { .. } => "wall.no-hollow",
             Self::Depth { .. } => "limit-depth",
-            Self::Cells { .. } => "limit-cells",
+            Self::LeafCells { .. } | Self::Cells { .. } => "limit-cells",
             Self::Defect(_) => "nonmanifold",
         }
     }
@@ -132,6 +140,9 @@ impl DilationError {
             }),
             Self::Stopped(_) | Self::Defect(_) | Self::Inside => None,
             Self::Cells { allowed } => {
+                Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
+            }
+            Self::LeafCells { allowed, .. } => {
                 Some(LimitFacts { limit: "cells", asked: allowed as f64 + 1.0, allowed: allowed as f64, remedy: None })
             }
             Self::Triangles { allowed, .. } => {

@@ -111,7 +111,7 @@ fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Bud
         return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.run(budget);
     };
     let Resolved { attractor: changed, balls, deviation_mm, rest } = &resolved;
-    let dilation = Plan::new(changed, *balls, *rest, simplify, budget)?.run(budget)?;
+    let dilation = Plan::new(changed, *balls, *rest, simplify, budget)?.run(&budget.beyond(*deviation_mm))?;
     let bounds = if attractor.has_own_radii() {
         dilated_box(changed, budget)?.widened(*deviation_mm)
     } else {

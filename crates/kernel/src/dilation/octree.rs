@@ -106,6 +106,8 @@ pub(super) struct Pass<'a> {
     pub(super) task: Task<'a>,
     pub(super) budget: &'a Budget,
     pub(super) triangles: AtomicU64,
+    /// Leaf cells met in its blocks.
+    leaves: AtomicU64,
     /// Whether a limit was hit: what is left need not be done.
     pub(super) failed: AtomicBool,
     /// Cubes of the lattice that are done, of those of the whole space.
@@ -155,6 +157,7 @@ impl<'a> Pass<'a> {
             task,
             budget,
             triangles: AtomicU64::new(0),
+            leaves: AtomicU64::new(0),
             failed: AtomicBool::new(false),
             done: AtomicU64::new(0),
             space,
@@ -370,6 +373,11 @@ impl<'a> Pass<'a> {
         let allowed = self.budget.limits.triangles;
         if total > allowed {
             return Err(DilationError::Triangles { tolerance_mm: self.setting.tolerance, allowed });
+        }
+        let leaves = self.leaves.fetch_add(surface.leaves, Ordering::Relaxed) + surface.leaves;
+        let allowed = self.budget.limits.cells;
+        if leaves > allowed {
+            return Err(DilationError::LeafCells { tolerance_mm: self.setting.tolerance, allowed });
         }
         Ok(Some(surface))
     }

@@ -332,7 +332,7 @@ impl<'a> Plan<'a> {
     /// Predicts from a sample of the lattice's blocks.
     pub(super) fn predict(&self, budget: &Budget) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
-            limits: crate::budget::Limits { triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
+            limits: crate::budget::Limits { cells: u64::MAX, triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
             progress: None,
             ..budget.clone()
         };
@@ -397,15 +397,33 @@ impl<'a> Plan<'a> {
             let task = Task::Changed(&Changed::new(&new), &blocks);
             let made = self.surfaces(setting, space, &grading, task, budget)?;
             critical = add(setting, &grading, &mut blocks, made, &mut uncertain, budget)?;
-            let total: u64 =
-                blocks.values_mut().filter_map(|surface| surface.get_mut().ok()).map(|surface| surface.triangles.len() as u64).sum();
-            if total > budget.limits.triangles {
-                return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
-            }
+            self.check(&mut blocks, budget)?;
         }
         let uncertain = uncertain.len() + critical.len();
+        let (mut site_error, mut triangles) = (SiteError::default(), 0);
+        for surface in blocks.values_mut().filter_map(|surface| surface.get_mut().ok()) {
+            site_error = site_error.max(surface.site_error);
+            triangles += surface.triangles.len() as u64;
+        }
+        self.prove(setting, site_error, triangles, budget);
         let surface = self.assemble(setting, space, &grading, blocks, budget)?;
         self.finish(setting, space, surface, uncertain as u64, Some(setting.lattice.pitch), budget)
+    }
+
+    /// Holds all blocks against the limits.
+    fn check(&self, blocks: &mut Blocks, budget: &Budget) -> Result<(), DilationError> {
+        let (mut triangles, mut leaves) = (0, 0);
+        for surface in blocks.values_mut().filter_map(|surface| surface.get_mut().ok()) {
+            triangles += surface.triangles.len() as u64;
+            leaves += surface.leaves;
+        }
+        if triangles > budget.limits.triangles {
+            return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+        }
+        if leaves > budget.limits.cells {
+            return Err(DilationError::LeafCells { tolerance_mm: self.aimed, allowed: budget.limits.cells });
+        }
+        Ok(())
     }
 
     /// The dilation by the union of polytopes around points and segments, where that serves better than a lattice.
@@ -413,6 +431,9 @@ impl<'a> Plan<'a> {
         let Some(arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
         let allowed = budget.limits.triangles;
         let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed };
+        if arrangement.leaves() > budget.limits.cells {
+            return Err(DilationError::LeafCells { tolerance_mm: self.aimed, allowed: budget.limits.cells });
+        }
         // What is expected is known to a factor of 2.
         if arrangement.triangles > 2.0 * allowed as f64 {
             return Err(too_many());
@@ -422,6 +443,7 @@ impl<'a> Plan<'a> {
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
+        self.prove(setting, surface.site_error, surface.triangles.len() as u64, budget);
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
@@ -508,6 +530,27 @@ impl<'a> Plan<'a> {
         Space { blocks: blocks.next_power_of_two() as i64, candidates }
     }
 
+    /// The bounds of a surface between the ends of the band, as those of a lattice and of what is simplified are: inner and outer, in mm.
+    fn proven(&self, setting: &Setting, site: SiteError) -> [f64; 2] {
+        // x is in the solid if d(x, S) <= least, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square, or at most `square` where d(x, A) <= r - e.
+        let squares = setting.least.powi(2);
+        let inside = (squares - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
+        let outside = setting.outer + site.outer + self.extra;
+        let (mut inner, outer) = (self.radius - inside, outside - self.radius);
+        if site.square <= squares {
+            inner = inner.min(self.tolerance);
+        }
+        // What is close to a site in space reaches as far as is aimed at.
+        [self.balls.inner(inner), self.balls.outer(outer).max(if setting.dense { self.aimed } else { 0.0 })]
+    }
+
+    /// Tells what is proven of a surface before it is simplified, which keeps it between the same ends of the band.
+    fn prove(&self, setting: &Setting, site: SiteError, triangles: u64, budget: &Budget) {
+        let [inner_mm, outer_mm] = self.proven(setting, site);
+        budget.prove(inner_mm.max(outer_mm));
+        budget.report("stitch", 0.0, triangles);
+    }
+
     fn certify(
         &self,
         setting: &Setting,
@@ -518,14 +561,7 @@ impl<'a> Plan<'a> {
         budget: &Budget,
     ) -> Result<Dilation, DilationError> {
         let site = surface.site_error;
-        // x is in the solid if d(x, S) <= least, and d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square, or at most `square` where d(x, A) <= r - e.
-        let squares = setting.least.powi(2);
-        let inside = (squares - site.inner_square).max(0.0).sqrt() - site.inner - self.extra;
-        let outside = setting.outer + site.outer + self.extra;
-        let (mut inner, outer) = (self.radius - inside, outside - self.radius);
-        if site.square <= squares {
-            inner = inner.min(self.tolerance);
-        }
+        let [inner_mm, outer_mm] = self.proven(setting, site);
         let leaf_cells = surface.leaves;
         let mesh = TriMesh { vertices: surface.vertices.into_iter().map(DVec3::from_array).collect(), triangles: surface.triangles };
         // Signs from pseudo-normals are right for embedded surfaces only; elsewhere they tear the result.
@@ -534,12 +570,13 @@ impl<'a> Plan<'a> {
             SolidError::NotManifold(_) if has_solids => DilationError::Inside,
             other => other.into(),
         })?;
+        budget.prove(inner_mm.max(outer_mm));
+        budget.report("dilate", 1.0, solid.mesh().triangles.len() as u64);
         Ok(Dilation {
             solid,
             crossings,
-            inner_mm: self.balls.inner(inner),
-            // What is close to a site in space reaches as far as is aimed at.
-            outer_mm: self.balls.outer(outer).max(if setting.dense { self.aimed } else { 0.0 }),
+            inner_mm,
+            outer_mm,
             least_radius_mm: self.balls.least,
             pitch_mm,
             leaf_cells,

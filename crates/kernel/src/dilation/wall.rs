@@ -59,7 +59,7 @@ pub fn wall(
 ) -> Result<Wall, DilationError> {
     let surface = surface_of(solid.mesh());
     let make = if simplify { dilate } else { dilate_unsimplified };
-    let around = make(&surface, thickness, tolerance, budget)?;
+    let around = make(&surface, thickness, tolerance, &budget.aside())?;
     let inside = Inside::new(solid.mesh());
     let other = shells(around.solid.mesh(), |vertex| (inside.winding(vertex) > 0) == (side == Side::Inward));
     if other.triangles.is_empty() {
@@ -102,16 +102,19 @@ pub fn close(
     let grown = Radius::new(radius.mm() + ball.mm()).unwrap_or(radius);
     // The solid that is left is as thin as r, and its error must stay below that.
     let aimed = tolerance.mm().min(0.5 * attractor.radii(radius.mm())[0]);
-    let swollen = make(&attractor.with_grown_radii(ball.mm()), grown, half(0.5 * aimed), budget)?;
+    let swollen = make(&attractor.with_grown_radii(ball.mm()), grown, half(0.5 * aimed), &budget.aside())?;
     let surface = surface_of(swollen.solid.mesh());
-    let around = make(&surface, ball, half(aimed - swollen.inner_mm.max(swollen.outer_mm)), budget)?;
+    let around = make(&surface, ball, half(aimed - swollen.inner_mm.max(swollen.outer_mm)), &budget.aside())?;
     let inside = Inside::new(swollen.solid.mesh());
     let mut left = shells(around.solid.mesh(), |vertex| inside.winding(vertex) > 0);
     left.reverse();
+    let solid = Solid::new(left, budget)?;
+    let (inner_mm, outer_mm) = (swollen.inner_mm + around.outer_mm, swollen.outer_mm + around.inner_mm);
+    budget.prove(inner_mm.max(outer_mm));
     Ok(Dilation {
-        solid: Solid::new(left, budget)?,
-        inner_mm: swollen.inner_mm + around.outer_mm,
-        outer_mm: swollen.outer_mm + around.inner_mm,
+        solid,
+        inner_mm,
+        outer_mm,
         least_radius_mm: swollen.least_radius_mm - ball.mm(),
         pitch_mm: swollen.pitch_mm.into_iter().chain(around.pitch_mm).reduce(f64::min),
         leaf_cells: swollen.leaf_cells + around.leaf_cells,

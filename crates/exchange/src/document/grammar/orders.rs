@@ -243,7 +243,11 @@ pub(in super::super) const JOB_LIMITS: Object = Object {
     members: &[
         optional("seconds", "Wall time in seconds.", positive),
         optional("triangles", "Triangles of the result.", count),
-        optional("cells", "Leaf cells that the evaluation may produce.", count),
+        optional(
+            "cells",
+            "Leaf cells that may be expanded: of an evaluation all of the shape's, of each dilation those that its surface needs, one again in every block of its lattice. A comparison of shapes looks at no more nodes than this, and ends there with what it knows.",
+            count,
+        ),
         optional("memory_bytes", "Accounted memory in bytes.", count),
         optional("depth", "Length of the longest address.", || json!({ "type": "integer", "minimum": 1, "maximum": u32::MAX })),
         optional("output_bytes", "Bytes of all files of the result, the certificate aside.", count),

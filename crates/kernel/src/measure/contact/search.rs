@@ -45,6 +45,9 @@ const MOST_BYTES: u64 = 512 << 20;
 /// are, and are found to be one by one.
 const MOST_FAR: u64 = 20_000;
 
+/// Pairs that are looked at between two reports.
+const PAIRS_PER_REPORT: u64 = 1 << 14;
+
 /// What to do with a pair.
 enum Step {
     /// It is as small as it has to be.
@@ -146,6 +149,8 @@ impl<'a> Search<'a> {
             });
         }
         let distance_mm = Interval { low: low.min(high), high };
+        budget.prove(distance_mm.width());
+        budget.report("intersect", 1.0, self.looked);
         let trees = [self.tree(0), self.tree(1)];
         let mut places = places(trees, &found, self.resolution_mm, self.slack, budget, |pair| self.described(pair))?;
         if let (true, [only]) = (complete, places.as_mut_slice()) {
@@ -158,7 +163,7 @@ impl<'a> Search<'a> {
     /// Finds the pairs that remain. The lower end of the distance, and whether all were found.
     fn run(&mut self, query: &ContactQuery, budget: &Budget, found: &mut Vec<Found>) -> Result<(f64, bool), ContactError> {
         let (most_pairs, most_bytes) = (most_pairs(budget), most_bytes(budget));
-        let (mut lower, mut complete, mut far) = (None, true, None);
+        let (mut lower, mut complete, mut far, mut told) = (None, true, None, 0);
         while let Some(pair) = self.near.pop().or_else(|| self.queue.pop().map(|entry| entry.0)) {
             if lower.is_some() && pair.low > self.resolution_mm {
                 break;
@@ -177,6 +182,7 @@ impl<'a> Search<'a> {
                 }
             }
             budget.cancel.check()?;
+            self.tell(lower, &pair, &mut told, budget);
             if self.pieces.is_some() && pair.nodes[0] == pair.nodes[1] {
                 let children = self.trees[0].children(pair.nodes[0]);
                 for first in children.clone().rev() {
@@ -205,6 +211,16 @@ impl<'a> Search<'a> {
         }
         // A pair that holds the closest points is never dropped, so one was kept, if there are any.
         Ok((lower.unwrap_or(0.0), complete))
+    }
+
+    /// Tells how far the search is, now and then: pairs that were looked at, and how narrow the distance is already.
+    fn tell(&self, lower: Option<f64>, pair: &Pair, told: &mut u64, budget: &Budget) {
+        if self.looked < *told {
+            return;
+        }
+        *told = self.looked + PAIRS_PER_REPORT;
+        budget.prove(self.nearest.distance_mm.high - self.least(lower, pair).min(self.nearest.distance_mm.high));
+        budget.report("intersect", 0.0, self.looked);
     }
 
     /// The lower end of the distance when the search ends at a pair: the others in the queue are no nearer than one of

@@ -37,6 +37,7 @@ use flat::{Below, Overlay, farthest, halves, over};
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Mutex;
 
 /// How far the points of a shape are from another, at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,12 +96,40 @@ pub fn hausdorff(a: &Attractor, b: &Attractor, tolerance: Tolerance, budget: &Bu
     let surfaces = [a, b].map(Attractor::surfaces);
     let solids = surfaces.each_ref().map(|own| own.iter().map(|mesh| Filled { mesh, inside: Inside::new(mesh) }).collect::<Vec<_>>());
     let [same_of_first, same_of_second] = same::shared_solids([&solids[0], &solids[1]]);
+    let known = Known::default();
     let (forwards, backwards) = rayon::join(
-        || directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], &same_of_first, tolerance, budget),
-        || directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], &same_of_second, tolerance, budget),
+        || directed([tree(a, budget)?, tree(b, budget)?], [&solids[0], &solids[1]], &same_of_first, tolerance, (&known, 0), budget),
+        || directed([tree(b, budget)?, tree(a, budget)?], [&solids[1], &solids[0]], &same_of_second, tolerance, (&known, 1), budget),
     );
     let ((from_first, first_complete), (from_second, second_complete)) = (forwards?, backwards?);
-    Ok(Hausdorff { from_first, from_second, complete: first_complete && second_complete })
+    let found = Hausdorff { from_first, from_second, complete: first_complete && second_complete };
+    budget.prove(found.distance_mm().width());
+    budget.report("compare", 1.0, known.looked());
+    Ok(found)
+}
+
+/// What is known already of both directions, which are searched at the same time: nodes that were looked at, and the interval.
+#[derive(Default)]
+struct Known(Mutex<[Option<(u64, Interval)>; 2]>);
+
+/// Nodes that are looked at between two reports.
+const NODES_PER_REPORT: u64 = 1 << 16;
+
+impl Known {
+    /// Takes note of one direction, and tells of both.
+    fn tell(&self, direction: usize, looked: u64, distance_mm: Interval, budget: &Budget) {
+        let Ok(mut both) = self.0.lock() else { return };
+        both[direction] = Some((looked, distance_mm));
+        if let [Some((_, first)), Some((_, second))] = *both {
+            budget.prove(first.high.max(second.high) - first.low.max(second.low));
+        }
+        drop(both);
+        budget.report("compare", 0.0, self.looked());
+    }
+
+    fn looked(&self) -> u64 {
+        self.0.lock().map_or(0, |both| both.iter().flatten().map(|(looked, _)| looked).sum())
+    }
 }
 
 /// A part of the first shape.
@@ -168,6 +197,7 @@ fn directed<'a>(
     solids: [&'a [Filled<'a>]; 2],
     same_solids: &[bool],
     tolerance: Tolerance,
+    (known, direction): (&Known, usize),
     budget: &'a Budget,
 ) -> Result<(Directed, bool), ContactError> {
     let mut search = Search {
@@ -199,13 +229,17 @@ fn directed<'a>(
     }
     // A piece that cannot be split ends the search: all others are no farther.
     let mut high = 0.0;
-    let mut complete = true;
+    let (mut complete, mut told) = (true, 0);
     while let Some(piece) = search.queue.pop() {
         high = piece.high;
         if high + search.skin - search.low <= tolerance.mm() {
             break;
         }
         budget.cancel.check()?;
+        if search.looked >= told {
+            told = search.looked + NODES_PER_REPORT;
+            known.tell(direction, search.looked, search.reached(high), budget);
+        }
         if search.is_exhausted() {
             complete = false;
             break;
@@ -217,7 +251,8 @@ fn directed<'a>(
         }
         high = 0.0;
     }
-    let distance_mm = Interval { low: search.low, high: high.max(search.low).max(search.settled) + search.skin };
+    let distance_mm = search.reached(high);
+    known.tell(direction, search.looked, distance_mm, budget);
     Ok((Directed { distance_mm, place: search.place }, complete))
 }
 
@@ -226,6 +261,11 @@ fn memory(piece: &Piece) -> u64 {
 }
 
 impl<'a> Search<'a> {
+    /// The interval that holds the supremum if all pieces in the queue have it at most at `high`.
+    fn reached(&self, high: f64) -> Interval {
+        Interval { low: self.low, high: high.max(self.low).max(self.settled) + self.skin }
+    }
+
     /// Whether a limit was hit.
     fn is_exhausted(&self) -> bool {
         let limits = &self.budget.limits;
