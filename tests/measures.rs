@@ -10,7 +10,7 @@ use lacuna_fabrication::enclosed::VolumeMethod;
 use lacuna_fabrication::{Certificate, Input, Job, JobKind, Params, run};
 use lacuna_kernel::budget::{Budget, Limits};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
-use lacuna_tests::support::cases;
+use lacuna_tests::support::{binary, cases};
 use serde_json::{Value, json};
 
 fn measured(model: Model, params: Params) -> Certificate {
@@ -381,11 +381,35 @@ fn mass_and_centroid_of_what_a_smooth_surface_encloses() {
     for axis in found.centroid_mm.unwrap() {
         assert_within(axis, 0.5, 0.05);
     }
+    assert!(found.area_mm2.is_some() && !found.warnings.iter().any(|words| words.contains("the area of the surface is not known")));
+    // Loop's surfaces are no Bezier patches on squares.
+    let found = measured(
+        Model { name: None, shape: document(&std::fs::read_to_string(cases::named("subdivision/loop_tetrahedron").model()).unwrap()) },
+        Params::new(0.01),
+    );
     assert!(found.area_mm2.is_none() && found.warnings.iter().any(|words| words.contains("the area of the surface is not known")));
     // A sheet has no volume, and a mass that is not told is no silence.
     let sheet = PolygonMesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], faces: vec![vec![0, 1, 2]], interior: Interior::Auto };
     let found = measured(Model { name: None, shape: Shape::Mesh(sheet) }, Params { density_g_cm3: Some(8.0), ..Params::new(0.001) });
     assert!(found.mass_g.is_none() && found.warnings[0].contains("no mass is told"), "{:?}", found.warnings);
+}
+
+/// 4 pi^2 R r of a torus and 4 pi r^2 of a sphere, 2400 of a cube all whose edges are sharp, and 400 times the integral of sqrt(1 + x^2 + y^2) over the unit square of a saddle,
+/// through the command.
+#[test]
+fn areas_of_smooth_surfaces() {
+    let told = |case: &str| -> Value {
+        let model = cases::named(case).model();
+        let words = ["measure", model.to_str().unwrap(), "--tolerance", "0.05", "--quiet"];
+        serde_json::from_slice(&binary::succeed(words)).unwrap()
+    };
+    let area = |case: &str| -> [f64; 2] { serde_json::from_value(told(case)["area_mm2"].clone()).unwrap() };
+    assert_within(area("nurbs/torus"), 4.0 * PI * PI * 30.0, 1e-3 * 1184.0);
+    assert_within(area("nurbs/sphere"), 400.0 * PI, 1e-3 * 1256.0);
+    assert_within(area("subdivision/catmull_clark_sharp"), 2400.0, 1e-6);
+    let saddle = 4.0 / 3.0 * ((1.0 + 3.0_f64.sqrt()) / 2.0_f64.sqrt()).ln() + 3.0_f64.sqrt() / 3.0 - PI / 18.0;
+    assert_within(area("nurbs/bezier_saddle"), 400.0 * saddle, 1e-2);
+    assert!(told("nurbs/trimmed_sphere").get("area_mm2").is_none_or(Value::is_null));
 }
 
 /// Solids of a group: sums where they are apart, bounds that hold the union where they are not.

@@ -168,7 +168,7 @@ pub struct Certificate {
     /// What a closed surface that is no mesh encloses: of a `measure` alone.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub enclosed: Option<EnclosedStatement>,
-    /// Area of the exact shape's boundary.
+    /// Area of the exact shape's boundary, or of one side of a surface; a smooth one counts places as often as it covers them.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     #[cfg_attr(feature = "wire", schema(schema_with = wire::interval_schema))]
     pub area_mm2: Option<Interval>,

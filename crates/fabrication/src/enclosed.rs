@@ -111,10 +111,12 @@ impl Certificate {
                 "the surface may pass through itself: {pairs} pairs of triangles that stand for it within {deviation:.3e} mm meet where they are not joined; where it does, {counts}, and no centroid is told"
             )),
         }
-        self.warnings.push(format!(
-            "the area of the surface is not known: no bounds are computed of one that is no mesh; that of the triangles that stand for it within {deviation:.3e} mm, an estimate where it is smooth, is {} mm2",
-            area(&mesh)
-        ));
+        if self.area_mm2.is_none() {
+            self.warnings.push(format!(
+                "the area of the surface is not known: bounds are computed of triangles and of Bezier patches; that of the triangles that stand for it within {deviation:.3e} mm, an estimate where it is smooth, is {} mm2",
+                area(&mesh)
+            ));
+        }
         self.enclosed = Some(stated);
         Ok(())
     }

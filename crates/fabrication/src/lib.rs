@@ -20,6 +20,7 @@ mod slice;
 pub mod solidify;
 pub mod solve;
 pub mod split;
+mod surface_area;
 
 pub use certificate::Certificate;
 pub use job::{CutPlane, Input, Job, JobKind, Operation, Params, Planes, Split, SplitKey, WallOrder, WallSide};

@@ -35,6 +35,7 @@ fn of_shape(job: &Job, attractor: &Attractor, tolerance: Tolerance, budget: &Bud
     budget.prove(certificate.achieved_bound_mm);
     let mut known = dimension(attractor, budget)?;
     certificate.state_meshes(attractor, &bounds, density, budget)?;
+    certificate.state_surface_area(attractor, budget)?;
     certificate.state_enclosed(attractor, &bounds, tolerance, density, budget)?;
     if certificate.enclosed.as_ref().is_some_and(|found| found.volume_mm3[0] > 0.0 || found.volume_mm3[1] < 0.0) {
         known = known.parting_space();

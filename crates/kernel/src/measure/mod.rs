@@ -1,5 +1,6 @@
 //! Measures of shapes and solids, as intervals that are proven.
 
+pub mod area;
 pub mod bounds;
 pub mod contact;
 mod curve;
@@ -17,6 +18,7 @@ pub mod thickness;
 pub mod triangle;
 pub mod windings;
 
+pub use area::surface_area;
 pub use bounds::{AxisBox, bounding_box, extent_along};
 pub use contact::{Contact, ContactError, ContactQuery, Primitive, Verdict, intersect, intersect_primitive, intersect_self};
 pub use dimension::{Dimension, DimensionKnowledge, dimension};
