@@ -544,13 +544,13 @@ pub(super) struct BlessArgs {
     /// Only cases whose path contains this text.
     #[arg(long, value_name = "TEXT")]
     pub(super) filter: Option<String>,
-    /// Also state in expected.toml that the result is within so many mm of a coarse mesh, which is written beside it: [shape].
+    /// Also state in expected.toml that the result is within so many mm of a coarse mesh, which is written beside it: `[shape]`.
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub(super) shape: Option<f64>,
-    /// Also state the bytes of the result in this format, for results of this version: [digest]; several times for several formats.
+    /// Also state the bytes of the result in this format, for results of this version: `[digest]`; several times for several formats.
     #[arg(long, value_name = "FORMAT")]
     pub(super) digest: Vec<String>,
-    /// Also state that the work should take no more seconds than this: [perf], which decides nothing unless the file says `gating = true`.
+    /// Also state that the work should take no more seconds than this: `[perf]`, which decides nothing unless the file says `gating = true`.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub(super) perf: Option<f64>,
     /// Print what was done as JSON on stdout.
