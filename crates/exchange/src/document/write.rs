@@ -351,7 +351,8 @@ object! {
         .put("cells", &limits.cells)?
         .put("memory_bytes", &limits.memory_bytes)?
         .put("depth", &limits.depth)?
-        .put("output_bytes", &limits.output_bytes)?;
+        // Where it is the usual one, documents, and so their digests, are as they were before there was this limit.
+        .put_if(limits.output_bytes != Limits::default().output_bytes, "output_bytes", &limits.output_bytes)?;
     Ifs: |ifs, members| members
         .put("family", &"ifs")?
         .put("maps", &list(&ifs.maps))?
