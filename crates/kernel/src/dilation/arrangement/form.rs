@@ -52,6 +52,8 @@ const DENSITIES: [f64; 10] = [0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1
 const TURNS: [f64; 2] = [0.5, 0.38];
 /// Rounding of unit vectors, far below any edge.
 const ROUNDING: f64 = 1e-9;
+/// What [`ROUNDING`] makes of the cosine of an angle between facets, at most, with room to spare.
+const AROUND: f64 = 1e-6;
 
 impl Form {
     /// The one with the fewest facets, of those that are tried, that lies within the ball with radius `most`.
@@ -74,15 +76,23 @@ impl Form {
         let (mut places, mut corners) = (Vec::new(), Vec::new());
         for a in 0..count {
             let near: Vec<usize> = (a + 1..count).filter(|&b| dot(&normals[a], &normals[b]) > widest).collect();
+            // Whatever reaches a vertex of the facet within `most`, rounding included, is among these.
+            let around: Vec<&Point> = normals.iter().filter(|normal| dot(&normals[a], normal) > widest - AROUND).collect();
             for (place, &b) in near.iter().enumerate() {
                 for &c in &near[place + 1..] {
                     let vertex = meeting([&normals[a], &normals[b], &normals[c]], [1.0; 3]);
                     let Some(vertex) = vertex else { continue };
-                    if normals.iter().any(|normal| dot(normal, &vertex) > 1.0 + ROUNDING) {
+                    if around.iter().any(|normal| dot(normal, &vertex) > 1.0 + ROUNDING) {
                         continue;
                     }
-                    let on = normals.iter().filter(|normal| dot(normal, &vertex) > 1.0 - ROUNDING).count();
-                    if on != 3 || vertex[2].abs() < ROUNDING.sqrt() || dot(&vertex, &vertex) > most * most {
+                    if dot(&vertex, &vertex) > most * most {
+                        if normals.iter().any(|normal| dot(normal, &vertex) > 1.0 + ROUNDING) {
+                            continue;
+                        }
+                        return None;
+                    }
+                    let on = around.iter().filter(|normal| dot(normal, &vertex) > 1.0 - ROUNDING).count();
+                    if on != 3 || vertex[2].abs() < ROUNDING.sqrt() {
                         return None;
                     }
                     corners.push(Corner { facets: [a, b, c].map(|facet| facet as u16), end: usize::from(vertex[2] > 0.0) });
