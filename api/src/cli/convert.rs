@@ -8,7 +8,6 @@ use lacuna_exchange::format::{self, Format, Geometry, MeshFile, Metadata};
 use lacuna_fabrication::{JobError, repaired_mesh};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{Interior, PolygonMesh};
-use lacuna_kernel::tessellation::Tessellation;
 
 use super::args::ConvertArgs;
 use super::inspect::mesh_file;
@@ -77,16 +76,10 @@ pub(super) fn title(path: &Path, objects: &[String]) -> String {
 fn write(format: Format, file: &MeshFile, title: &str, closed: bool, part: &mut crate::files::PendingFile) -> Result<(), Problem> {
     let metadata = Metadata { title: Some(title), ..Metadata::default() };
     let mut sink = BufWriter::with_capacity(1 << 16, part);
-    let wires = Tessellation {
-        vertices: if file.mesh.triangles.is_empty() { file.mesh.vertices.clone() } else { Vec::new() },
-        segments: file.segments.clone(),
-        points: file.points.clone(),
-        ..Tessellation::default()
-    };
-    let geometry = if file.mesh.triangles.is_empty() && !file.is_empty() {
-        Geometry::from(&wires)
-    } else {
-        Geometry::Polygons { mesh: &file.mesh, polygons: &file.polygons, closed }
+    let wires = file.wires();
+    let geometry = match &wires {
+        Some(wires) => Geometry::from(wires),
+        None => Geometry::Polygons { mesh: &file.mesh, polygons: &file.polygons, closed },
     };
     let written = guarded(|| format::write(format, geometry, &metadata, &mut sink))?;
     written.map_err(|error| match error {

@@ -6,6 +6,7 @@ use super::limits::{MeshBuilder, Read, within};
 use super::{FORMATS, Format, ReadLimits, obj, off, ply, stl, threemf, vrml};
 use lacuna_kernel::model::polygon::{PolygonFault, PolygonRun};
 use lacuna_kernel::solid::TriMesh;
+use lacuna_kernel::tessellation::Tessellation;
 use std::convert::Infallible;
 
 /// A unit of length that a file names.
@@ -101,6 +102,18 @@ impl MeshFile {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.mesh.triangles.is_empty() && self.segments.is_empty() && self.points.is_empty()
+    }
+
+    /// Its segments and points as they are written, where there are no faces but some of these.
+    #[must_use]
+    pub fn wires(&self) -> Option<Tessellation> {
+        let has_wires = !(self.segments.is_empty() && self.points.is_empty());
+        has_wires.then(|| Tessellation {
+            vertices: self.mesh.vertices.clone(),
+            segments: self.segments.clone(),
+            points: self.points.clone(),
+            ..Tessellation::default()
+        })
     }
 
     /// The faces as the file has them: its polygons whole, their corners in its order. Where there are none, its segments and then its points, as faces with two corners and one.
