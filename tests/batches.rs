@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use lacuna_tests::support::binary::lacuna;
-use lacuna_tests::support::cases::model;
+use lacuna_tests::support::cases::{long_job, model};
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::{Answer, Service, until, view};
 use lacuna_tests::support::stage::Stage;
@@ -28,13 +28,6 @@ fn solid(number: u32) -> Value {
 /// The work of a moment, another one for every number.
 fn small(number: u32) -> Value {
     json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 + f64::from(number) / 1e6 } })
-}
-
-/// Work for minutes that is quickly accepted, another one for every number.
-fn long(number: u32) -> Value {
-    let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
-    json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
-        "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
 }
 
 /// A solid that ends with its limit of triangles: a thick one, of a single block, so that it is refused in the same words by any number of threads.
@@ -163,10 +156,10 @@ fn a_batch_is_refused_as_a_whole_with_the_places_of_all_faults() {
     assert_eq!(service.post("/v1/batches", &twice).json()["errors"][0]["pointer"], "/jobs/1/name");
 
     // As many jobs count as there are: six never pass, four beside two pass later.
-    let never = service.post("/v1/batches", &batch((0..6).map(long)));
+    let never = service.post("/v1/batches", &batch((0..6).map(long_job)));
     assert_eq!((never.status, never.header("retry-after")), (429, ""), "{}", never.json());
-    let two = submit(&service, &batch((0..2).map(long)));
-    let later = service.post("/v1/batches", &batch((2..6).map(long)));
+    let two = submit(&service, &batch((0..2).map(long_job)));
+    let later = service.post("/v1/batches", &batch((2..6).map(long_job)));
     assert_eq!((later.status, later.header("retry-after")), (429, "5"), "{}", later.json());
     let ids: BTreeSet<String> = shown(&service, &two)["jobs"].as_array().unwrap().iter().map(|row| row["job"].to_string()).collect();
     let listed = service.get("/v1/jobs").json();
@@ -207,7 +200,7 @@ fn a_short_batch_that_names_a_long_model_a_hundred_times_is_refused() {
 fn a_batch_is_stopped_and_forgotten_as_one() {
     let scratch = Scratch::new();
     let service = Service::start_with(scratch.path(), &[("LACUNA_WORKERS", "1")]);
-    let mut order = batch((0..4).map(long));
+    let mut order = batch((0..4).map(long_job));
     order["jobs"].as_array_mut().unwrap().insert(0, json!({ "job": small(0) }));
     let id = submit(&service, &order);
     until(PATIENCE, "work", || states(&shown(&service, &id)).get(1) == Some(&"running"));
@@ -397,12 +390,12 @@ fn several_processes_share_batches() {
     assert_eq!(same["jobs"][0]["output_digests"], view["jobs"][7]["output_digests"]);
 
     // Stopped and forgotten from elsewhere; what passes the room of a key is refused as a whole.
-    let stopped = submit(&first, &batch((0..3).map(long)));
+    let stopped = submit(&first, &batch((0..3).map(long_job)));
     until(PATIENCE, "work", || states(&shown(&second, &stopped)).contains(&"running"));
     assert_eq!(second.post(&format!("/v1/batches/{stopped}/cancel"), &json!({})).status / 100, 2);
     assert_eq!(ended(&first, &stopped)["state"], "cancelled");
     let small = stage.start_with("front", "small", &[("LACUNA_JOBS_PER_KEY", "2")]);
-    assert_eq!(small.post("/v1/batches", &batch((10..13).map(long))).status, 429);
+    assert_eq!(small.post("/v1/batches", &batch((10..13).map(long_job))).status, 429);
     assert_eq!(first.delete(&format!("/v1/batches/{stopped}")).status, 204);
     assert_eq!(second.get(&format!("/v1/batches/{stopped}")).status, 404);
     let listed = second.get("/v1/jobs?limit=200").json();

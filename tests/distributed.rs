@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::lacuna;
-use lacuna_tests::support::cases::model;
+use lacuna_tests::support::cases::{long_job, model, search_job};
 use lacuna_tests::support::service::{Service, submit, until, view};
 use lacuna_tests::support::stage::{LEASE, Stage};
 use serde_json::{Value, json};
@@ -17,13 +17,6 @@ const PATIENCE: Duration = Duration::from_secs(90);
 fn order(number: u32) -> Value {
     json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"), "outputs": ["stl", "3mf"],
         "params": { "tolerance_mm": 0.05, "radius_mm": 1.0 + f64::from(number) / 64.0 } })
-}
-
-/// Work for minutes that is quickly accepted, a different one for every number.
-fn long_order(number: u32) -> Value {
-    let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
-    json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
-        "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
 }
 
 /// The number of the worker that says it has started a job.
@@ -108,7 +101,7 @@ fn a_job_is_stopped_from_another_process_and_its_events_are_told_there() {
     let _worker = stage.start("worker", "one");
     let mut longest = Duration::ZERO;
     for number in 0..3 {
-        let id = submit(&first, &long_order(number));
+        let id = submit(&first, &long_job(number));
         let mut events = TcpStream::connect(second.address).unwrap();
         events.set_read_timeout(Some(PATIENCE)).unwrap();
         write!(events, "GET /v1/jobs/{id}/events HTTP/1.1\r\nhost: localhost\r\n\r\n").unwrap();
@@ -134,7 +127,7 @@ fn a_worker_that_is_asked_to_end_hands_its_job_back_and_another_ends_it() {
     let front = stage.start("front", "front");
     let mut workers = [Some(stage.start("worker", "one")), Some(stage.start("worker", "two"))];
     // Some seconds of work: more than the worker has to end it, and it can be waited for.
-    let mut order = long_order(0);
+    let mut order = search_job(0);
     order["params"]["tolerance_mm"] = json!(1e-5);
     let id = submit(&front, &order);
     until(PATIENCE, "a start", || taker(&workers, &id, 1).is_some());
@@ -161,7 +154,7 @@ fn a_dead_worker_s_job_is_another_s_and_a_job_that_kills_is_given_up() {
     let mut workers = [Some(stage.start("worker", "one")), Some(stage.start("worker", "two"))];
 
     // Killed in the middle of a job, which another worker then does.
-    let id = submit(&front, &long_order(0));
+    let id = submit(&front, &long_job(0));
     until(PATIENCE, "a start", || taker(&workers, &id, 1).is_some());
     let dead = taker(&workers, &id, 1).unwrap();
     workers[dead].take().unwrap().kill();
@@ -178,7 +171,7 @@ fn a_dead_worker_s_job_is_another_s_and_a_job_that_kills_is_given_up() {
 
     // Jobs at several workers are stopped from the front.
     let other = stage.start("worker", "four");
-    let ids: Vec<String> = (1..3).map(|number| submit(&front, &long_order(number))).collect();
+    let ids: Vec<String> = (1..3).map(|number| submit(&front, &long_job(number))).collect();
     until(PATIENCE, "a start", || ids.iter().any(|id| other.said(&["job started", id])));
     for id in &ids {
         assert_eq!(front.post(&format!("/v1/jobs/{id}/cancel"), &json!({})).status / 100, 2);
@@ -191,7 +184,7 @@ fn a_worker_that_was_given_up_does_not_overwrite() {
     let Some(stage) = Stage::set() else { return };
     let front = stage.start("front", "front");
     let mut workers = [Some(stage.start("worker", "one")), None];
-    let id = submit(&front, &long_order(0));
+    let id = submit(&front, &long_job(0));
     until(PATIENCE, "a start", || taker(&workers, &id, 1).is_some());
     // As long as it stands still it cannot renew its lease.
     workers[0].as_ref().unwrap().signal("STOP");
@@ -212,7 +205,7 @@ fn nothing_is_lost_while_the_database_is_away() {
     let Some(stage) = Stage::set() else { return };
     let front = stage.start("front", "front");
     let worker = stage.start("worker", "one");
-    let running = submit(&front, &long_order(0));
+    let running = submit(&front, &long_job(0));
     until(PATIENCE, "a start", || worker.said(&["job started", &running]));
     let waiting: Vec<String> = (0..5).map(|number| submit(&front, &order(number))).collect();
 

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use lacuna_tests::support::cases::model;
+use lacuna_tests::support::cases::{long_job, model};
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::{Service, is_alive, resident_bytes, send_signal, submit, until};
 use serde_json::{Value, json};
@@ -15,17 +15,10 @@ fn small(number: u32) -> Value {
     json!({ "lacuna": 1, "kind": "measure", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.1 + f64::from(number) / 1e6 } })
 }
 
-/// Work for minutes that is quickly accepted, another one for every number.
-fn long(number: u32) -> Value {
-    let input = |name: &str, path: &str| json!({ "name": name, "model": model(path) });
-    json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-7 + f64::from(number) / 1e11 },
-        "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
-}
-
 /// A job that is being computed, and the process that does it, beside those of other jobs.
 #[track_caller]
 fn running(service: &Service, number: u32, others: &[u32]) -> (String, u32) {
-    let id = submit(service, &long(number));
+    let id = submit(service, &long_job(number));
     until(PATIENCE, "progress", || service.get(&format!("/v1/jobs/{id}")).json()["progress"].is_object());
     let its: Vec<u32> = service.children().into_iter().filter(|child| !others.contains(child)).collect();
     assert_eq!(its.len(), 1, "a process of its own");
@@ -246,8 +239,8 @@ fn stopping_a_job_frees_its_process_at_once() {
 fn a_time_limit_ends_the_process_too() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
-    let mut order = long(0);
-    order["limits"] = json!({ "seconds": 0.5 });
+    let mut order = long_job(0);
+    order["limits"]["seconds"] = json!(0.5);
     let job = service.done(&order);
     assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("limit.seconds")), "{job}");
     assert_eq!((&job["problem"]["limit"], &job["problem"]["allowed"]), (&json!("seconds"), &json!(0.5)));

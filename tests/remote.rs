@@ -182,13 +182,10 @@ fn refusals_have_the_exit_codes_of_this_machine() {
     assert!(run(Some(&service), ["--local", "evaluate", model, "--tolerance", "0.1", "-o", out]).status.success());
 }
 
-/// Work for a minute at least.
+/// A file with a job for minutes.
 fn long(scratch: &Scratch) -> std::path::PathBuf {
-    let model: Value = serde_json::from_slice(&std::fs::read(cases::named("ifs/sierpinski_tetrahedron").model()).unwrap()).unwrap();
-    let job = json!({ "lacuna": 1, "kind": "solidify", "model": model, "params": { "tolerance_mm": 0.04, "radius_mm": 0.4 },
-        "outputs": ["stl"], "limits": { "triangles": 40_000_000 } });
     let path = scratch.join("long.json");
-    std::fs::write(&path, job.to_string()).unwrap();
+    std::fs::write(&path, cases::long_job(0).to_string()).unwrap();
     path
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::{run, succeed};
-use lacuna_tests::support::cases::{self, model};
+use lacuna_tests::support::cases::{self, long_job, model};
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::{Answer, Service, submit};
 use serde_json::{Value, json};
@@ -16,12 +16,6 @@ use serde_json::{Value, json};
 fn order() -> Value {
     json!({ "lacuna": 1, "kind": "solidify", "model": model("meshes/segment"), "params": { "tolerance_mm": 0.05, "radius_mm": 1.0 },
         "outputs": ["stl", "3mf"] })
-}
-
-/// Work for many seconds: a Sierpinski tetrahedron with a thin wall.
-fn long_order() -> Value {
-    json!({ "lacuna": 1, "kind": "solidify", "model": model("ifs/sierpinski_tetrahedron"),
-        "params": { "tolerance_mm": 0.04, "radius_mm": 0.4 }, "outputs": ["stl"], "limits": { "triangles": 40_000_000 } })
 }
 
 /// A problem document of a status, whose words name something, and after which the service still works.
@@ -272,7 +266,7 @@ fn what_is_not_there_is_a_problem_too() {
 fn a_job_can_be_stopped() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
-    let accepted = service.post("/v1/jobs", &long_order());
+    let accepted = service.post("/v1/jobs", &long_job(0));
     assert_eq!(accepted.status, 202, "{}", accepted.json());
     let id = accepted.json()["id"].as_str().unwrap().to_owned();
     std::thread::sleep(Duration::from_millis(300));
@@ -292,7 +286,7 @@ fn a_job_can_be_stopped() {
 fn a_time_limit_is_kept() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
-    let mut order = long_order();
+    let mut order = long_job(0);
     order["limits"]["seconds"] = json!(1);
     let start = Instant::now();
     let view = service.done(&order);
@@ -307,7 +301,7 @@ fn results_and_waiting_jobs_outlive_a_power_failure() {
     let scratch = Scratch::new();
     let service = Service::start_with(scratch.path(), &[("LACUNA_WORKERS", "1")]);
     let done = service.done(&order());
-    let running = service.post("/v1/jobs", &long_order()).json()["id"].as_str().unwrap().to_owned();
+    let running = service.post("/v1/jobs", &long_job(0)).json()["id"].as_str().unwrap().to_owned();
     let mut small = order();
     small["params"]["radius_mm"] = json!(2.0);
     let waiting = service.post("/v1/jobs", &small).json()["id"].as_str().unwrap().to_owned();

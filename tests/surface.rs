@@ -6,16 +6,10 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use lacuna_tests::support::binary::{lacuna, run, succeed};
-use lacuna_tests::support::cases::model;
+use lacuna_tests::support::cases::{long_job, model};
 use lacuna_tests::support::scratch::Scratch;
 use lacuna_tests::support::service::{Service, until};
 use serde_json::{Value, json};
-
-/// Work for a minute at least.
-fn long_order(tolerance: f64) -> Value {
-    json!({ "lacuna": 1, "kind": "solidify", "model": model("ifs/sierpinski_tetrahedron"),
-        "params": { "tolerance_mm": tolerance, "radius_mm": 0.4 }, "outputs": ["stl"], "limits": { "triangles": 40_000_000 } })
-}
 
 #[test]
 fn shortcuts_are_jobs_that_are_waited_for() {
@@ -47,8 +41,8 @@ fn shortcuts_are_jobs_that_are_waited_for() {
 fn a_new_job_stops_the_one_that_it_supersedes() {
     let scratch = Scratch::new();
     let service = Service::start(scratch.path());
-    let first = service.post("/v1/jobs", &long_order(0.04)).json()["id"].as_str().unwrap().to_owned();
-    let mut second = long_order(0.05);
+    let first = service.post("/v1/jobs", &long_job(0)).json()["id"].as_str().unwrap().to_owned();
+    let mut second = long_job(1);
     second["supersedes"] = json!(first);
     // A job that is refused replaces nothing.
     let mut refused = second.clone();
@@ -383,7 +377,7 @@ fn an_answer_that_takes_too_long_is_a_problem_and_a_job_s_id_comes_before() {
     assert!(problem["detail"].as_str().unwrap().contains("3 s"), "{problem}");
 
     // Whoever would wait longer than an answer may take gets the job's id while there is time.
-    let answer = service.post_with("/v1/jobs", &[("prefer", "wait=30")], long_order(0.04).to_string().as_bytes());
+    let answer = service.post_with("/v1/jobs", &[("prefer", "wait=30")], long_job(0).to_string().as_bytes());
     assert_eq!(answer.status, 202, "{}", answer.json());
     assert!(matches!(answer.header("preference-applied"), "wait=1" | "wait=2"), "{answer:?}");
     assert_eq!(service.post(&format!("{}/cancel", answer.header("location")), &json!({})).status / 100, 2);

@@ -192,6 +192,23 @@ pub fn model(name: &str) -> serde_json::Value {
     serde_json::from_slice(&fs::read(named(name).model()).unwrap()).unwrap()
 }
 
+/// A job document for minutes on two cores that is accepted in a moment, another one for every number: a Sierpinski
+/// tetrahedron with a thin wall, of 40 million triangles before they are made fewer.
+#[must_use]
+pub fn long_job(number: u32) -> serde_json::Value {
+    serde_json::json!({ "lacuna": 1, "kind": "solidify", "model": model("ifs/sierpinski_tetrahedron"), "outputs": ["stl"],
+        "params": { "tolerance_mm": 0.04 + f64::from(number) / 1e7, "radius_mm": 0.4 }, "limits": { "triangles": 40_000_000 } })
+}
+
+/// A job document for some seconds that is accepted at once, another one for every number: how far two fractals are apart,
+/// for a tolerance that the search does not reach.
+#[must_use]
+pub fn search_job(number: u32) -> serde_json::Value {
+    let input = |name: &str, path: &str| serde_json::json!({ "name": name, "model": model(path) });
+    serde_json::json!({ "lacuna": 1, "kind": "measure", "params": { "tolerance_mm": 1e-6 + f64::from(number) / 1e10 },
+        "inputs": [input("a", "ifs/sierpinski_tetrahedron"), input("b", "ifs/menger_sponge")] })
+}
+
 /// The cases that make a solid.
 #[must_use]
 pub fn solids() -> Vec<Case> {

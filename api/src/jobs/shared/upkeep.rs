@@ -96,13 +96,18 @@ async fn refresh_all(shared: Arc<Shared>) {
 
 /// Takes up the jobs of workers that were not heard of for the time of their lease.
 ///
-/// While the database was away no worker could renew its lease. So only who has reached the database all through
-/// the time of two leases judges others by theirs: in the first of them every worker finds its way back.
+/// While the database was away no worker could renew its lease, nor while the machine stood still. So only who has
+/// reached the database all through the time of two leases, and was not held up itself, judges others by theirs: in the
+/// first of them every worker finds its way back.
 async fn look_after(ledger: Weak<Shared>) {
     let mut reached_since = Instant::now();
     loop {
+        let rest = Instant::now();
         tokio::time::sleep(LOOK_EVERY).await;
         let Some(shared) = ledger.upgrade() else { return };
+        if rest.elapsed() > LOOK_EVERY + shared.lease / 2 {
+            reached_since = Instant::now();
+        }
         crate::locked(&shared.mirrors).retain(|_, job| job.strong_count() > 0);
         if let Err(problem) = shared.within(take_up(&shared, &mut reached_since)).await {
             tracing::warn!(detail = %problem.detail, "leases cannot be looked at");
