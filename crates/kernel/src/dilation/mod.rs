@@ -35,6 +35,7 @@ mod plan;
 mod sample;
 mod seam;
 mod simplify;
+mod slivers;
 mod smooth;
 mod stability;
 mod star;

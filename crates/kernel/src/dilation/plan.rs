@@ -463,7 +463,8 @@ impl<'a> Plan<'a> {
     ) -> Result<Dilation, DilationError> {
         let is_proven = !setting.dense && uncertain == 0;
         let uncertain = uncertain + dust::remove(setting, &self.rule, &space.candidates, is_proven, &mut surface) as u64;
-        let mended = mend(std::mem::take(&mut surface.vertices), &surface.triangles, setting.rounding, budget)?;
+        let (vertices, triangles) = (std::mem::take(&mut surface.vertices), std::mem::take(&mut surface.triangles));
+        let mended = mend(vertices, triangles, setting.rounding, budget)?;
         budget.report("dilate", 1.0, mended.triangles.len() as u64);
         surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
         self.certify(setting, surface, mended.crossings, uncertain, pitch_mm, budget)

@@ -15,11 +15,13 @@
 
 use super::certificate::{Nearby, Places};
 use super::plan::Setting;
+use super::slivers;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Tree, in_space};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::budget::{Budget, Stopped};
+use crate::solid::around::Around;
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::mend::{LEAST_HEIGHT, MOST_AROUND, Mender};
 
@@ -111,23 +113,15 @@ impl<'a> Simplifier<'a> {
         surface: &mut BlockSurface,
         budget: &Budget,
     ) -> Result<(), Stopped> {
-        let starts = self.tree.reset(candidates);
-        let edge = 2.0 * setting.lattice.pitch;
-        let size = (0..3).map(|axis| core.high[axis] - core.low[axis]).fold(0.0, f64::max);
-        let top = (size / edge).log2().ceil().max(0.0) as u32 + 1;
-        self.places.reset(core.low, edge, top, starts);
-        let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
-        let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
-        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
-        self.mender.start(&mesh);
-        let inside: Vec<bool> = mesh.points.iter().map(|point| core.contains(point)).collect();
-        surface.settled.resize(mesh.points.len(), false);
-        self.mender.clean(&mut mesh, &inside, &surface.settled, setting.rounding);
+        surface.settled.resize(surface.vertices.len(), false);
         if self.clean_only {
-            self.remove_slivers(setting, &mut mesh, &inside);
-            self.write(&mut mesh, &inside, surface);
+            self.remove_slivers(setting, core, candidates, surface);
             return Ok(());
         }
+        let mut mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
+        self.start(setting, core, candidates, &mesh);
+        let inside: Vec<bool> = mesh.points.iter().map(|point| core.contains(point)).collect();
+        self.mender.clean(&mut mesh, &inside, &surface.settled, setting.rounding);
         self.mender.index(&mesh);
         // A settled vertex waits until something changes; `fresh` says that something did since its last trial.
         let mut fresh: Vec<bool> = surface.settled.iter().map(|settled| !settled).collect();
@@ -166,22 +160,44 @@ impl<'a> Simplifier<'a> {
         Ok(())
     }
 
-    /// Removes vertices of the slivers that could not be turned: rounding to single precision may fold them over their neighbours, and these are the
+    /// Begins with a mesh in a node.
+    fn start(&mut self, setting: &Setting, core: &Core, candidates: &Candidates, mesh: &HalfEdges) {
+        let starts = self.tree.reset(candidates);
+        let edge = 2.0 * setting.lattice.pitch;
+        let size = (0..3).map(|axis| core.high[axis] - core.low[axis]).fold(0.0, f64::max);
+        let top = (size / edge).log2().ceil().max(0.0) as u32 + 1;
+        self.places.reset(core.low, edge, top, starts);
+        let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
+        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
+        self.mender.start(mesh);
+    }
+
+    /// Turns edges of slivers, or removes their vertices: rounding to single precision may fold them over their neighbours, and these are the
     /// only crossings that a lattice's surface was seen to have.
-    fn remove_slivers(&mut self, setting: &Setting, mesh: &mut HalfEdges, inside: &[bool]) {
-        let slivers = std::mem::take(&mut self.mender.slivers);
-        if !slivers.is_empty() {
-            self.due.clear();
-            self.due.resize(mesh.points.len(), 0.0);
-            self.mender.index(mesh);
-            let upper = (OF_LATTICE.passes[0] * (setting.outer - setting.least)).max(SLIVER_MOVE * setting.rounding);
-            for corner in slivers.iter().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<Vec<u32>>() {
-                if inside[corner as usize] && mesh.is_used(corner) {
-                    self.remove(setting, mesh, inside, corner, 0.0, upper);
+    fn remove_slivers(&mut self, setting: &Setting, core: &Core, candidates: &Candidates, surface: &mut BlockSurface) {
+        if let Some(mut around) = slivers::around(surface, core, setting.rounding, 2.0 * setting.lattice.pitch) {
+            let Around { mesh, numbers, is_whole, .. } = &mut around;
+            let inside: Vec<bool> = mesh.points.iter().zip(is_whole).map(|(point, whole)| *whole && core.contains(point)).collect();
+            let settled: Vec<bool> = numbers.iter().map(|&number| surface.settled[number as usize]).collect();
+            self.start(setting, core, candidates, mesh);
+            self.mender.clean(mesh, &inside, &settled, setting.rounding);
+            let left = std::mem::take(&mut self.mender.slivers);
+            if !left.is_empty() {
+                self.due.clear();
+                self.due.resize(mesh.points.len(), 0.0);
+                self.mender.index(mesh);
+                let upper = (OF_LATTICE.passes[0] * (setting.outer - setting.least)).max(SLIVER_MOVE * setting.rounding);
+                for corner in left.iter().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<Vec<u32>>() {
+                    if inside[corner as usize] && mesh.is_used(corner) {
+                        self.remove(setting, mesh, &inside, corner, 0.0, upper);
+                    }
                 }
             }
+            self.mender.slivers = left;
+            slivers::write(around, surface);
+            surface.site_error = surface.site_error.max(self.tree.largest_error);
         }
-        self.mender.slivers = slivers;
+        slivers::settle(surface, core);
     }
 
     /// Moves vertices outwards to the end of the band where the distance is smooth: chords between them have the whole band then.

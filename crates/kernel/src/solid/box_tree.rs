@@ -56,25 +56,23 @@ pub(crate) struct BoxTree {
     places: Vec<u32>,
     /// The items' boxes along the curve.
     boxes: Vec<Box32>,
-    given: Vec<Option<Box32>>,
     keys: Vec<u64>,
 }
 
 impl BoxTree {
     /// Makes the tree over those of `items` that have a box.
     pub(crate) fn build(&mut self, items: usize, box_of: impl Fn(u32) -> Option<Box32> + Sync, parallel: bool) {
-        let Self { nodes, leaves, order, places, boxes, given, keys } = self;
+        // Boxes are asked for again and again: to keep them takes more memory than all the rest.
+        let Self { nodes, leaves, order, places, boxes, keys } = self;
         let count = items as u32;
-        given.clear();
-        if parallel {
-            given.par_extend((0..count).into_par_iter().map(&box_of));
+        let all = if parallel {
+            (0..count).into_par_iter().filter_map(&box_of).reduce(|| Box32::EMPTY, |all, own| all.union(&own))
         } else {
-            given.extend((0..count).map(box_of));
-        }
-        let all = given.iter().flatten().fold(Box32::EMPTY, |all, own| all.union(own));
+            (0..count).filter_map(&box_of).fold(Box32::EMPTY, |all, own| all.union(&own))
+        };
         let scale: [f32; 3] = std::array::from_fn(|axis| 1023.0 / (all.high[axis] - all.low[axis]).max(f32::MIN_POSITIVE));
         let key = |item: u32| {
-            let own = given[item as usize]?;
+            let own = box_of(item)?;
             let code = (0..3).fold(0_u64, |code, axis| {
                 let middle = 0.5 * (own.low[axis] + own.high[axis]);
                 code | spread(((middle - all.low[axis]) * scale[axis]) as u64) << axis
@@ -100,7 +98,12 @@ impl BoxTree {
         nodes.clear();
         nodes.resize(2 * *leaves, Box32::EMPTY);
         boxes.clear();
-        boxes.extend(order.iter().filter_map(|&item| given[item as usize]));
+        boxes.reserve(order.len());
+        if parallel {
+            boxes.par_extend(order.par_iter().map(|&item| box_of(item).unwrap_or(Box32::EMPTY)));
+        } else {
+            boxes.extend(order.iter().map(|&item| box_of(item).unwrap_or(Box32::EMPTY)));
+        }
         for (place, own) in boxes.iter().enumerate() {
             let leaf = *leaves + place / LEAF;
             nodes[leaf] = nodes[leaf].union(own);

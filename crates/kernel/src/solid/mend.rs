@@ -4,6 +4,7 @@
 //! Joining vertices at one place and turning the edges of triangles without area leave the surface as a set what it is. What is left is moved by a few steps of
 //! single precision, see [`NUDGE`].
 
+use super::around::Around;
 use super::box_tree::{Box32, BoxTree};
 use super::contact;
 use super::half_edges::{HalfEdges, NONE, Star, next};
@@ -13,7 +14,7 @@ use super::{Crossings, TriMesh};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use glam::DVec3;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 /// How far vertices are moved that leave a triangle without area, or triangles that cross, in units of rounding: [`MOST_STEPS`] of single precision along each axis.
 pub(crate) const NUDGE: f64 = 2.0 * MOST_STEPS as f64;
@@ -43,23 +44,76 @@ pub(crate) struct Mended {
 ///
 /// # Errors
 /// [`Stopped`].
-pub(crate) fn mend(points: Vec<Point>, triangles: &[[u32; 3]], rounding: f64, budget: &Budget) -> Result<Mended, Stopped> {
-    let mut mesh = HalfEdges::new(points, triangles);
-    let (inside, settled) = (vec![true; mesh.points.len()], vec![false; mesh.points.len()]);
+pub(crate) fn mend(mut points: Vec<Point>, mut triangles: Vec<[u32; 3]>, rounding: f64, budget: &Budget) -> Result<Mended, Stopped> {
     let mut mender = Mender::default();
-    mender.start(&mesh);
-    mender.clean(&mut mesh, &inside, &settled, rounding);
-    let mut moved = BTreeSet::new();
-    mender.nudge(&mut mesh, &mut moved);
-    let mut found = crossings(&mesh, budget)?;
+    let mut moved = HashSet::new();
+    let slivers = triangles.iter().filter(|triangle| is_sliver(&triangle.map(|corner| points[corner as usize]), LEAST_HEIGHT * rounding));
+    let corners: HashSet<u32> = slivers.flatten().copied().collect();
+    if !corners.is_empty() {
+        let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
+        let Around { mesh, numbers, is_whole, .. } = &mut around;
+        mender.start(mesh);
+        mender.clean(mesh, is_whole, &vec![false; mesh.points.len()], rounding);
+        let mut nudged = BTreeSet::new();
+        mender.nudge(mesh, &mut nudged);
+        moved.extend(nudged.iter().map(|&vertex| numbers[vertex as usize]));
+        renumber(&mut moved, &around.write(&mut points, &mut triangles));
+    }
+    let mut found = crossings(&mut points, &mut triangles, budget)?;
     for _ in 0..PART_ROUNDS {
-        if found.count == 0 || !mender.part(&mut mesh, &found.first, rounding, &mut moved) {
+        if found.count == 0 {
             break;
         }
-        found = crossings(&mesh, budget)?;
+        let corners: HashSet<u32> = found.first.iter().flatten().flat_map(|&triangle| triangles[triangle as usize]).collect();
+        let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
+        let Around { mesh, numbers, .. } = &mut around;
+        mender.start(mesh);
+        let (mut tried, mut own) = (BTreeSet::new(), BTreeSet::new());
+        for (vertex, number) in (0..).zip(numbers.iter()) {
+            if corners.contains(number) {
+                tried.insert(vertex);
+            }
+            if moved.contains(number) {
+                own.insert(vertex);
+            }
+        }
+        let changed = mender.part(mesh, &tried, rounding, &mut own);
+        moved.extend(own.iter().map(|&vertex| numbers[vertex as usize]));
+        renumber(&mut moved, &around.write(&mut points, &mut triangles));
+        if !changed {
+            break;
+        }
+        found = crossings(&mut points, &mut triangles, budget)?;
     }
-    let (points, triangles, _) = mesh.compact();
+    drop_unused(&mut points, &mut triangles);
     Ok(Mended { points, triangles, crossings: found.count })
+}
+
+/// Gives vertices their new numbers, without those that are gone.
+fn renumber(vertices: &mut HashSet<u32>, numbers: &[u32]) {
+    *vertices = vertices.iter().map(|&vertex| numbers[vertex as usize]).filter(|&vertex| vertex != NONE).collect();
+}
+
+/// Removes vertices that no triangle has.
+fn drop_unused(points: &mut Vec<Point>, triangles: &mut [[u32; 3]]) {
+    let mut numbers = vec![NONE; points.len()];
+    triangles.iter().flatten().for_each(|&corner| numbers[corner as usize] = 0);
+    let mut used = numbers.iter().map(|&number| number != NONE);
+    points.retain(|_| used.next() == Some(true));
+    if points.len() < numbers.len() {
+        numbers.iter_mut().filter(|number| **number != NONE).zip(0..).for_each(|(number, count)| *number = count);
+        triangles.iter_mut().flatten().for_each(|corner| *corner = numbers[*corner as usize]);
+    }
+}
+
+/// Crossings of a mesh that is lent.
+fn crossings(points: &mut Vec<Point>, triangles: &mut Vec<[u32; 3]>, budget: &Budget) -> Result<Crossings, Stopped> {
+    let vertices = std::mem::take(points).into_iter().map(DVec3::from_array).collect();
+    let mesh = TriMesh { vertices, triangles: std::mem::take(triangles) };
+    let found = Crossings::among(&mesh, MOST_PARTED, budget);
+    *points = mesh.vertices.into_iter().map(|vertex| vertex.to_array()).collect();
+    *triangles = mesh.triangles;
+    found
 }
 
 /// A triangle that is compared with others.
@@ -239,12 +293,12 @@ impl Mender {
         }
     }
 
-    /// Parts triangles that cross by moving corners by a few steps of single precision, each at most once: slivers that rounding folds over their neighbours.
+    /// Parts triangles that cross by moving their corners by a few steps of single precision, each at most once: slivers that rounding folds over their neighbours.
     /// A corner that no step frees is joined with a neighbour as near as that. Whether anything was changed.
-    fn part(&mut self, mesh: &mut HalfEdges, pairs: &[[u32; 2]], rounding: f64, moved: &mut BTreeSet<u32>) -> bool {
+    fn part(&mut self, mesh: &mut HalfEdges, corners: &BTreeSet<u32>, rounding: f64, moved: &mut BTreeSet<u32>) -> bool {
         self.index(mesh);
         let mut changed = false;
-        for corner in pairs.iter().flatten().filter_map(|&triangle| mesh.triangle(triangle)).flatten().collect::<BTreeSet<u32>>() {
+        for &corner in corners {
             if moved.contains(&corner) || !mesh.is_used(corner) || !mesh.star(corner, usize::MAX, &mut self.star) {
                 continue;
             }
@@ -406,16 +460,6 @@ impl Mender {
     }
 }
 
-/// Crossings of what is left of a mesh, in its own numbers of triangles.
-fn crossings(mesh: &HalfEdges, budget: &Budget) -> Result<Crossings, Stopped> {
-    let kept: Vec<u32> = (0..mesh.triangles()).filter(|&triangle| mesh.triangle(triangle).is_some()).collect();
-    let triangles = kept.iter().filter_map(|&triangle| mesh.triangle(triangle)).collect();
-    let mesh = TriMesh { vertices: mesh.points.iter().copied().map(DVec3::from_array).collect(), triangles };
-    let mut crossings = Crossings::among(&mesh, MOST_PARTED, budget)?;
-    crossings.first.iter_mut().flatten().for_each(|triangle| *triangle = kept[*triangle as usize]);
-    Ok(crossings)
-}
-
 /// A point moved by some steps of single precision along the axes that a code of three digits names.
 fn stepped(from: &Point, code: usize, steps: u32) -> Point {
     std::array::from_fn(|axis| {
@@ -425,7 +469,7 @@ fn stepped(from: &Point, code: usize, steps: u32) -> Point {
 }
 
 /// Whether a triangle's least height is below `least`.
-fn is_sliver(points: &[Point; 3], least: f64) -> bool {
+pub(crate) fn is_sliver(points: &[Point; 3], least: f64) -> bool {
     let normal = cross(&subtract(&points[1], &points[0]), &subtract(&points[2], &points[0]));
     let longest = (0..3).map(|k| distance_squared(&points[k], &points[(k + 1) % 3])).fold(0.0, f64::max);
     dot(&normal, &normal) <= least * least * longest
@@ -435,6 +479,12 @@ fn is_sliver(points: &[Point; 3], least: f64) -> bool {
 mod tests {
     use super::*;
     use std::f64::consts::TAU;
+
+    /// How many pairs of triangles cross.
+    fn crossings(points: &[Point], triangles: &[[u32; 3]]) -> u64 {
+        let mesh = TriMesh { vertices: points.iter().copied().map(DVec3::from_array).collect(), triangles: triangles.to_vec() };
+        Crossings::of(&mesh, &Budget::default()).unwrap().count
+    }
 
     /// A torus of squares halved, its corners in single precision.
     fn torus(around: u32, along: u32) -> (Vec<Point>, Vec<[u32; 3]>) {
@@ -475,9 +525,9 @@ mod tests {
             }
             let extent = points.iter().flatten().fold(0.0_f64, |largest, x| largest.max(x.abs()));
             let rounding = super::super::rounding(extent);
-            let before = crossings(&HalfEdges::new(points.clone(), &triangles), &budget).unwrap().count;
+            let before = crossings(&points, &triangles);
             folded += usize::from(before > 0);
-            let mended = mend(points.clone(), &triangles, rounding, &budget).unwrap();
+            let mended = mend(points.clone(), triangles.clone(), rounding, &budget).unwrap();
             assert_eq!(mended.crossings, 0, "seed {seed}, {before} before");
             for point in &mended.points {
                 let nearest = points.iter().map(|old| distance_squared(old, point)).fold(f64::INFINITY, f64::min).sqrt();
@@ -501,10 +551,10 @@ mod tests {
             };
             let rough = f64::from(seed % 5);
             points.iter_mut().for_each(|point| *point = point.map(|x| f64::from((x + rough * share()) as f32)));
-            let mesh = HalfEdges::new(points, &triangles);
-            if crossings(&mesh, &Budget::default()).unwrap().count > 0 {
+            if crossings(&points, &triangles) > 0 {
                 continue;
             }
+            let mesh = HalfEdges::new(points, &triangles);
             let mut mender = Mender::default();
             mender.start(&mesh);
             mender.index(&mesh);
@@ -543,7 +593,7 @@ mod tests {
         let around = [[0, 1, 2], [0, 3, 1], [0, 4, 3], [1, 3, 4], [5, 1, 6], [2, 1, 5], [4, 0, 6], [1, 4, 6]];
         let closing = [[6, 0, 7], [5, 6, 7], [2, 5, 7], [0, 2, 7]];
         let triangles: Vec<[u32; 3]> = around.into_iter().chain(closing).collect();
-        let mended = mend(points.to_vec(), &triangles, super::super::rounding(103.0), &Budget::default()).unwrap();
+        let mended = mend(points.to_vec(), triangles, super::super::rounding(103.0), &Budget::default()).unwrap();
         assert_eq!(mended.crossings, 0);
         assert!(mended.points.len() < points.len(), "a corner is joined");
     }

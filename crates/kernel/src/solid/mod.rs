@@ -1,5 +1,6 @@
 //! Indexed triangle meshes and proven solids.
 
+pub(crate) mod around;
 pub(crate) mod box_tree;
 pub(crate) mod contact;
 mod crossings;
@@ -159,7 +160,7 @@ impl Solid {
         let extent = mesh.vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max);
         let rounding = rounding(extent);
         let points = mesh.vertices.iter().map(|vertex| vertex.to_array().map(|x| f64::from(x as f32))).collect();
-        let mended = mend::mend(points, &mesh.triangles, rounding, budget)?;
+        let mended = mend::mend(points, mesh.triangles.clone(), rounding, budget)?;
         let vertices = mended.points.into_iter().map(DVec3::from_array).collect();
         let solid = Self::new(TriMesh { vertices, triangles: mended.triangles }, budget)?;
         Ok(Rounded { solid, crossings: mended.crossings, moved_mm: carried(extent) })
