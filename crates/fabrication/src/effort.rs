@@ -7,11 +7,17 @@
 use lacuna_kernel::dilation::Prediction;
 
 /// For each triangle of a lattice's surface: made, cleaned, joined, verified, written and read back.
-const TRIANGLE: f64 = 5.1e-6;
-/// For each leaf cell that a block of the lattice meets: what is near to the block is sorted out, and its distances are found.
-const MET_CELL: f64 = 3.8e-6;
+const TRIANGLE: f64 = 3.3e-6;
+/// For each leaf cell that a block of the lattice meets: what is near to the block is sorted out.
+const MET_CELL: f64 = 1.7e-6;
+/// For each node or site that the searches for the nearest site of a place look at.
+const SEARCHED: f64 = 6.1e-9;
+/// For each site that is found near a place: it is held against the others there, so that cells that overlap take long.
+const FOUND: f64 = 2.9e-7;
 /// For each byte that the simplification looks at: the sites near a corner, all of which every trial to remove it asks.
-const LOOKED_AT_BYTE: f64 = 3.4e-9;
+const LOOKED_AT_BYTE: f64 = 2.9e-9;
+/// For each triangle of the polytopes around points and wires: made, simplified, verified, written and read back.
+const OF_POLYTOPE: f64 = 6.0e-6;
 /// For each leaf cell that is drawn by itself, and for each that becomes part of a conforming complex.
 const CELL: f64 = 5.0e-7;
 const FACE: f64 = 2.0e-6;
@@ -28,8 +34,11 @@ const CONVERTED: f64 = 1.0e-6;
 /// Of a dilation.
 pub(crate) fn of_dilation(prediction: &Prediction, simplify: bool) -> f64 {
     let triangles = prediction.triangles.max(prediction.counted_triangles);
+    if prediction.pitch_mm.is_none() {
+        return triangles * OF_POLYTOPE;
+    }
     let simplifying = if simplify { prediction.looked_at_bytes * LOOKED_AT_BYTE } else { 0.0 };
-    triangles * TRIANGLE + prediction.leaf_cells * MET_CELL + simplifying
+    triangles * TRIANGLE + prediction.leaf_cells * MET_CELL + prediction.searched * SEARCHED + prediction.found * FOUND + simplifying
 }
 
 /// Of an evaluation with so many leaf cells.

@@ -66,7 +66,7 @@ pub(crate) fn stl_bytes(triangles: f64) -> f64 {
 
 /// What a process holds for each byte that a lattice is accounted for where its mesh is left as it is: found on the fixtures, as is the next.
 /// `fixtures/ESTIMATES.md` shows how well they do.
-const HELD_PER_BYTE: f64 = 2.0;
+const HELD_PER_BYTE: f64 = 1.4;
 /// Threads that simplify at a time, each with memory of its own. The machine of the process that does the job may have more.
 const THREADS: f64 = 2.0;
 /// What a process holds that does next to nothing, in bytes: the program, its threads and their stacks.

@@ -226,6 +226,8 @@ impl<'a> Workshop<'a> {
         surface.uncertain.sort_unstable();
         surface.uncertain.dedup();
         surface.leaves = surface.leaves.max(self.tree.leaves);
+        surface.looked += self.tree.looked;
+        surface.found += self.tree.found;
         surface.site_error = surface.site_error.max(self.tree.largest_error);
     }
 

@@ -195,6 +195,10 @@ pub struct Prediction {
     pub simplifying_bytes: f64,
     /// That of all blocks together, in bytes: what the simplification looks at, and so a measure of its work.
     pub looked_at_bytes: f64,
+    /// Nodes and sites that the searches for the nearest sites look at: a measure of their work.
+    pub searched: f64,
+    /// Sites that searches find near points, for each point anew: all of these are compared there.
+    pub found: f64,
     /// The result is nowhere thinner: 2 (r - i), with the least radius r and the most that the inner bound i may be.
     pub least_thickness_mm: f64,
     /// a, in mm, where there is a lattice.

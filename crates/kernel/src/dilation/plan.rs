@@ -349,6 +349,8 @@ impl<'a> Plan<'a> {
                 leaf_cells: arrangement.leaves() as f64,
                 simplifying_bytes: 0.0,
                 looked_at_bytes: 0.0,
+                searched: 0.0,
+                found: 0.0,
                 least_thickness_mm,
                 pitch_mm: None,
             });
@@ -363,6 +365,8 @@ impl<'a> Plan<'a> {
             leaf_cells: expected.leaves,
             simplifying_bytes: expected.simplifying,
             looked_at_bytes: expected.looked_at,
+            searched: expected.searched,
+            found: expected.found,
             least_thickness_mm,
             pitch_mm: Some(self.pitch),
         })

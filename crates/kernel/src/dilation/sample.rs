@@ -42,6 +42,10 @@ pub(super) struct Expected {
     pub(super) simplifying: f64,
     /// Those of all blocks together: what it looks at.
     pub(super) looked_at: f64,
+    /// Nodes and sites that the searches of all blocks look at.
+    pub(super) searched: f64,
+    /// Sites that they find near points, for each point anew.
+    pub(super) found: f64,
 }
 
 /// What was made of a block.
@@ -50,6 +54,8 @@ struct Made {
     made: u64,
     triangles: u64,
     leaves: u64,
+    searched: u64,
+    found: u64,
     simplifying: usize,
     /// Triangles of a block whose simplification was tried.
     tried: u64,
@@ -111,8 +117,8 @@ impl Pass<'_> {
         let held = held(&blocks) / blocks.len().max(1);
         let at_a_time = (MOST_HELD / 4 / held.max(1)).clamp(1, AT_A_TIME);
         for (round, some) in blocks.chunks(at_a_time).enumerate() {
-            // What simplification holds differs little from block to block; to find it takes as long as all the rest.
-            let simplify = simplify && round == 0;
+            // What simplification holds differs little from block to block; to find it takes as long as all the rest. Blocks may be empty.
+            let simplify = simplify && sum.tried == 0;
             let made: Vec<Result<Made, DilationError>> =
                 some.par_iter().with_max_len(1).map(|(node, inherited)| self.made(*node, inherited, &cleaning, simplify)).collect();
             for made in made {
@@ -122,6 +128,8 @@ impl Pass<'_> {
                     made: sum.made + made.made,
                     triangles: sum.triangles + made.triangles,
                     leaves: sum.leaves + made.leaves,
+                    searched: sum.searched + made.searched,
+                    found: sum.found + made.found,
                     simplifying: sum.simplifying.max(made.simplifying),
                     tried: sum.tried + made.tried,
                 };
@@ -138,6 +146,8 @@ impl Pass<'_> {
             made: sum.made as f64 * each,
             triangles,
             leaves: sum.leaves as f64 * each,
+            searched: sum.searched as f64 * each,
+            found: sum.found as f64 * each,
             simplifying: sum.simplifying as f64 * GROWN,
             // As many to a triangle everywhere as where it was tried.
             looked_at: looked_at as f64 * triangles / sum.tried.max(1) as f64,
@@ -161,6 +171,7 @@ impl Pass<'_> {
             let task = Task::Changed(&Changed::new(&new), &blocks);
             surface = self.graded(&grading, task).block(node, candidates, open)?.unwrap_or_default();
         }
+        let (searched, found) = (surface.looked, surface.found);
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let core = self.core(node);
         Simplifier::new(self.rule, cleaning).run(cleaning, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
@@ -172,7 +183,7 @@ impl Pass<'_> {
             simplifier.run(self.setting, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
             (simplifying, tried) = (simplifier.bytes(), triangles);
         }
-        Ok(Made { made, triangles, leaves, simplifying, tried })
+        Ok(Made { made, triangles, leaves, searched, found, simplifying, tried })
     }
 
     /// Another task of the same pass over a lattice that is graded otherwise.

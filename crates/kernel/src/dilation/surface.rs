@@ -32,6 +32,10 @@ pub(super) struct BlockSurface {
     pub(super) pieces: Vec<(Cube, u32)>,
     /// Leaf cells met.
     pub(super) leaves: u64,
+    /// What the searches for sites looked at: see [`super::tree::Tree::looked`].
+    pub(super) looked: u64,
+    /// Sites that were found near points, see [`super::tree::Tree::found`].
+    pub(super) found: u64,
     /// Largest errors of leaves met.
     pub(super) site_error: SiteError,
     /// Cubes to subdivide: the distance may have a critical point on the wrong side there, or, among dense sites, what would be filled is not near a site.

@@ -138,6 +138,10 @@ pub(super) struct Tree<'a> {
     scratch: [Vec<ControlPoint>; 2],
     /// Leaf cells met.
     pub(super) leaves: u64,
+    /// Nodes and sites whose distance from a point was asked: the work of all searches.
+    pub(super) looked: u64,
+    /// Sites that were found near a point, for each point anew.
+    pub(super) found: u64,
     /// Largest errors of leaves that were met.
     pub(super) largest_error: SiteError,
 }
@@ -159,6 +163,8 @@ impl<'a> Tree<'a> {
             stack: Vec::new(),
             scratch: [Vec::new(), Vec::new()],
             leaves: 0,
+            looked: 0,
+            found: 0,
             largest_error: SiteError::default(),
         }
     }
@@ -182,6 +188,8 @@ impl<'a> Tree<'a> {
         self.points.clear();
         self.sites.clear();
         self.leaves = 0;
+        self.looked = 0;
+        self.found = 0;
         self.exhausted = false;
         self.largest_error = SiteError::default();
         self.point_sites.clear();
@@ -336,15 +344,20 @@ impl<'a> Tree<'a> {
                 continue;
             }
             match node.content {
-                Content::Points(..) | Content::Sites(..) => {
+                Content::Points(_, count) | Content::Sites(_, count) => {
+                    self.looked += u64::from(count);
                     self.visit_sites(x, id, best);
                     if best.limit < best.enough {
                         return;
                     }
                 }
-                Content::Open(first, count) => self.push_near(x, first, count, best, stack),
+                Content::Open(first, count) => {
+                    self.looked += u64::from(count);
+                    self.push_near(x, first, count, best, stack);
+                }
                 Content::Closed(points) => {
                     let (first, count) = self.expand(id, points);
+                    self.looked += u64::from(count);
                     self.push_near(x, first, count, best, stack);
                 }
             }
@@ -459,26 +472,34 @@ impl<'a> Tree<'a> {
             let deficit = self.deficit(id);
             match node.content {
                 Content::Points(first, count) => {
+                    self.looked += u64::from(count);
                     for index in first..first + count {
                         let point = &self.point_sites[index as usize];
                         let square = distance_squared(x, point) + deficit;
                         if square <= limit {
+                            self.found += 1;
                             visit(SiteId::Point(index), point, square);
                         }
                     }
                 }
                 Content::Sites(first, count) => {
+                    self.looked += u64::from(count);
                     for index in first..first + count {
                         let closest = self.sites[index as usize].closest(x);
                         let square = distance_squared(x, &closest) + deficit;
                         if square <= limit {
+                            self.found += 1;
                             visit(SiteId::Listed(index), &closest, square);
                         }
                     }
                 }
-                Content::Open(first, count) => stack.extend(first..first + count),
+                Content::Open(first, count) => {
+                    self.looked += u64::from(count);
+                    stack.extend(first..first + count);
+                }
                 Content::Closed(points) => {
                     let (first, count) = self.expand(id, points);
+                    self.looked += u64::from(count);
                     stack.extend(first..first + count);
                 }
             }

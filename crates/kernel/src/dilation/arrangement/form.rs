@@ -52,6 +52,8 @@ const DENSITIES: [f64; 10] = [0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1
 const TURNS: [f64; 2] = [0.5, 0.38];
 /// Rounding of unit vectors, far below any edge.
 const ROUNDING: f64 = 1e-9;
+/// A hole is seen where the farthest facet is by this more than it may be, in its cosine: far above rounding.
+const SEEN: f64 = 1e-7;
 /// What [`ROUNDING`] makes of the cosine of an angle between facets, at most, with room to spare.
 const AROUND: f64 = 1e-6;
 
@@ -70,6 +72,9 @@ impl Form {
     /// The polytope with a pattern of facets, if it is simple, has no vertex on the plane across the axis, and lies within `most`.
     fn new(pattern: &Pattern, most: f64) -> Option<Self> {
         let (normals, ends) = pattern.normals();
+        if pattern.leaves_a_hole(&normals, most) {
+            return None;
+        }
         let count = normals.len();
         // Facets that meet in a vertex within `most` are no farther from each other than this.
         let widest = 2.0 / (most * most) - 1.0 - ROUNDING;
@@ -216,6 +221,38 @@ impl Pattern {
         }
         (normals, ends)
     }
+
+    /// Whether the polytope surely reaches farther than `most`: in some direction no normal comes within the angle whose cosine is 1 / most. Looked for where two facets of a row meet one of
+    /// the next or of the last one, as most patterns that do not serve show.
+    fn leaves_a_hole(&self, normals: &[Point], most: f64) -> bool {
+        let mut start = self.belt;
+        let mut below: Vec<Point> = normals[..self.belt].to_vec();
+        for row in 1..=self.rows {
+            let count = self.row(row).2;
+            let above: Vec<Point> = normals[start..start + 2 * count].iter().step_by(2).copied().collect();
+            start += 2 * count;
+            if [(&below, &above), (&above, &below)].into_iter().any(|(pairs, thirds)| is_open(pairs, thirds, normals, most)) {
+                return true;
+            }
+            below = above;
+        }
+        !self.is_closed && below[0][2] < 1.0 / most - SEEN
+    }
+}
+
+/// Whether a direction in which two neighbours of a ring meet the nearest of another one is far from all normals.
+fn is_open(pairs: &[Point], thirds: &[Point], normals: &[Point], most: f64) -> bool {
+    if pairs.len() < 2 {
+        return false;
+    }
+    (0..pairs.len()).any(|place| {
+        let (a, b) = (&pairs[place], &pairs[(place + 1) % pairs.len()]);
+        let middle: Point = std::array::from_fn(|axis| a[axis] + b[axis]);
+        let Some(third) = thirds.iter().max_by(|p, q| dot(p, &middle).total_cmp(&dot(q, &middle))) else { return false };
+        let Some(vertex) = meeting([a, b, third], [1.0; 3]) else { return false };
+        let length = dot(&vertex, &vertex).sqrt();
+        length > most && normals.iter().all(|normal| dot(normal, &vertex) < (1.0 / most - SEEN) * length)
+    })
 }
 
 /// The point on three planes n . x = c, if there is one to speak of.
@@ -249,5 +286,36 @@ mod tests {
             }
         }
         assert!(Form::within(1.001).is_none());
+    }
+
+    /// What is seen to leave a hole reaches farther indeed, and most of what does is seen: patterns for several balls, held against their vertices.
+    #[test]
+    fn holes_that_are_seen_are_there() {
+        let (mut seen, mut missed) = (0, 0);
+        for most in [1.5, 1.2, 1.1, 1.06] {
+            let least = (PI / (1.0_f64 / most).acos()).ceil() as usize;
+            for pattern in Pattern::all(least).step_by(97).filter(|pattern| pattern.facets() <= 110) {
+                let (normals, _) = pattern.normals();
+                let is_seen = pattern.leaves_a_hole(&normals, most);
+                // The farthest vertex, by all triples.
+                let mut reach = 0.0_f64;
+                for a in 0..normals.len() {
+                    let near: Vec<usize> = (a + 1..normals.len()).filter(|&b| dot(&normals[a], &normals[b]) > -0.7).collect();
+                    for (place, &b) in near.iter().enumerate() {
+                        for &c in &near[place + 1..] {
+                            let Some(vertex) = meeting([&normals[a], &normals[b], &normals[c]], [1.0; 3]) else { continue };
+                            let length = dot(&vertex, &vertex).sqrt();
+                            if length > reach && normals.iter().all(|normal| dot(normal, &vertex) <= 1.0 + ROUNDING) {
+                                reach = length;
+                            }
+                        }
+                    }
+                }
+                assert!(!is_seen || reach > most, "{most}: {} facets reach {reach}", normals.len());
+                seen += usize::from(is_seen);
+                missed += usize::from(!is_seen && reach > most);
+            }
+        }
+        assert!(seen > 20 && missed * 10 < seen, "{seen} seen, {missed} missed");
     }
 }

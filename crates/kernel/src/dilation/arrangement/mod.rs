@@ -24,6 +24,7 @@ use form::Form;
 use nerve::Common;
 use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
+use std::sync::{Arc, OnceLock};
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at all
 /// sets. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
@@ -50,6 +51,7 @@ pub(super) struct Arrangement<'a> {
     /// How far beyond its ends each of them is cut.
     beyond: Vec<[Option<f64>; 2]>,
     near: Lists,
+    forms: Forms,
     /// About how many triangles will be made.
     pub(super) triangles: f64,
 }
@@ -78,8 +80,9 @@ impl<'a> Arrangement<'a> {
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
         let shell = |site: &Weighted| setting.shell(site, State::default());
-        let Some(form) = setting.form(&sites.list, State::default()) else { return Ok(None) };
-        let beyond = joints::cuts(&sites.list, &form, shell);
+        let forms = Forms::default();
+        let Some(form) = forms.of(setting, &sites.list, State::default()) else { return Ok(None) };
+        let beyond = joints::cuts(&sites.list, form, shell);
         let body = |(weighted, &beyond): (&Weighted, &[Option<f64>; 2])| Body {
             site: weighted.site,
             reach: weighted.in_space(setting.outer) + setting.slack,
@@ -88,7 +91,7 @@ impl<'a> Arrangement<'a> {
         let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
         let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
         drop(bodies);
-        let mut arrangement = Self { setting, sites, beyond, near, triangles: 0.0 };
+        let mut arrangement = Self { setting, sites, beyond, near, forms, triangles: 0.0 };
         arrangement.triangles = arrangement.expected_triangles(budget)?;
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
@@ -139,7 +142,8 @@ impl<'a> Arrangement<'a> {
     fn engine(&self, trial: u64) -> Engine<'_> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
-        Engine { setting: self.setting, sites, beyond: &self.beyond, near: &self.near, polytopes: Polytopes::default(), states, trial }
+        let Self { setting, beyond, near, forms, .. } = self;
+        Engine { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), states, trial }
     }
 }
 
@@ -238,6 +242,18 @@ impl Setting {
     }
 }
 
+/// The forms of an arrangement by their states, and where there is none: to look for one takes as long as hundreds of polytopes, so it is done once.
+#[derive(Default)]
+struct Forms([[OnceLock<Option<Arc<Form>>>; 2]; LEVELS as usize]);
+
+impl Forms {
+    /// The form for a state below [`LEVELS`].
+    fn of(&self, setting: &Setting, sites: &[Weighted], state: State) -> Option<&Arc<Form>> {
+        let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)];
+        place.get_or_init(|| setting.form(sites, state).map(Arc::new)).as_ref()
+    }
+}
+
 /// What a trial came to.
 enum Run {
     Done(Box<Arranged>),
@@ -252,6 +268,7 @@ struct Engine<'a> {
     sites: &'a [Weighted],
     beyond: &'a [[Option<f64>; 2]],
     near: &'a Lists,
+    forms: &'a Forms,
     polytopes: Polytopes,
     states: Vec<State>,
     trial: u64,
@@ -291,17 +308,15 @@ impl Engine<'_> {
 
     /// The index of the form for a state; none where none is fine enough.
     fn form(&mut self, state: State, cut: [bool; 2]) -> Option<usize> {
-        let [own, whole] = [cut, [false; 2]].map(|cut| state.form(cut));
+        let own = state.form(cut);
         if own >= self.polytopes.forms.len() {
             self.polytopes.forms.resize_with(own + 1, || None);
         }
-        if self.polytopes.forms[whole].is_none() {
-            self.polytopes.forms[whole] = self.setting.form(self.sites, state);
-        }
         if self.polytopes.forms[own].is_none() {
-            self.polytopes.forms[own] = self.polytopes.forms[whole].as_ref().map(|form| form.cut(cut));
+            let whole = self.forms.of(self.setting, self.sites, state)?;
+            self.polytopes.forms[own] = Some(if cut == [false; 2] { Arc::clone(whole) } else { Arc::new(whole.cut(cut)) });
         }
-        self.polytopes.forms[own].is_some().then_some(own)
+        Some(own)
     }
 
     /// A site's polytope in a state; none where no form is fine enough.

@@ -5,6 +5,7 @@ use crate::attractor::cell::{Point, Site, cross, dot, subtract};
 use crate::dilation::tree::Weighted;
 use crate::split_mix::number;
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 /// A set of a polytope's facets: those that a point is beyond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -107,7 +108,7 @@ pub(super) struct Polytope {
 #[derive(Debug, Default)]
 pub(super) struct Polytopes {
     /// Those that are in use.
-    pub(super) forms: Vec<Option<Form>>,
+    pub(super) forms: Vec<Option<Arc<Form>>>,
     pub(super) all: Vec<Polytope>,
 }
 
