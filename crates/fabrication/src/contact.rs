@@ -6,7 +6,7 @@ use lacuna_kernel::budget::Budget;
 use lacuna_kernel::measure::contact::{
     CellPair, Contact, ContactError, ContactQuery, Place, Primitive, Verdict, intersect, intersect_primitive, intersect_self,
 };
-use lacuna_kernel::measure::hausdorff::{Directed, Hausdorff, hausdorff};
+use lacuna_kernel::measure::hausdorff::{Directed, Hausdorff, MOST_BYTES, MOST_NODES, hausdorff};
 use lacuna_kernel::measure::{AxisBox, bounding_box};
 use lacuna_kernel::solid::Inside;
 use lacuna_kernel::tolerance::{LENGTHS_MM, Tolerance};
@@ -125,7 +125,7 @@ pub(crate) fn compare(job: &Job, tolerance: Tolerance, budget: &Budget) -> Resul
     let found = hausdorff(first, second, tolerance, budget)?;
     let mut certificate = certificate::of_shapes(&shapes, found.distance_mm().width(), tolerance);
     if !found.complete {
-        certificate.warnings.push("the search ended at a limit, of the job's cells or memory: the distance is not as narrow as the tolerance; a larger tolerance, or larger limits, would do".into());
+        certificate.warnings.push(format!("the search ended at a limit, of the job's cells or memory, or its own of {MOST_NODES} nodes and {} MiB in each direction, or at what numbers can tell apart: the distance is not as narrow as the tolerance; a larger tolerance would do", MOST_BYTES >> 20));
     }
     let Hausdorff { from_first, from_second, .. } = &found;
     let directed =

@@ -20,7 +20,7 @@ const LOOKED_AT_BYTE: f64 = 2.9e-9;
 const OF_POLYTOPE: f64 = 6.0e-6;
 /// For each leaf cell that is drawn by itself, and for each that becomes part of a conforming complex.
 const CELL: f64 = 5.0e-7;
-const FACE: f64 = 2.0e-6;
+const FACE: f64 = 1.5e-6;
 /// For each triangle of the operands of a boolean: what the engine does, and the check of the result. Measured from 1e-5 (half a million triangles trimmed by a plane) over 2e-5 (a union of 4000
 /// cubes) to 7e-5 (one of 10 000 that overlap more): how much they overlap is not predicted.
 const COMBINED: f64 = 2.0e-5;

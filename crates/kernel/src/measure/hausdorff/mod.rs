@@ -68,10 +68,12 @@ impl Hausdorff {
     }
 }
 
-/// Nodes to look at, at most, so many more for each root or group of roots of both shapes, and the memory that cells and pieces may take, in each direction. Both are searched at the same time.
-const MOST_NODES: u64 = 20_000_000;
+/// Nodes to look at in each direction, at most; both are searched at the same time.
+pub const MOST_NODES: u64 = 20_000_000;
+/// So many more for each root or group of roots of both shapes.
 const MORE_PER_NODE: u64 = 500;
-const MOST_BYTES: u64 = 256 << 20;
+/// The memory that cells and pieces may take in each direction, in bytes.
+pub const MOST_BYTES: u64 = 256 << 20;
 
 /// What a closed surface encloses.
 struct Filled<'a> {
