@@ -71,12 +71,17 @@ impl Around {
                 new[number as usize] = NONE;
             }
         }
-        new.iter_mut().filter(|number| **number != NONE).zip(0..).for_each(|(number, count)| *number = count);
-        let mut stays = new.iter().map(|&number| number != NONE);
-        points.retain(|_| stays.next() == Some(true));
-        triangles.iter_mut().flatten().for_each(|corner| *corner = new[*corner as usize]);
+        close_up(points, triangles, &mut new);
         new
     }
+}
+
+/// Removes the vertices whose number is `NONE`, which no triangle has, and numbers the others anew, in their order.
+pub(crate) fn close_up(points: &mut Vec<Point>, triangles: &mut [[u32; 3]], numbers: &mut [u32]) {
+    let mut stays = numbers.iter().map(|&number| number != NONE);
+    points.retain(|_| stays.next() == Some(true));
+    numbers.iter_mut().filter(|number| **number != NONE).zip(0..).for_each(|(number, count)| *number = count);
+    triangles.iter_mut().flatten().for_each(|corner| *corner = numbers[*corner as usize]);
 }
 
 /// The box of a triangle and what is within `width` of it.

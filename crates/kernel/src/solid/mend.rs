@@ -4,7 +4,7 @@
 //! Joining vertices at one place and turning the edges of triangles without area leave the surface as a set what it is. What is left is moved by a few steps of
 //! single precision, see [`NUDGE`].
 
-use super::around::Around;
+use super::around::{Around, close_up};
 use super::box_tree::{Box32, BoxTree};
 use super::contact;
 use super::half_edges::{HalfEdges, NONE, Star, next};
@@ -98,11 +98,8 @@ fn renumber(vertices: &mut HashSet<u32>, numbers: &[u32]) {
 fn drop_unused(points: &mut Vec<Point>, triangles: &mut [[u32; 3]]) {
     let mut numbers = vec![NONE; points.len()];
     triangles.iter().flatten().for_each(|&corner| numbers[corner as usize] = 0);
-    let mut used = numbers.iter().map(|&number| number != NONE);
-    points.retain(|_| used.next() == Some(true));
-    if points.len() < numbers.len() {
-        numbers.iter_mut().filter(|number| **number != NONE).zip(0..).for_each(|(number, count)| *number = count);
-        triangles.iter_mut().flatten().for_each(|corner| *corner = numbers[*corner as usize]);
+    if numbers.contains(&NONE) {
+        close_up(points, triangles, &mut numbers);
     }
 }
 
