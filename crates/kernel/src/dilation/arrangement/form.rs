@@ -2,6 +2,7 @@
 
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::Arc;
 
 /// Facets at most: as many as a [`super::polytopes::Mask`] has bits.
 pub(super) const MOST_FACETS: usize = 512;
@@ -14,8 +15,7 @@ pub(super) struct Form {
     pub(super) normals: Vec<Point>,
     /// Which end of a segment a facet is at: the second for those above the belt, the first for the others.
     pub(super) ends: Vec<usize>,
-    pub(super) corners: Vec<Corner>,
-    pub(super) edges: Vec<Edge>,
+    pub(super) structure: Arc<Structure>,
     /// The distance of the farthest vertex.
     pub(super) reach: f64,
     /// The length of the shortest edge.
@@ -24,6 +24,28 @@ pub(super) struct Form {
     pub(super) girth: f64,
     /// The facets across the axis, at the ends where it is cut.
     pub(super) flats: [Option<u16>; 2],
+}
+
+/// How the facets of a simple polytope hang together.
+#[derive(Debug)]
+pub(super) struct Structure {
+    pub(super) facets: usize,
+    pub(super) corners: Vec<Corner>,
+    pub(super) edges: Vec<Edge>,
+}
+
+impl Structure {
+    /// That of a polytope with these facets and corners, given where the corners are.
+    pub(super) fn new(normals: &[Point], corners: Vec<Corner>, places: &[Point]) -> Self {
+        let edges = edges(normals, &corners, places);
+        Self { facets: normals.len(), corners, edges }
+    }
+
+    /// Whether it holds to Euler's formula, for a simple polytope: nothing is missing.
+    pub(super) fn is_whole(&self) -> bool {
+        let Self { facets, corners, edges } = self;
+        2 * edges.len() == 3 * corners.len() && corners.len() + facets == edges.len() + 2
+    }
 }
 
 /// A vertex.
@@ -105,16 +127,15 @@ impl Form {
                 }
             }
         }
-        let edges = edges(&normals, &corners, &places);
-        // Euler's formula, for a simple polytope: nothing is missing.
-        if 2 * edges.len() != 3 * corners.len() || corners.len() + count != edges.len() + 2 {
+        let structure = Structure::new(&normals, corners, &places);
+        if !structure.is_whole() {
             return None;
         }
         let reach = places.iter().map(|place| dot(place, place).sqrt()).fold(0.0, f64::max) * (1.0 + ROUNDING);
         let length = |edge: &Edge| distance_squared(&places[usize::from(edge.corners[0])], &places[usize::from(edge.corners[1])]).sqrt();
-        let shortest = edges.iter().map(length).fold(f64::INFINITY, f64::min);
+        let shortest = structure.edges.iter().map(length).fold(f64::INFINITY, f64::min);
         let girth = (PI / belt_of(&normals) as f64).cos().recip() * (1.0 + ROUNDING);
-        Some(Self { normals, ends, corners, edges, reach, shortest, girth, flats: [None; 2] })
+        Some(Self { normals, ends, structure: Arc::new(structure), reach, shortest, girth, flats: [None; 2] })
     }
 
     /// The same with a facet across the axis in the place of all rows at some ends.
@@ -124,7 +145,7 @@ impl Form {
         let kept: Vec<usize> = (0..self.normals.len()).filter(is_kept).collect();
         let (mut normals, mut ends): (Vec<Point>, Vec<usize>) = kept.iter().map(|&facet| (self.normals[facet], self.ends[facet])).unzip();
         let renamed = |facet: u16| kept.binary_search(&usize::from(facet)).map_or(u16::MAX, |place| place as u16);
-        let stays = self.corners.iter().filter(|corner| !at[corner.end]);
+        let stays = self.structure.corners.iter().filter(|corner| !at[corner.end]);
         let mut corners: Vec<Corner> = stays.map(|corner| Corner { facets: corner.facets.map(renamed), end: corner.end }).collect();
         let mut flats = [None; 2];
         for end in (0..2).filter(|&end| at[end]) {
@@ -136,8 +157,8 @@ impl Form {
         }
         let place = |corner: &Corner| meeting(corner.facets.map(|facet| &normals[usize::from(facet)]), [1.0; 3]).unwrap_or_default();
         let places: Vec<Point> = corners.iter().map(place).collect();
-        let edges = edges(&normals, &corners, &places);
-        Self { normals, ends, corners, edges, reach: self.reach, shortest: self.shortest, girth: self.girth, flats }
+        let structure = Arc::new(Structure::new(&normals, corners, &places));
+        Self { normals, ends, structure, reach: self.reach, shortest: self.shortest, girth: self.girth, flats }
     }
 }
 
@@ -276,10 +297,9 @@ mod tests {
             assert!(form.shortest > 1e-3, "{most}: {}", form.shortest);
             // The belt's edges run along the axis, all others stay at their end.
             for form in [form.cut([true, false]), form.cut([false, true]), form.cut([true; 2]), form] {
-                assert_eq!(2 * form.edges.len(), 3 * form.corners.len());
-                assert_eq!(form.corners.len() + form.normals.len(), form.edges.len() + 2);
-                for edge in &form.edges {
-                    let ends = edge.corners.map(|corner| form.corners[usize::from(corner)].end);
+                assert!(form.structure.is_whole());
+                for edge in &form.structure.edges {
+                    let ends = edge.corners.map(|corner| form.structure.corners[usize::from(corner)].end);
                     let is_belt = edge.facets.iter().all(|&facet| form.normals[usize::from(facet)][2] == 0.0);
                     assert_eq!(ends[0] != ends[1], is_belt);
                 }

@@ -13,7 +13,7 @@
 
 use super::form::Form;
 use super::polytopes::{Plane, Shell, ordered};
-use crate::attractor::cell::{Point, between, dot, subtract};
+use crate::attractor::cell::{Point, Site, between, dot, subtract};
 use crate::dilation::tree::Weighted;
 use crate::split_mix::{STEP, number};
 
@@ -35,7 +35,7 @@ struct End {
 /// How far beyond its ends, in their order, every site may be cut; none where it is not. `form` is that of the polytopes that will be cut.
 pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) -> Shell) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
-    for (site, weighted) in (0..).zip(sites) {
+    for (site, weighted) in (0..).zip(sites).filter(|(_, weighted)| !matches!(weighted.site, Site::Triangle(_))) {
         // Zeros have two signs.
         let [first, second] = ordered(&weighted.site).map(|at| at.map(|x| x + 0.0));
         if first == second {
@@ -126,7 +126,7 @@ fn share(site: u32, end: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attractor::cell::{Site, distance_squared};
+    use crate::attractor::cell::distance_squared;
     use crate::split_mix::Random;
 
     /// Balls around what joints bring together are covered by what is left of each segment's own.

@@ -6,6 +6,7 @@
 
 mod facets;
 mod form;
+mod hull;
 mod joints;
 mod nerve;
 mod pieces;
@@ -143,7 +144,7 @@ impl<'a> Arrangement<'a> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
         let Self { setting, beyond, near, forms, .. } = self;
-        Engine { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), states, trial }
+        Engine { setting, sites, beyond, near, forms, cut_forms: Vec::new(), polytopes: Polytopes::default(), states, trial }
     }
 }
 
@@ -169,14 +170,11 @@ impl Sites {
             open.push((candidate.cell, candidates.points_of(attractor, candidate).to_vec()));
             while let Some((cell, points)) = open.pop() {
                 if let Some(error) = rule.leaf(&cell, &points) {
-                    let (deficit, mut are_wires) = (rule.deficit(cell.root), true);
-                    rule.emit(&cell, &points, &mut |site| {
-                        are_wires &= !matches!(site, Site::Triangle(_));
-                        found.list.push(Weighted { site, deficit });
-                    });
+                    let deficit = rule.deficit(cell.root);
+                    rule.emit(&cell, &points, &mut |site| found.list.push(Weighted { site, deficit }));
                     found.error = found.error.max(error);
                     found.leaves += 1;
-                    if !are_wires || found.list.len() > most {
+                    if found.list.len() > most {
                         return Ok(None);
                     }
                     continue;
@@ -269,6 +267,8 @@ struct Engine<'a> {
     beyond: &'a [[Option<f64>; 2]],
     near: &'a Lists,
     forms: &'a Forms,
+    /// The forms that are in use, cut and whole.
+    cut_forms: Vec<Option<Arc<Form>>>,
     polytopes: Polytopes,
     states: Vec<State>,
     trial: u64,
@@ -309,12 +309,12 @@ impl Engine<'_> {
     /// The index of the form for a state; none where none is fine enough.
     fn form(&mut self, state: State, cut: [bool; 2]) -> Option<usize> {
         let own = state.form(cut);
-        if own >= self.polytopes.forms.len() {
-            self.polytopes.forms.resize_with(own + 1, || None);
+        if own >= self.cut_forms.len() {
+            self.cut_forms.resize_with(own + 1, || None);
         }
-        if self.polytopes.forms[own].is_none() {
+        if self.cut_forms[own].is_none() {
             let whole = self.forms.of(self.setting, self.sites, state)?;
-            self.polytopes.forms[own] = Some(if cut == [false; 2] { Arc::clone(whole) } else { Arc::new(whole.cut(cut)) });
+            self.cut_forms[own] = Some(if cut == [false; 2] { Arc::clone(whole) } else { Arc::new(whole.cut(cut)) });
         }
         Some(own)
     }
@@ -322,12 +322,16 @@ impl Engine<'_> {
     /// A site's polytope in a state; none where no form is fine enough.
     fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
         let (site, beyond) = (self.sites[index], self.beyond[index]);
+        if matches!(site.site, Site::Triangle(_)) {
+            let seed = (self.trial << 8 | state.form([false; 2]) as u64) << 32 | index as u64;
+            return Polytope::around(site, self.setting.shell(&site, state), seed);
+        }
         let number = self.form(state, beyond.map(|beyond| beyond.is_some()))?;
         let seed = (self.trial << 8 | number as u64) << 32 | index as u64;
         let most = self.setting.shell(&site, State::default()).outer;
         let cut = Cut { beyond: beyond.map(Option::unwrap_or_default), most };
-        let form = self.polytopes.forms[number].as_ref()?;
-        Polytope::new(site, form, number, self.setting.shell(&site, state), cut, seed)
+        let form = self.cut_forms[number].as_ref()?;
+        Polytope::new(site, form, self.setting.shell(&site, state), cut, seed)
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

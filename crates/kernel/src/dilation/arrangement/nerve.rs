@@ -10,7 +10,7 @@
 //! kinds of bodies, settles most sets, and none of those by the band's outer end others.
 
 use super::Doubt;
-use super::pieces::Lists;
+use super::pieces::{Lists, ends};
 use super::polytopes::Polytope;
 use super::polytopes::{Polytopes, height, normal};
 use crate::attractor::cell::{Point, between, dot, subtract};
@@ -205,10 +205,10 @@ fn least_value([low, high]: [Point; 2], function: impl Fn(&Point) -> (f64, Point
 impl Polytope {
     /// The box of its site.
     fn site_box(&self) -> [Point; 2] {
-        let ends = self.ends();
-        let end = |least: bool| {
-            std::array::from_fn(|axis| if least { ends[0][axis].min(ends[1][axis]) } else { ends[0][axis].max(ends[1][axis]) })
-        };
-        [end(true), end(false)]
+        let ends = || ends(&self.site.site).iter();
+        [
+            std::array::from_fn(|axis| ends().map(|end| end[axis]).fold(f64::INFINITY, f64::min)),
+            std::array::from_fn(|axis| ends().map(|end| end[axis]).fold(f64::NEG_INFINITY, f64::max)),
+        ]
     }
 }

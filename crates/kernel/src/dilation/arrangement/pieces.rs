@@ -129,7 +129,7 @@ pub(super) fn near(bodies: &[Body], most: [usize; 2], budget: &Budget) -> Result
 }
 
 /// The corners of a site.
-fn ends(site: &Site) -> &[Point] {
+pub(super) fn ends(site: &Site) -> &[Point] {
     match site {
         Site::Point(a) => std::slice::from_ref(a),
         Site::Segment(ends) => ends,
@@ -226,16 +226,16 @@ fn meet(one: &Polytope, other: &Polytope) -> bool {
 
 /// The facets of a polytope that lie within another.
 fn hidden(polytopes: &Polytopes, index: u32, met: &[u32]) -> Mask {
-    let (form, corners) = (polytopes.form(index), &polytopes.of(index).corners);
+    let (structure, corners) = (polytopes.structure(index), &polytopes.of(index).corners);
     let mut hidden = Mask::default();
     for &other in met {
         let mut seen = Mask::default();
-        for (corner, point) in form.corners.iter().zip(corners) {
+        for (corner, point) in structure.corners.iter().zip(corners) {
             if !polytopes.of(other).contains(point) {
                 corner.facets.iter().for_each(|&facet| seen.add(usize::from(facet)));
             }
         }
-        (0..form.normals.len()).filter(|&facet| !seen.has(facet)).for_each(|facet| hidden.add(facet));
+        (0..structure.facets).filter(|&facet| !seen.has(facet)).for_each(|facet| hidden.add(facet));
     }
     hidden
 }
@@ -325,7 +325,7 @@ impl Arrangement<'_> {
 
     /// Pieces of a polytope's edges, and of the lines where it meets later ones.
     fn of(&self, index: u32, scratch: &mut Scratch) {
-        let edges = &self.polytopes.form(index).edges;
+        let edges = &self.polytopes.structure(index).edges;
         scratch.cuts.resize_with(edges.len().max(scratch.cuts.len()), Vec::new);
         scratch.cuts.iter_mut().for_each(Vec::clear);
         scratch.is_gone.clear();
@@ -345,11 +345,11 @@ impl Arrangement<'_> {
 
     /// Finds where the edges of one polytope pierce the facets of another; its own cuts are kept, and places where lines of both end.
     fn pierce(&self, index: u32, other: u32, is_first: bool, with_lines: bool, scratch: &mut Scratch) {
-        let (form, corners) = (self.polytopes.form(index), &self.polytopes.of(index).corners);
+        let (structure, corners) = (self.polytopes.structure(index), &self.polytopes.of(index).corners);
         let by = self.polytopes.of(other);
         scratch.beyond.clear();
         scratch.beyond.extend(corners.iter().map(|corner| by.beyond(corner)));
-        for (number, edge) in form.edges.iter().enumerate() {
+        for (number, edge) in structure.edges.iter().enumerate() {
             let [p, q] = edge.corners.map(usize::from);
             let beyond = [&scratch.beyond[p], &scratch.beyond[q]];
             if beyond[0].meets(beyond[1]) || !edge.facets.iter().any(|&facet| self.is_seen(index, facet)) {
@@ -379,9 +379,9 @@ impl Arrangement<'_> {
 
     /// What other polytopes leave of a polytope's own edges.
     fn edges(&self, index: u32, scratch: &mut Scratch) {
-        let (form, corners) = (self.polytopes.form(index), &self.polytopes.of(index).corners);
+        let (structure, corners) = (self.polytopes.structure(index), &self.polytopes.of(index).corners);
         let Scratch { cuts, is_gone, out, .. } = scratch;
-        for (number, edge) in form.edges.iter().enumerate().filter(|&(number, _)| !is_gone[number]) {
+        for (number, edge) in structure.edges.iter().enumerate().filter(|&(number, _)| !is_gone[number]) {
             let [p, q] = edge.corners.map(usize::from);
             let name = |facet| pierced(edge_number(index, number), facet);
             let facets = edge.facets.map(|facet| facet_number(index, usize::from(facet)));

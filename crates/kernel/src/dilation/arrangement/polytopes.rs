@@ -1,6 +1,6 @@
 //! The polytopes of sites: what stands for their dilations by a ball.
 
-use super::form::{Corner, Form, MOST_FACETS, meeting};
+use super::form::{Corner, Form, MOST_FACETS, Structure, meeting};
 use crate::attractor::cell::{Point, Site, cross, dot, subtract};
 use crate::dilation::tree::Weighted;
 use crate::split_mix::number;
@@ -93,8 +93,7 @@ pub(super) fn owner(facet: u32) -> (u32, usize) {
 #[derive(Debug)]
 pub(super) struct Polytope {
     pub(super) site: Weighted,
-    /// Its form, as an index of [`Polytopes::forms`].
-    pub(super) form: usize,
+    pub(super) structure: Arc<Structure>,
     pub(super) planes: Box<[Plane]>,
     /// Those that its dilation is cut by, too: see `joints`.
     pub(super) cuts: [Option<Plane>; 2],
@@ -107,8 +106,6 @@ pub(super) struct Polytope {
 /// The polytopes of all sites.
 #[derive(Debug, Default)]
 pub(super) struct Polytopes {
-    /// Those that are in use.
-    pub(super) forms: Vec<Option<Arc<Form>>>,
     pub(super) all: Vec<Polytope>,
 }
 
@@ -133,7 +130,7 @@ pub(super) struct Cut {
     pub(super) most: f64,
 }
 
-/// The ends of a site in an order that does not depend on how it is stated; both the same for a point.
+/// The ends of a point, both the same, or of a segment, in an order that does not depend on how it is stated.
 pub(super) fn ordered(site: &Site) -> [Point; 2] {
     match *site {
         Site::Segment([a, b]) if b.partial_cmp(&a) == Some(Ordering::Less) => [b, a],
@@ -142,10 +139,15 @@ pub(super) fn ordered(site: &Site) -> [Point; 2] {
     }
 }
 
+/// A number in [0, 1) that looks random: the seed's, with an index below 1024.
+pub(super) fn share(seed: u64, index: u64) -> f64 {
+    (number(seed.wrapping_mul(1024).wrapping_add(index)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// The share of the room between the balls that is left to shift facets.
-const SHIFT: f64 = 0.08;
+pub(super) const SHIFT: f64 = 0.08;
 /// The share of it by which facets of one polytope differ; all of them have the rest.
-const OWN_SHIFT: f64 = 0.1;
+pub(super) const OWN_SHIFT: f64 = 0.1;
 /// Facets are shifted against each other by this share of the shortest edge at most: the form stays what it is.
 const LEAST_EDGE: f64 = 0.1;
 /// Shifts that are tried, each a quarter of the one before: where edges are short beside the angle of their facets, the first may be too large.
@@ -157,7 +159,7 @@ impl Polytope {
     /// Facets are shifted outwards by numbers that look random, so that no four planes meet in a point but by chance: each polytope as a whole, so that facets
     /// of neighbours which would coincide lie one above the other, and its facets against each other a little. Those where it is cut are as far beyond its ends as is said, and no
     /// corner is farther than `most`.
-    pub(super) fn new(site: Weighted, shape: &Form, form: usize, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
+    pub(super) fn new(site: Weighted, shape: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
         let ends = ordered(&site.site);
         let frame = frame(&subtract(&ends[1], &ends[0]));
         let flat = |facet: usize| (0..2).find(|&end| shape.flats[end].map(usize::from) == Some(facet));
@@ -168,7 +170,7 @@ impl Polytope {
         if room < 0.0 {
             return None;
         }
-        let share = |index: u64| (number(seed.wrapping_mul(1024).wrapping_add(index)) >> 11) as f64 / (1_u64 << 53) as f64;
+        let share = |index: u64| share(seed, index);
         let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(0);
         let own = (OWN_SHIFT * room).min(LEAST_EDGE * shape.shortest * shell.inner);
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
@@ -184,23 +186,29 @@ impl Polytope {
                 let at = turned(&meeting(facets.map(|facet| &shape.normals[facet]), facets.map(offset))?);
                 Some(std::array::from_fn(|axis| ends[corner.end][axis] + at[axis]))
             };
-            let corners: Box<[Point]> = shape.corners.iter().map(corner).collect::<Option<_>>()?;
-            let keeps_form = shape.corners.iter().zip(&corners).all(|(corner, point)| {
+            let corners: Box<[Point]> = shape.structure.corners.iter().map(corner).collect::<Option<_>>()?;
+            let keeps_form = shape.structure.corners.iter().zip(&corners).all(|(corner, point)| {
                 let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
                 others.all(|(_, plane)| height(plane, point) < 0.0)
             });
             keeps_form.then_some((planes, corners))
         };
         let (planes, corners) = (0..SHIFTS).find_map(|number| shifted(own * 0.25_f64.powi(number)))?;
-        let low = std::array::from_fn(|axis| corners.iter().map(|corner: &Point| corner[axis]).fold(f64::INFINITY, f64::min));
-        let high = std::array::from_fn(|axis| corners.iter().map(|corner: &Point| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
         let cuts = shape.flats.map(|flat| flat.map(|facet| planes[usize::from(facet)]));
-        Some(Self { site, form, planes, cuts, corners, low, high })
+        Some(Self::with(site, Arc::clone(&shape.structure), planes, cuts, corners))
     }
 
-    /// The ends of its site, both the same for a point.
-    pub(super) fn ends(&self) -> [Point; 2] {
-        ordered(&self.site.site)
+    /// One with these facets and corners.
+    pub(super) fn with(
+        site: Weighted,
+        structure: Arc<Structure>,
+        planes: Box<[Plane]>,
+        cuts: [Option<Plane>; 2],
+        corners: Box<[Point]>,
+    ) -> Self {
+        let low = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::INFINITY, f64::min));
+        let high = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
+        Self { site, structure, planes, cuts, corners, low, high }
     }
 
     /// Whether its box meets that of two points.
@@ -238,8 +246,8 @@ impl Polytopes {
     }
 
     #[inline]
-    pub(super) fn form(&self, index: u32) -> &Form {
-        self.forms[self.of(index).form].as_ref().expect("a polytope is made from its form")
+    pub(super) fn structure(&self, index: u32) -> &Structure {
+        &self.of(index).structure
     }
 
     /// The plane of a facet.

@@ -1,0 +1,150 @@
+//! The polytope of a triangle.
+
+use super::form::{Corner, MOST_FACETS, Structure, meeting};
+use super::polytopes::{OWN_SHIFT, Plane, Polytope, SHIFT, Shell, height, normal, share};
+use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
+use crate::dilation::tree::Weighted;
+use crate::measure::triangle::closest_on_triangle;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// The least sine of a triangle's angles: polytopes around needles begin with corners too far away.
+const LEAST_SINE: f64 = 1e-3;
+/// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
+const NOISE: f64 = 1e-9;
+
+/// A polytope that is cut facet by facet, all lengths from the triangle's first corner.
+struct Hull {
+    planes: Vec<Plane>,
+    corners: Vec<(Point, [u16; 3])>,
+}
+
+impl Polytope {
+    /// The polytope of a triangle in its shell; none for needles, or where facets are too many or too small.
+    ///
+    /// Its facets touch the triangle's dilation by the inner radius, shifted outwards as those of [`Polytope::new`]: two along the triangle, strips along its sides, as many as keep within the outer one, and at the
+    /// corners one towards the farthest vertex, until none is beyond. So it lies between both dilations.
+    pub(super) fn around(weighted: Weighted, shell: Shell, seed: u64) -> Option<Self> {
+        let Site::Triangle([a, b, c]) = weighted.site else { return None };
+        let corners = [[0.0; 3], subtract(&b, &a), subtract(&c, &a)];
+        let room = SHIFT * (shell.outer - shell.inner);
+        let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
+        let offset = |facet: usize| all + OWN_SHIFT * room * share(seed, 1 + facet as u64);
+        let mut hull = Hull::prism(&corners, offset)?;
+        let noise = NOISE * shell.outer;
+        // A polygon around a circle: half of it between both faces.
+        let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
+        let up = normal(&hull.planes[0]);
+        for side in 0..3 {
+            let out = normal(&hull.planes[2 + side]);
+            for k in 1..strips {
+                let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();
+                let direction: Point = std::array::from_fn(|axis| cosine * up[axis] + sine * out[axis]);
+                hull.cut(&direction, dot(&direction, &corners[side]) + offset(hull.planes.len()), noise)?;
+            }
+        }
+        loop {
+            let closest = |x: &Point| closest_on_triangle(x, &corners[0], &corners[1], &corners[2]);
+            let far = hull.corners.iter().map(|(corner, _)| (distance_squared(corner, &closest(corner)), corner));
+            let (square, corner) = far.max_by(|p, q| p.0.total_cmp(&q.0))?;
+            if square < shell.outer * shell.outer {
+                break;
+            }
+            let (corner, touched) = (*corner, closest(corner));
+            let direction = subtract(&corner, &touched).map(|part| part / square.sqrt());
+            hull.cut(&direction, dot(&direction, &touched) + offset(hull.planes.len()), noise)?;
+        }
+        hull.finish(weighted, &a, noise)
+    }
+}
+
+impl Hull {
+    /// Both faces, and a facet across the triangle at every side.
+    fn prism(corners: &[Point; 3], offset: impl Fn(usize) -> f64) -> Option<Self> {
+        let sides: [Point; 3] = std::array::from_fn(|k| subtract(&corners[(k + 1) % 3], &corners[k]));
+        let across = cross(&sides[0], &sides[1]);
+        let length = |vector: &Point| dot(vector, vector).sqrt();
+        let double = length(&across);
+        let is_needle = |k: usize| double <= LEAST_SINE * length(&sides[k]) * length(&sides[(k + 1) % 3]);
+        if (0..3).any(is_needle) {
+            return None;
+        }
+        let up = across.map(|part| part / double);
+        let mut planes: Vec<Plane> = Vec::new();
+        let mut add = |direction: Point, support: f64| {
+            let distance = support + offset(planes.len());
+            planes.push([direction[0], direction[1], direction[2], distance]);
+        };
+        add(up, 0.0);
+        add(up.map(|part| -part), 0.0);
+        for (side, corner) in sides.iter().zip(corners) {
+            let out = cross(side, &up).map(|part| part / length(side));
+            add(out, dot(&out, corner));
+        }
+        let mut hull = Self { planes, corners: Vec::new() };
+        for face in [0, 1] {
+            for side in 0..3 {
+                let facets = [face, 2 + side, 2 + (side + 1) % 3];
+                hull.corners.push((hull.at(facets)?, facets));
+            }
+        }
+        Some(hull)
+    }
+
+    fn at(&self, facets: [u16; 3]) -> Option<Point> {
+        let planes = facets.map(|facet| &self.planes[usize::from(facet)]);
+        let normals = planes.map(normal);
+        meeting([&normals[0], &normals[1], &normals[2]], planes.map(|plane| plane[3]))
+    }
+
+    /// Cuts off what is beyond a plane. Corners of a simple polytope are neighbours if they have two facets in common.
+    fn cut(&mut self, direction: &Point, distance: f64, noise: f64) -> Option<()> {
+        let (facet, plane) = (self.planes.len(), [direction[0], direction[1], direction[2], distance]);
+        if facet >= MOST_FACETS {
+            return None;
+        }
+        let heights: Vec<f64> = self.corners.iter().map(|(corner, _)| height(&plane, corner)).collect();
+        if heights.iter().any(|height| height.abs() < noise) {
+            return None;
+        }
+        self.planes.push(plane);
+        let mut made = Vec::new();
+        for (_, beyond) in self.corners.iter().zip(&heights).filter(|&(_, &height)| height > 0.0).map(|(corner, _)| corner) {
+            for (_, kept) in self.corners.iter().zip(&heights).filter(|&(_, &height)| height < 0.0).map(|(corner, _)| corner) {
+                let mut common = beyond.iter().copied().filter(|own| kept.contains(own));
+                if let (Some(first), Some(second)) = (common.next(), common.next()) {
+                    let facets = [first, second, facet as u16];
+                    made.push((self.at(facets)?, facets));
+                }
+            }
+        }
+        let mut height = heights.iter();
+        self.corners.retain(|_| height.next().is_some_and(|height| *height < 0.0));
+        self.corners.extend(made);
+        Some(())
+    }
+
+    /// Leaves out the facets that are gone.
+    fn finish(self, site: Weighted, origin: &Point, noise: f64) -> Option<Polytope> {
+        let is_used = |facet: &usize| self.corners.iter().any(|(_, facets)| facets.contains(&(*facet as u16)));
+        let used: Vec<usize> = (0..self.planes.len()).filter(is_used).collect();
+        let renamed = |facet: u16| used.binary_search(&usize::from(facet)).map_or(u16::MAX, |place| place as u16);
+        let planes: Vec<Plane> = used.iter().map(|&facet| self.planes[facet]).collect();
+        let corners: Vec<Corner> = self.corners.iter().map(|(_, facets)| Corner { facets: facets.map(renamed), end: 0 }).collect();
+        let places: Vec<Point> = self.corners.iter().map(|&(at, _)| at).collect();
+        // No corner is beyond a facet, nor so near to one that it may be: the facets hang together as they are said to.
+        let is_inside = |(corner, at): (&Corner, &Point)| {
+            let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
+            others.all(|(_, plane)| height(plane, at) < -noise)
+        };
+        let normals: Vec<Point> = planes.iter().map(normal).collect();
+        if !corners.iter().zip(&places).all(is_inside) {
+            return None;
+        }
+        let structure = Structure::new(&normals, corners, &places);
+        let moved = |at: &Point| std::array::from_fn(|axis| at[axis] + origin[axis]);
+        let shifted = |plane: &Plane| [plane[0], plane[1], plane[2], plane[3] + dot(&normal(plane), origin)];
+        let (planes, corners) = (planes.iter().map(shifted).collect(), places.iter().map(moved).collect());
+        structure.is_whole().then(|| Polytope::with(site, Arc::new(structure), planes, [None; 2], corners))
+    }
+}
