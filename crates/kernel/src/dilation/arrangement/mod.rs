@@ -22,7 +22,7 @@ use crate::attractor::cell::{Cell, ControlPoint, Site, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
 use form::Form;
-use nerve::Common;
+use nerve::{Common, Meeting};
 use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
 use std::sync::{Arc, OnceLock};
@@ -90,7 +90,7 @@ impl<'a> Arrangement<'a> {
             cuts: joints::planes(weighted, beyond),
         };
         let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
-        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
+        let Some(near) = pieces::near(&bodies, if std::env::var_os("ALL").is_some() { [1 << 40, 1 << 40] } else { MOST_NEAR }, budget)? else { return Ok(None) };
         drop(bodies);
         let mut arrangement = Self { setting, sites, beyond, near, forms, triangles: 0.0 };
         arrangement.triangles = arrangement.expected_triangles(budget)?;
@@ -281,11 +281,12 @@ impl Engine<'_> {
         }
         let (mut changed, mut doubts) = (vec![true; self.sites.len()], Vec::<Doubt>::new());
         let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
+        let mut meeting = Meeting::default();
         while changed.contains(&true) {
             let stale = self.near.around(&changed);
             doubts.retain(|doubt| !stale[doubt.sites[0] as usize]);
             let more = most.saturating_sub(doubts.len());
-            let found = nerve::doubts(self.setting, &self.polytopes, self.near, &stale, more, budget)?;
+            let found = nerve::doubts(self.setting, &self.polytopes, self.near, &mut meeting, &stale, more, budget)?;
             let Some(found) = found else { return Ok(Run::Doubtful) };
             doubts.extend(found);
             changed = self.refine(&doubts);

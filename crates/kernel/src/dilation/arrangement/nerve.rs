@@ -30,7 +30,22 @@ const MOST_BODIES: usize = 4;
 /// Sites that are looked at before doubts are counted.
 const AT_A_TIME: usize = 16;
 
+/// Of every site the later ones whose dilations have a point in common with its own, as far as is told.
+#[derive(Debug, Default)]
+pub(super) struct Meeting(Vec<Vec<u32>>);
+
+impl Meeting {
+    fn after(&self, index: u32) -> &[u32] {
+        &self.0[index as usize]
+    }
+
+    fn has(&self, first: u32, second: u32) -> bool {
+        self.after(first).binary_search(&second).is_ok()
+    }
+}
+
 /// The sets of sites whose polytopes were not shown to have a common point exactly where the dilations have: those whose first site is `stale`. `None` where there are more than `most`.
+/// Which pairs meet is told by the sites alone: it is asked for the first time, when all are stale, and kept.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -38,21 +53,38 @@ pub(super) fn doubts(
     setting: &Setting,
     polytopes: &Polytopes,
     near: &Lists,
+    meeting: &mut Meeting,
     stale: &[bool],
     most: usize,
     budget: &Budget,
 ) -> Result<Option<Vec<Doubt>>, Stopped> {
     let nerve = Nerve { setting, polytopes };
-    let of = |first: u32| {
-        budget.cancel.check()?;
-        let mut found = Vec::new();
-        let later: Vec<u32> = near.of(first).iter().copied().filter(|&other| other > first).collect();
-        nerve.extend(&mut vec![first], &later, &mut found, budget)?;
-        Ok(found)
-    };
-    let (sites, mut doubts): (Vec<u32>, Vec<Doubt>) = ((0..polytopes.count()).filter(|&site| stale[site as usize]).collect(), Vec::new());
+    let sites: Vec<u32> = (0..polytopes.count()).filter(|&site| stale[site as usize]).collect();
+    let mut doubts = Vec::new();
+    meeting.0.resize(polytopes.all.len(), Vec::new());
     for some in sites.chunks(AT_A_TIME) {
-        let found: Vec<Vec<Doubt>> = some.par_iter().map(|&site| of(site)).collect::<Result<_, Stopped>>()?;
+        let pairs = |&first: &u32| {
+            budget.cancel.check()?;
+            let later = near.of(first).iter().copied().filter(|&other| other > first).collect();
+            let mut search = Search::new(&nerve, first, later);
+            Ok((search.pairs(), search.found))
+        };
+        let found: Vec<(Vec<u32>, Vec<Doubt>)> = some.par_iter().map(pairs).collect::<Result<_, Stopped>>()?;
+        for (&first, (after, own)) in some.iter().zip(found) {
+            meeting.0[first as usize] = after;
+            doubts.extend(own);
+        }
+        if doubts.len() > most {
+            return Ok(None);
+        }
+    }
+    for some in sites.chunks(AT_A_TIME) {
+        let sets = |&first: &u32| {
+            let mut search = Search::new(&nerve, first, meeting.after(first).to_vec());
+            search.triples_and_more(meeting, budget)?;
+            Ok(search.found)
+        };
+        let found: Vec<Vec<Doubt>> = some.par_iter().map(sets).collect::<Result<_, Stopped>>()?;
         doubts.extend(found.into_iter().flatten());
         if doubts.len() > most {
             return Ok(None);
@@ -74,26 +106,115 @@ pub(super) enum Common {
     Unknown,
 }
 
-impl Nerve<'_> {
-    /// Looks at the simplex with each of some sites added, and at what holds it.
-    fn extend(&self, simplex: &mut Vec<u32>, later: &[u32], found: &mut Vec<Doubt>, budget: &Budget) -> Result<(), Stopped> {
-        budget.cancel.check()?;
-        for (place, &next) in later.iter().enumerate() {
-            simplex.push(next);
-            let (common, doubt) = self.common(simplex);
-            if doubt {
-                found.push(Doubt { sites: simplex.clone(), wanted: common });
+/// The simplices with a first body.
+///
+/// Most are settled by a place that is in many bodies, a *hub*: any of these have a common point. And most others are not looked at, as sets that hold one without a common point have none.
+struct Search<'a> {
+    nerve: &'a Nerve<'a>,
+    first: u32,
+    /// The bodies that may follow, in ascending order, and of each the hubs in it, bit by bit; all hubs are in the first body.
+    later: Vec<u32>,
+    hubs: Vec<u64>,
+    count: u32,
+    found: Vec<Doubt>,
+}
+
+impl<'a> Search<'a> {
+    /// Begins with the hubs that the first site itself suggests: its corners, and the middles between them.
+    fn new(nerve: &'a Nerve<'a>, first: u32, later: Vec<u32>) -> Self {
+        let mut search = Self { nerve, first, hubs: vec![0; later.len()], count: 0, later, found: Vec::new() };
+        let corners = ends(&nerve.polytopes.of(first).site.site);
+        for p in 0..corners.len() {
+            for q in 0..=p {
+                search.add_hub(&between(&corners[p], &corners[q], 0.5));
             }
-            if common != Common::None && simplex.len() < MOST_BODIES {
-                self.extend(simplex, &later[place + 1..], found, budget)?;
+        }
+        search
+    }
+
+    /// Adds a hub, if it is in the first body.
+    fn add_hub(&mut self, x: &Point) {
+        if self.count == u64::BITS || !self.nerve.is_in(self.first, x) {
+            return;
+        }
+        for (&body, hubs) in self.later.iter().zip(&mut self.hubs) {
+            *hubs |= u64::from(self.nerve.is_in(body, x)) << self.count;
+        }
+        self.count += 1;
+    }
+
+    /// Whether the first body and some that follow may have a common point.
+    fn may_meet(&mut self, others: &[usize]) -> bool {
+        if others.iter().fold(u64::MAX, |common, &other| common & self.hubs[other]) != 0 {
+            return true;
+        }
+        let mut simplex = [self.first; MOST_BODIES];
+        for (slot, &other) in simplex[1..].iter_mut().zip(others) {
+            *slot = self.later[other];
+        }
+        let simplex = &simplex[..=others.len()];
+        let (common, doubt, x) = self.nerve.common(simplex);
+        if doubt {
+            self.found.push(Doubt { sites: simplex.to_vec(), wanted: common });
+        }
+        if let Some(x) = x {
+            self.add_hub(&x);
+        }
+        common != Common::None
+    }
+
+    /// Looks at all pairs; returns the bodies that meet the first.
+    fn pairs(&mut self) -> Vec<u32> {
+        let meet: Vec<usize> = (0..self.later.len()).filter(|&other| self.may_meet(&[other])).collect();
+        meet.into_iter().map(|other| self.later[other]).collect()
+    }
+
+    /// Looks at the larger sets of bodies of which all pairs meet.
+    fn triples_and_more(&mut self, meeting: &Meeting, budget: &Budget) -> Result<(), Stopped> {
+        let count = self.later.len();
+        // Of every second body the third ones.
+        let mut thirds: Vec<Vec<usize>> = Vec::with_capacity(count);
+        for second in 0..count {
+            budget.cancel.check()?;
+            let mut own = Vec::new();
+            for third in second + 1..count {
+                if meeting.has(self.later[second], self.later[third]) && self.may_meet(&[second, third]) {
+                    own.push(third);
+                }
             }
-            simplex.pop();
+            thirds.push(own);
+        }
+        for second in 0..count {
+            budget.cancel.check()?;
+            for (place, &third) in thirds[second].iter().enumerate() {
+                let fourths = &thirds[second][place + 1..];
+                let own = self.hubs[second] & self.hubs[third];
+                if own != 0 && fourths.iter().fold(own, |own, &fourth| own & self.hubs[fourth]) != 0 {
+                    // One hub is in all of them.
+                    continue;
+                }
+                for &fourth in fourths {
+                    if thirds[third].binary_search(&fourth).is_ok() {
+                        self.may_meet(&[second, third, fourth]);
+                    }
+                }
+            }
         }
         Ok(())
     }
+}
 
-    /// Whether the dilations have a common point, and whether it is in doubt that the polytopes have one exactly then.
-    fn common(&self, simplex: &[u32]) -> (Common, bool) {
+impl Nerve<'_> {
+    /// Whether a place is surely in the dilation of a site by the band's inner end.
+    fn is_in(&self, index: u32, x: &Point) -> bool {
+        let Setting { least, slack, .. } = *self.setting;
+        let body = self.polytopes.of(index);
+        let is_cut_off = || body.cuts.iter().flatten().any(|plane| height(plane, x) > -slack);
+        body.site.distance_squared(x).sqrt() + slack < least && !is_cut_off()
+    }
+
+    /// Whether the dilations have a common point, whether it is in doubt that the polytopes have one exactly then, and a place in all dilations by the band's inner end, if one was met.
+    fn common(&self, simplex: &[u32]) -> (Common, bool, Option<Point>) {
         let Setting { least, reach, outer, slack, .. } = *self.setting;
         let bodies = || simplex.iter().map(|&index| self.polytopes.of(index));
         let bounds = |distance: f64| {
@@ -110,7 +231,7 @@ impl Nerve<'_> {
         };
         let within = bounds(outer);
         if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
-            return (Common::None, false);
+            return (Common::None, false, None);
         }
         let highest = |x: &Point| {
             let planes = bodies().flat_map(|body| body.cuts.iter().flatten());
@@ -120,12 +241,12 @@ impl Nerve<'_> {
         let mut x = between(&within[0], &within[1], 0.5);
         for step in 0..STEPS {
             let far = bodies().map(|body| (body.site.distance_squared(&x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((square, body)) = far else { return (Common::Unknown, true) };
+            let Some((square, body)) = far else { return (Common::Unknown, true, None) };
             if square.sqrt() + slack >= least {
                 x = between(&x, &body.site.closest(&x), 1.0 / (step + 2) as f64);
                 continue;
             }
-            let Some((height, plane)) = highest(&x).filter(|(height, _)| *height > -slack) else { return (Common::Some, false) };
+            let Some((height, plane)) = highest(&x).filter(|(height, _)| *height > -slack) else { return (Common::Some, false, Some(x)) };
             let normal = normal(plane);
             x = std::array::from_fn(|axis| x[axis] - (height + 4.0 * slack) * normal[axis]);
         }
@@ -155,7 +276,7 @@ impl Nerve<'_> {
         let bounds = least_value(within, distance, |bounds| is_settled(bounds) || is_known(bounds));
         let common = side(bounds, reach);
         if is_settled(bounds) {
-            return (common, false);
+            return (common, false, None);
         }
         let beyond = |x: &Point| -> (f64, Point) {
             let planes = bodies().flat_map(|body| body.planes.iter());
@@ -163,7 +284,7 @@ impl Nerve<'_> {
             highest.map_or((0.0, [0.0; 3]), |(height, plane)| (height, normal(plane)))
         };
         let polytopes = side(least_value(within, beyond, |bounds| side(bounds, 0.0) != Common::Unknown), 0.0);
-        (common, common == Common::Unknown || common != polytopes)
+        (common, common == Common::Unknown || common != polytopes, None)
     }
 }
 
