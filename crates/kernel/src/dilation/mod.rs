@@ -13,7 +13,7 @@
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
 //! Its cubes are larger than that asks where one site serves all that is filled. Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
 //!
-//! Points and segments of which few are near to each other need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`).
+//! Points, segments and triangles of which few are near to each other, wires and panels, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`).
 //!
 //! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
 //!
@@ -64,7 +64,7 @@ pub struct Dilation {
     pub inner_mm: f64,
     /// The solid is inside D(r + outer).
     pub outer_mm: f64,
-    /// a; none where points and segments were thickened without a lattice (see `arrangement`).
+    /// a; none where few sites are near to each other, which need no lattice (see `arrangement`).
     pub pitch_mm: Option<f64>,
     /// Leaf cells met, each once in every block of the lattice that needed it, or once where there is no lattice.
     pub leaf_cells: u64,

@@ -1,4 +1,4 @@
-//! Thickening of points and segments by the union of a polytope around each: where few sites are near to each other, the boundary is found facet by facet, without a lattice.
+//! Thickening of points, segments and triangles by the union of a polytope around each: where few sites are near to each other, the boundary is found facet by facet, without a lattice.
 //!
 //! With s < r < outer the ends of the band, site S_i has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
 //! where all of them are cut across the end of a segment that meets others, see `joints`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
@@ -45,7 +45,7 @@ const SAMPLE: usize = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
 pub(super) const BYTES_PER_TRIANGLE: f64 = 600.0;
 
-/// The points and segments of an attractor, few of them near to each other.
+/// The sites of an attractor, few of them near to each other.
 pub(super) struct Arrangement<'a> {
     setting: &'a Setting,
     sites: Sites,
@@ -65,7 +65,7 @@ pub(super) struct Arranged {
 }
 
 impl<'a> Arrangement<'a> {
-    /// The sites of an attractor; `None` where they are others than points and segments, or so many, or so near to each other, that a lattice serves better.
+    /// The sites of an attractor; `None` where there are solids, whose inside belongs to the dilation, or so many sites, or so near to each other, that a lattice serves better.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -90,7 +90,10 @@ impl<'a> Arrangement<'a> {
             cuts: joints::planes(weighted, beyond),
         };
         let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
-        let Some(near) = pieces::near(&bodies, if std::env::var_os("ALL").is_some() { [1 << 40, 1 << 40] } else { MOST_NEAR }, budget)? else { return Ok(None) };
+        let Some(near) = pieces::near(&bodies, if std::env::var_os("ALL").is_some() { [1 << 40, 1 << 40] } else { MOST_NEAR }, budget)?
+        else {
+            return Ok(None);
+        };
         drop(bodies);
         let mut arrangement = Self { setting, sites, beyond, near, forms, triangles: 0.0 };
         arrangement.triangles = arrangement.expected_triangles(budget)?;
@@ -161,7 +164,7 @@ struct Sites {
 }
 
 impl Sites {
-    /// The sites below some candidates, if they are points and segments, at least one and at most `most`.
+    /// The sites below some candidates, if there are at least one and at most `most`.
     fn of(rule: &SiteRule<'_>, candidates: &Candidates, most: usize, budget: &Budget) -> Result<Option<Self>, Stopped> {
         let attractor = rule.attractor();
         let mut found = Self::default();

@@ -2,6 +2,7 @@ use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
 use crate::dilation::plan::{Balls, Plan};
 use crate::dilation::{Dilation, DilationError, dilate};
+use crate::measure::triangle::closest_on_triangle;
 use crate::model::{Interior, Model, PolygonMesh, Shape};
 use crate::solid::Inside;
 use crate::split_mix::Random;
@@ -231,4 +232,94 @@ fn many_sites_near_each_other_are_left_to_the_lattice() {
     let vertices: Vec<DVec3> = (0..400).map(|_| place(&mut random, 10.0)).collect();
     let dilation = dilate(&points(&vertices), Radius::new(2.0).unwrap(), Tolerance::new(0.2).unwrap(), &Budget::default()).unwrap();
     assert!(dilation.pitch_mm.is_some());
+}
+
+/// Open surfaces of triangles that are large beside the radius: within their bounds, with the topology of the lattice's, and far fewer triangles.
+#[test]
+fn panels_keep_their_bounds_and_agree_with_the_lattice() {
+    let mut random = Random(23);
+    let (mut compared, mut left) = (0, 0);
+    for round in 0..24_u32 {
+        let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+        match round % 3 {
+            // Triangles by themselves, which may cross.
+            0 => {
+                for k in 0..4 + round / 3 {
+                    vertices.extend((0..3).map(|_| place(&mut random, 30.0)));
+                    faces.push(vec![3 * k, 3 * k + 1, 3 * k + 2]);
+                }
+            }
+            // A sheet in folds, flat in places.
+            1 => {
+                let side = 3 + round / 6;
+                for j in 0..=side {
+                    for i in 0..=side {
+                        let height = if round % 2 == 0 { 4.0 * number(&mut random) } else { 5.0 * f64::from(i % 2) };
+                        vertices.push(DVec3::new(6.0 * f64::from(i), 6.0 * f64::from(j), height));
+                    }
+                }
+                let at = |i: u32, j: u32| j * (side + 1) + i;
+                for j in 0..side {
+                    for i in 0..side {
+                        faces.push(vec![at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                        faces.push(vec![at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+                    }
+                }
+            }
+            // A tube with open ends: a handle.
+            _ => {
+                let (sides, rows) = (5 + round / 6, 3);
+                for j in 0..=rows {
+                    for i in 0..sides {
+                        let angle = std::f64::consts::TAU * f64::from(i) / f64::from(sides);
+                        vertices.push(DVec3::new(12.0 * angle.cos(), 12.0 * angle.sin(), 7.0 * f64::from(j)));
+                    }
+                }
+                let at = |i: u32, j: u32| j * sides + i % sides;
+                for j in 0..rows {
+                    for i in 0..sides {
+                        faces.push(vec![at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                        faces.push(vec![at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+                    }
+                }
+            }
+        }
+        let (radius, tolerance) = ([1.0, 0.6][round as usize % 2], [0.1, 0.03][round as usize / 2 % 2]);
+        let shape = lowered(&vertices, faces.clone());
+        let Some(dilation) = arranged_unless_left(&shape, radius, tolerance) else {
+            left += 1;
+            continue;
+        };
+        assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
+        let inside = Inside::new(dilation.solid.mesh());
+        let corners = |face: &Vec<u32>| [0, 1, 2].map(|k| vertices[face[k] as usize]);
+        let distance = |x: DVec3| {
+            let of = |face: &Vec<u32>| {
+                let [a, b, c] = corners(face).map(|corner| corner.to_array());
+                x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
+            };
+            faces.iter().map(of).fold(f64::INFINITY, f64::min)
+        };
+        for _ in 0..300 {
+            let face = &faces[(random.next() % faces.len() as u64) as usize];
+            let [a, b, c] = corners(face);
+            let on = a.lerp(b, number(&mut random)).lerp(c, number(&mut random));
+            let away = place(&mut random, 2.0) - DVec3::ONE;
+            let x = on + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(&mut random));
+            let d = distance(x);
+            if d < radius - dilation.inner_mm {
+                assert_eq!(inside.winding(x), 1, "{round}: {x} is {d} from the triangles");
+            } else if d > radius + dilation.outer_mm {
+                assert_eq!(inside.winding(x), 0, "{round}: {x} is {d} from the triangles");
+            }
+        }
+        let other = on_lattice(&shape, radius, tolerance);
+        if dilation.topology_exact && other.topology_exact {
+            compared += 1;
+            assert_eq!(topology(&dilation), topology(&other), "{round}");
+        }
+        let triangles = [&dilation, &other].map(|made| made.solid.mesh().triangles.len());
+        assert!(triangles[0] < triangles[1], "{round}: {triangles:?}");
+    }
+    assert!(compared > 18 && left < 4, "{compared} compared, {left} left to the lattice");
 }
