@@ -245,7 +245,7 @@ export interface Certificate {
   /** Every point of the exact shape eroded by this much lies in the result: D(r - inner) is inside the solid. */ inner_bound_mm?: number | null;
   /** `sha256:` and the digest of the canonical job document; filled in by the service or the command. */ input_digest: string;
   /** Version of the kernel that made it. */ kernel_version: string;
-  /** Edge of the lattice's cubes, where there was a lattice: points and segments of which few are near to each other are thickened without. */ lattice_pitch_mm?: number | null;
+  /** Edge of the lattice's cubes, where there was a lattice: points, segments and triangles of which few are near to each other are thickened without. */ lattice_pitch_mm?: number | null;
   /** Leaf cells evaluated. A dilation evaluates only cells near its boundary, and one again in every block of the lattice that needs it. */ leaf_cells: number;
   level?: LevelStatement | null;
   mass_g?: Array<number>;
@@ -982,7 +982,7 @@ export interface Plan {
   /** Triangles against which the limit of triangles is held: those of the lattices as they are first made. */ counted_triangles?: number;
   /** Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan takes as long for, are not in it. `null` where they are not predicted: comparisons, sections, and what is searched for besides (`stability`, `thickness`, `oriented_box`, the other surface of a wall, the closing of gaps). */ cpu_seconds?: number | null;
   exceeds?: Excess | null;
-  /** Edge of the lattice's cubes. `null` where points and segments are thickened without a lattice, and where nothing is thickened. */ lattice_pitch_mm?: number | null;
+  /** Edge of the lattice's cubes. `null` where points, segments and triangles are thickened without a lattice, and where nothing is thickened. */ lattice_pitch_mm?: number | null;
   /** Leaf cells of the whole shape at its share of the tolerance; `solidify` expands only those that the boundary of the result needs. */ leaf_cells: number;
   /** Peak memory of the process that does the job, in bytes. 0 where nothing is predicted. */ memory_bytes: number;
   /** Bytes of a binary STL file with so many `triangles`; of sections, those of all drawings that are asked for, or else of one in SVG. `null` for sections of what is thickened first, and where nothing is predicted. */ output_bytes?: number | null;

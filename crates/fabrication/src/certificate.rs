@@ -199,7 +199,7 @@ pub struct Certificate {
     /// Area of the written mesh.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub mesh_area_mm2: Option<f64>,
-    /// Edge of the lattice's cubes, where there was a lattice: points and segments of which few are near to each other are thickened without.
+    /// Edge of the lattice's cubes, where there was a lattice: points, segments and triangles of which few are near to each other are thickened without.
     #[cfg_attr(feature = "wire", serde(skip_serializing_if = "Option::is_none", default))]
     pub lattice_pitch_mm: Option<f64>,
     /// Version of the kernel that made it.

@@ -31,7 +31,7 @@ pub struct Plan {
     pub memory_bytes: f64,
     /// Bytes of a binary STL file with so many `triangles`; of sections, those of all drawings that are asked for, or else of one in SVG. `null` for sections of what is thickened first, and where nothing is predicted.
     pub output_bytes: Option<f64>,
-    /// Edge of the lattice's cubes. `null` where points and segments are thickened without a lattice, and where nothing is thickened.
+    /// Edge of the lattice's cubes. `null` where points, segments and triangles are thickened without a lattice, and where nothing is thickened.
     pub lattice_pitch_mm: Option<f64>,
     /// Seconds that one core takes, an estimate for a machine like that on which the constants were measured: `fixtures/ESTIMATES.md`. Reading and lowering the models, which a plan
     /// takes as long for, are not in it. `null` where they are not predicted: comparisons, sections, and what is searched for besides (`stability`, `thickness`, `oriented_box`, the other surface of
