@@ -90,7 +90,7 @@ impl<'a> Arrangement<'a> {
             cuts: joints::planes(weighted, beyond),
         };
         let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
-        let Some(near) = pieces::near(&bodies, if std::env::var_os("ALL").is_some() { [1 << 40, 1 << 40] } else { MOST_NEAR }, budget)?
+        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)?
         else {
             return Ok(None);
         };
