@@ -35,12 +35,12 @@ impl Polytope {
         // A polygon around a circle: half of it between both faces.
         let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
         let up = normal(&hull.planes[0]);
-        for side in 0..3 {
+        for (side, corner) in corners.iter().enumerate() {
             let out = normal(&hull.planes[2 + side]);
             for k in 1..strips {
                 let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();
                 let direction: Point = std::array::from_fn(|axis| cosine * up[axis] + sine * out[axis]);
-                hull.cut(&direction, dot(&direction, &corners[side]) + offset(hull.planes.len()), noise)?;
+                hull.cut(&direction, dot(&direction, corner) + offset(hull.planes.len()), noise)?;
             }
         }
         loop {

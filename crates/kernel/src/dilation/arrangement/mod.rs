@@ -90,10 +90,7 @@ impl<'a> Arrangement<'a> {
             cuts: joints::planes(weighted, beyond),
         };
         let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
-        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)?
-        else {
-            return Ok(None);
-        };
+        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
         drop(bodies);
         let mut arrangement = Self { setting, sites, beyond, near, forms, triangles: 0.0 };
         arrangement.triangles = arrangement.expected_triangles(budget)?;
