@@ -13,6 +13,9 @@ const LEAST_SINE: f64 = 1e-3;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
 const NOISE: f64 = 1e-9;
 
+/// The facets along the triangle come first.
+const FACES: usize = 2;
+
 /// A polytope that is cut facet by facet, all lengths from the triangle's first corner.
 struct Hull {
     planes: Vec<Plane>,
@@ -22,21 +25,23 @@ struct Hull {
 impl Polytope {
     /// The polytope of a triangle in its shell; none for needles, or where facets are too many or too small.
     ///
-    /// Its facets touch the triangle's dilation by the inner radius, shifted outwards as those of [`Polytope::new`]: two along the triangle, strips along its sides, as many as keep within the outer one, and at the
+    /// Its facets touch the triangle's dilation by the inner radius, shifted outwards as those of [`Polytope::new`]: two along the triangle, farther out, strips along its sides, as many as keep within the outer one, and at the
     /// corners one towards the farthest vertex, until none is beyond. So it lies between both dilations.
     pub(super) fn around(weighted: Weighted, shell: Shell, seed: u64) -> Option<Self> {
         let Site::Triangle([a, b, c]) = weighted.site else { return None };
         let corners = [[0.0; 3], subtract(&b, &a), subtract(&c, &a)];
         let room = SHIFT * (shell.outer - shell.inner);
         let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
-        let offset = |facet: usize| all + OWN_SHIFT * room * share(seed, 1 + facet as u64);
+        // Faces have nothing beyond them that would make up for what they lack: they are in the band's middle, where panels are as thick as they should be.
+        let lift = |facet: usize| if facet < FACES { 0.5 * (shell.outer - shell.inner - room) } else { 0.0 };
+        let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
         let mut hull = Hull::prism(&corners, offset)?;
         let noise = NOISE * shell.outer;
         // A polygon around a circle: half of it between both faces.
         let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
         let up = normal(&hull.planes[0]);
         for (side, corner) in corners.iter().enumerate() {
-            let out = normal(&hull.planes[2 + side]);
+            let out = normal(&hull.planes[FACES + side]);
             for k in 1..strips {
                 let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();
                 let direction: Point = std::array::from_fn(|axis| cosine * up[axis] + sine * out[axis]);
