@@ -1,7 +1,7 @@
 //! The polytope of a triangle.
 
 use super::form::{Corner, MOST_FACETS, Structure, meeting};
-use super::polytopes::{OWN_SHIFT, Plane, Polytope, SHIFT, Shell, height, normal, share};
+use super::polytopes::{OWN_SHIFT, Plane, Polytope, SHIFT, Shell, hang_together, height, normal, share};
 use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
 use crate::dilation::tree::Weighted;
 use crate::measure::triangle::closest_on_triangle;
@@ -12,7 +12,6 @@ use std::sync::Arc;
 const LEAST_SINE: f64 = 1e-3;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
 const NOISE: f64 = 1e-9;
-
 /// The facets along the triangle come first.
 const FACES: usize = 2;
 
@@ -87,9 +86,9 @@ impl Hull {
             add(out, dot(&out, corner));
         }
         let mut hull = Self { planes, corners: Vec::new() };
-        for face in [0, 1] {
+        for face in 0..FACES {
             for side in 0..3 {
-                let facets = [face, 2 + side, 2 + (side + 1) % 3];
+                let facets = [face, FACES + side, FACES + (side + 1) % 3].map(|facet| facet as u16);
                 hull.corners.push((hull.at(facets)?, facets));
             }
         }
@@ -137,15 +136,11 @@ impl Hull {
         let planes: Vec<Plane> = used.iter().map(|&facet| self.planes[facet]).collect();
         let corners: Vec<Corner> = self.corners.iter().map(|(_, facets)| Corner { facets: facets.map(renamed), end: 0 }).collect();
         let places: Vec<Point> = self.corners.iter().map(|&(at, _)| at).collect();
-        // No corner is beyond a facet, nor so near to one that it may be: the facets hang together as they are said to.
-        let is_inside = |(corner, at): (&Corner, &Point)| {
-            let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
-            others.all(|(_, plane)| height(plane, at) < -noise)
-        };
-        let normals: Vec<Point> = planes.iter().map(normal).collect();
-        if !corners.iter().zip(&places).all(is_inside) {
+        // Nor so near to one that it may be beyond.
+        if !hang_together(&corners, &places, &planes, noise) {
             return None;
         }
+        let normals: Vec<Point> = planes.iter().map(normal).collect();
         let structure = Structure::new(&normals, corners, &places);
         let moved = |at: &Point| std::array::from_fn(|axis| at[axis] + origin[axis]);
         let shifted = |plane: &Plane| [plane[0], plane[1], plane[2], plane[3] + dot(&normal(plane), origin)];

@@ -27,8 +27,8 @@ use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
 use std::sync::{Arc, OnceLock};
 
-/// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at all
-/// sets. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
+/// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at such
+/// sets as far as all their parts meet. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
 const MOST_NEAR: [usize; 2] = [5_000, 200];
 /// Doubts that polytopes may leave, as a share of the sites, and in any case: more of them are no matter of a few places, and finer polytopes everywhere cost more than a lattice.
 const MOST_DOUBTS: f64 = 0.2;
@@ -307,8 +307,8 @@ impl Engine<'_> {
         Ok(true)
     }
 
-    /// The index of the form for a state; none where none is fine enough.
-    fn form(&mut self, state: State, cut: [bool; 2]) -> Option<usize> {
+    /// The form for a state, cut at some ends; none where none is fine enough.
+    fn form(&mut self, state: State, cut: [bool; 2]) -> Option<Arc<Form>> {
         let own = state.form(cut);
         if own >= self.cut_forms.len() {
             self.cut_forms.resize_with(own + 1, || None);
@@ -317,22 +317,20 @@ impl Engine<'_> {
             let whole = self.forms.of(self.setting, self.sites, state)?;
             self.cut_forms[own] = Some(if cut == [false; 2] { Arc::clone(whole) } else { Arc::new(whole.cut(cut)) });
         }
-        Some(own)
+        self.cut_forms[own].clone()
     }
 
     /// A site's polytope in a state; none where no form is fine enough.
     fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
         let (site, beyond) = (self.sites[index], self.beyond[index]);
+        let (shell, is_cut) = (self.setting.shell(&site, state), beyond.map(|beyond| beyond.is_some()));
+        let seed = (self.trial << 8 | state.form(is_cut) as u64) << 32 | index as u64;
         if matches!(site.site, Site::Triangle(_)) {
-            let seed = (self.trial << 8 | state.form([false; 2]) as u64) << 32 | index as u64;
-            return Polytope::around(site, self.setting.shell(&site, state), seed);
+            return Polytope::around(site, shell, seed);
         }
-        let number = self.form(state, beyond.map(|beyond| beyond.is_some()))?;
-        let seed = (self.trial << 8 | number as u64) << 32 | index as u64;
+        let form = self.form(state, is_cut)?;
         let most = self.setting.shell(&site, State::default()).outer;
-        let cut = Cut { beyond: beyond.map(Option::unwrap_or_default), most };
-        let form = self.cut_forms[number].as_ref()?;
-        Polytope::new(site, form, self.setting.shell(&site, state), cut, seed)
+        Polytope::new(site, &form, shell, Cut { beyond: beyond.map(Option::unwrap_or_default), most }, seed)
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

@@ -139,6 +139,14 @@ pub(super) fn ordered(site: &Site) -> [Point; 2] {
     }
 }
 
+/// Whether the facets of a polytope hang together as its corners say: each of these is deeper than `least` below all planes but its own.
+pub(super) fn hang_together(corners: &[Corner], places: &[Point], planes: &[Plane], least: f64) -> bool {
+    corners.iter().zip(places).all(|(corner, place)| {
+        let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
+        others.all(|(_, plane)| height(plane, place) < -least)
+    })
+}
+
 /// A number in [0, 1) that looks random: the seed's, with an index below 1024.
 pub(super) fn share(seed: u64, index: u64) -> f64 {
     (number(seed.wrapping_mul(1024).wrapping_add(index)) >> 11) as f64 / (1_u64 << 53) as f64
@@ -187,11 +195,7 @@ impl Polytope {
                 Some(std::array::from_fn(|axis| ends[corner.end][axis] + at[axis]))
             };
             let corners: Box<[Point]> = shape.structure.corners.iter().map(corner).collect::<Option<_>>()?;
-            let keeps_form = shape.structure.corners.iter().zip(&corners).all(|(corner, point)| {
-                let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
-                others.all(|(_, plane)| height(plane, point) < 0.0)
-            });
-            keeps_form.then_some((planes, corners))
+            hang_together(&shape.structure.corners, &corners, &planes, 0.0).then_some((planes, corners))
         };
         let (planes, corners) = (0..SHIFTS).find_map(|number| shifted(own * 0.25_f64.powi(number)))?;
         let cuts = shape.flats.map(|flat| flat.map(|facet| planes[usize::from(facet)]));
