@@ -31,6 +31,7 @@ mod lattice;
 mod octree;
 mod outside;
 mod parting;
+mod patches;
 mod plan;
 mod sample;
 mod seam;

@@ -7,8 +7,9 @@ use super::dust;
 use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Changed, Node, Pass, Task};
 use super::outside::MOST;
+use super::patches;
 use super::seam;
-use super::simplify::{Core, OF_POLYTOPES, Simplifier};
+use super::simplify::Core;
 use super::smooth::MOST_NOISE;
 use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
@@ -203,6 +204,13 @@ pub(super) struct Space {
     candidates: Candidates,
 }
 
+#[cfg(test)]
+impl Space {
+    pub(super) fn candidates(&self) -> &Candidates {
+        &self.candidates
+    }
+}
+
 /// The radii of the balls: one, or several that one serves, see [`SiteRule::deficit`]. A length e at the largest, r, is one at the smallest, s, of the same difference of squares:
 /// (s - e')^2 - s^2 = (r - e)^2 - r^2. At those between it is less than e'.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -294,6 +302,11 @@ impl<'a> Plan<'a> {
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
     fn pitch_for(rule: &SiteRule<'_>, radius: f64, tolerance: f64) -> f64 {
         (tolerance.max(0.0) * (2.0 * radius - tolerance) * rule.lattice_share()).sqrt() / ENCLOSING
+    }
+
+    #[cfg(test)]
+    pub(super) fn rule(&self) -> &SiteRule<'a> {
+        &self.rule
     }
 
     #[cfg(test)]
@@ -451,7 +464,7 @@ impl<'a> Plan<'a> {
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
-        Simplifier::new(&self.rule, setting).run(setting, &OF_POLYTOPES, &core, &space.candidates, &mut surface, budget)?;
+        patches::simplify(setting, &self.rule, core, &space.candidates, &mut surface, budget)?;
         self.finish(setting, space, surface, uncertain, None, budget).map(Some)
     }
 

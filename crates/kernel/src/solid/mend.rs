@@ -201,7 +201,7 @@ impl Mender {
         self.stamp = 0;
     }
 
-    /// Joins vertices at the same place, and turns edges of triangles without area, while that changes anything.
+    /// Joins vertices at the same place, and turns edges of triangles without area, while that changes anything; only triangles whose corners are all `inside` become others.
     pub(crate) fn clean(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool], rounding: f64) {
         for _ in 0..FLIP_ROUNDS {
             let merged = self.merge(mesh, inside, settled);
@@ -218,9 +218,12 @@ impl Mender {
             if !inside[vertex as usize] || settled[vertex as usize] || !mesh.star(vertex, MOST_AROUND, &mut self.star) {
                 continue;
             }
+            if !self.star.ring.iter().all(|&other| inside[other as usize]) {
+                continue;
+            }
             for m in 0..self.star.ring.len() {
                 let target = self.star.ring[m];
-                if mesh.points[target as usize] == mesh.points[vertex as usize] && inside[target as usize] && self.keeps_manifold(mesh, m) {
+                if mesh.points[target as usize] == mesh.points[vertex as usize] && self.keeps_manifold(mesh, m) {
                     mesh.collapse(vertex, &self.star, m);
                     merged = true;
                     break;
@@ -253,7 +256,7 @@ impl Mender {
             }
             let (a, b, c, d) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3], mesh.end(next(twin)));
             let at = |corner: u32| mesh.points[corner as usize];
-            if contact::is_flat(&[at(d), at(c), at(a)]) || contact::is_flat(&[at(c), at(d), at(b)]) {
+            if !inside[d as usize] || contact::is_flat(&[at(d), at(c), at(a)]) || contact::is_flat(&[at(c), at(d), at(b)]) {
                 continue;
             }
             if mesh.star(c, usize::MAX, &mut self.other) && !self.other.ring.contains(&d) {

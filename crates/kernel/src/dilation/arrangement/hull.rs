@@ -1,45 +1,47 @@
-//! The polytope of a triangle.
+//! The polytope of a convex polygon.
 
+use super::figure::{Figure, Polygon};
 use super::form::{Corner, MOST_FACETS, Structure, meeting};
+use super::joints;
 use super::polytopes::{OWN_SHIFT, Plane, Polytope, SHIFT, Shell, hang_together, height, normal, share};
-use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
-use crate::dilation::tree::Weighted;
-use crate::measure::triangle::closest_on_triangle;
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The least sine of a triangle's angles: polytopes around needles begin with corners too far away.
+/// The least sine of a polygon's angles: polytopes around needles begin with corners too far away.
 const LEAST_SINE: f64 = 1e-3;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
 const NOISE: f64 = 1e-9;
-/// The facets along the triangle come first.
+/// The facets along the polygon come first.
 const FACES: usize = 2;
 
-/// A polytope that is cut facet by facet, all lengths from the triangle's first corner.
+/// A polytope that is cut facet by facet, all lengths from the polygon's first corner.
 struct Hull {
     planes: Vec<Plane>,
     corners: Vec<(Point, [u16; 3])>,
 }
 
 impl Polytope {
-    /// The polytope of a triangle in its shell; none for needles, or where facets are too many or too small.
+    /// The polytope of a polygon in its shell; none for needles, or where facets are too many or too small.
     ///
-    /// Its facets touch the triangle's dilation by the inner radius, shifted outwards as those of [`Polytope::new`]: two along the triangle, farther out, strips along its sides, as many as keep within the outer one, and at the
-    /// corners one towards the farthest vertex, until none is beyond. So it lies between both dilations.
-    pub(super) fn around(weighted: Weighted, shell: Shell, seed: u64) -> Option<Self> {
-        let Site::Triangle([a, b, c]) = weighted.site else { return None };
-        let corners = [[0.0; 3], subtract(&b, &a), subtract(&c, &a)];
+    /// Its facets touch the polygon's dilation by the inner radius, shifted outwards as those of [`Polytope::new`]: two along the polygon, farther out, strips along its sides, as many as keep within the outer one, and at the
+    /// corners one towards the farthest vertex, until none is beyond. So it lies between both dilations, where it is not cut as far beyond its sides as is said.
+    pub(super) fn around(figure: &Figure, beyond: &[Option<f64>], shell: Shell, seed: u64) -> Option<Self> {
+        let polygon = figure.polygon()?;
+        let origin = polygon.corners[0];
+        let polygon = polygon.from(&origin);
         let room = SHIFT * (shell.outer - shell.inner);
         let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
         // Faces have nothing beyond them that would make up for what they lack: they are in the band's middle, where panels are as thick as they should be.
         let lift = |facet: usize| if facet < FACES { 0.5 * (shell.outer - shell.inner - room) } else { 0.0 };
         let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
-        let mut hull = Hull::prism(&corners, offset)?;
+        let outside = |facet: usize| facet.checked_sub(FACES).and_then(|side| beyond[side]).unwrap_or_else(|| offset(facet));
+        let mut hull = Hull::prism(&polygon, outside)?;
         let noise = NOISE * shell.outer;
         // A polygon around a circle: half of it between both faces.
         let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
         let up = normal(&hull.planes[0]);
-        for (side, corner) in corners.iter().enumerate() {
+        for (side, corner) in polygon.corners.iter().enumerate().filter(|&(side, _)| beyond[side].is_none()) {
             let out = normal(&hull.planes[FACES + side]);
             for k in 1..strips {
                 let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();
@@ -48,32 +50,31 @@ impl Polytope {
             }
         }
         loop {
-            let closest = |x: &Point| closest_on_triangle(x, &corners[0], &corners[1], &corners[2]);
-            let far = hull.corners.iter().map(|(corner, _)| (distance_squared(corner, &closest(corner)), corner));
+            let far = hull.corners.iter().map(|(corner, _)| (distance_squared(corner, &polygon.closest(corner)), corner));
             let (square, corner) = far.max_by(|p, q| p.0.total_cmp(&q.0))?;
             if square < shell.outer * shell.outer {
                 break;
             }
-            let (corner, touched) = (*corner, closest(corner));
+            let (corner, touched) = (*corner, polygon.closest(corner));
             let direction = subtract(&corner, &touched).map(|part| part / square.sqrt());
             hull.cut(&direction, dot(&direction, &touched) + offset(hull.planes.len()), noise)?;
         }
-        hull.finish(weighted, &a, noise)
+        hull.finish(&origin, joints::planes(figure, beyond), noise)
     }
 }
 
 impl Hull {
     /// Both faces, and a facet across the triangle at every side.
-    fn prism(corners: &[Point; 3], offset: impl Fn(usize) -> f64) -> Option<Self> {
-        let sides: [Point; 3] = std::array::from_fn(|k| subtract(&corners[(k + 1) % 3], &corners[k]));
-        let across = cross(&sides[0], &sides[1]);
+    fn prism(Polygon { corners, up }: &Polygon, offset: impl Fn(usize) -> f64) -> Option<Self> {
+        let (count, up) = (corners.len(), *up);
+        let sides: Vec<Point> = (0..count).map(|k| subtract(&corners[(k + 1) % count], &corners[k])).collect();
         let length = |vector: &Point| dot(vector, vector).sqrt();
-        let double = length(&across);
-        let is_needle = |k: usize| double <= LEAST_SINE * length(&sides[k]) * length(&sides[(k + 1) % 3]);
-        if (0..3).any(is_needle) {
+        let sine = |one: &Point, other: &Point| length(&cross(one, other)) / (length(one) * length(other));
+        // Sides without a length, too.
+        let is_sharp = |k: usize| sine(&sides[k], &sides[(k + 1) % count]) > LEAST_SINE;
+        if !(0..count).all(is_sharp) {
             return None;
         }
-        let up = across.map(|part| part / double);
         let mut planes: Vec<Plane> = Vec::new();
         let mut add = |direction: Point, support: f64| {
             let distance = support + offset(planes.len());
@@ -81,14 +82,14 @@ impl Hull {
         };
         add(up, 0.0);
         add(up.map(|part| -part), 0.0);
-        for (side, corner) in sides.iter().zip(corners) {
+        for (side, corner) in sides.iter().zip(corners.iter()) {
             let out = cross(side, &up).map(|part| part / length(side));
             add(out, dot(&out, corner));
         }
         let mut hull = Self { planes, corners: Vec::new() };
         for face in 0..FACES {
-            for side in 0..3 {
-                let facets = [face, FACES + side, FACES + (side + 1) % 3].map(|facet| facet as u16);
+            for side in 0..count {
+                let facets = [face, FACES + side, FACES + (side + 1) % count].map(|facet| facet as u16);
                 hull.corners.push((hull.at(facets)?, facets));
             }
         }
@@ -129,7 +130,7 @@ impl Hull {
     }
 
     /// Leaves out the facets that are gone.
-    fn finish(self, site: Weighted, origin: &Point, noise: f64) -> Option<Polytope> {
+    fn finish(self, origin: &Point, cuts: Box<[Plane]>, noise: f64) -> Option<Polytope> {
         let is_used = |facet: &usize| self.corners.iter().any(|(_, facets)| facets.contains(&(*facet as u16)));
         let used: Vec<usize> = (0..self.planes.len()).filter(is_used).collect();
         let renamed = |facet: u16| used.binary_search(&usize::from(facet)).map_or(u16::MAX, |place| place as u16);
@@ -145,6 +146,6 @@ impl Hull {
         let moved = |at: &Point| std::array::from_fn(|axis| at[axis] + origin[axis]);
         let shifted = |plane: &Plane| [plane[0], plane[1], plane[2], plane[3] + dot(&normal(plane), origin)];
         let (planes, corners) = (planes.iter().map(shifted).collect(), places.iter().map(moved).collect());
-        structure.is_whole().then(|| Polytope::with(site, Arc::new(structure), planes, [None; 2], corners))
+        structure.is_whole().then(|| Polytope::with(Arc::new(structure), planes, cuts, corners))
     }
 }

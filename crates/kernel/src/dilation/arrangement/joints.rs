@@ -11,10 +11,11 @@
 //!
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
+use super::figure::{Figure, Outline};
 use super::form::Form;
+use super::hinges;
 use super::polytopes::{Plane, Shell, ordered};
-use crate::attractor::cell::{Point, Site, between, dot, subtract};
-use crate::dilation::tree::Weighted;
+use crate::attractor::cell::{Point, between, dot, subtract};
 use crate::split_mix::{STEP, number};
 
 /// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
@@ -33,11 +34,11 @@ struct End {
 }
 
 /// How far beyond its ends, in their order, every site may be cut; none where it is not. `form` is that of the polytopes that will be cut.
-pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) -> Shell) -> Vec<[Option<f64>; 2]> {
+pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
-    for (site, weighted) in (0..).zip(sites).filter(|(_, weighted)| !matches!(weighted.site, Site::Triangle(_))) {
+    for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
         // Zeros have two signs.
-        let [first, second] = ordered(&weighted.site).map(|at| at.map(|x| x + 0.0));
+        let [first, second] = ordered(figure).map(|at| at.map(|x| x + 0.0));
         if first == second {
             ends.push(End { at: first, site, end: None });
         } else {
@@ -81,18 +82,20 @@ pub(super) fn cuts(sites: &[Weighted], form: &Form, shell: impl Fn(&Weighted) ->
     cuts
 }
 
-/// The planes that a site's dilations are cut by.
-pub(super) fn planes(site: &Weighted, beyond: [Option<f64>; 2]) -> [Option<Plane>; 2] {
-    let ends = ordered(&site.site);
-    std::array::from_fn(|end| {
-        let along = unit(&subtract(&ends[end], &ends[1 - end]));
-        beyond[end].map(|beyond| [along[0], along[1], along[2], dot(&along, &ends[end]) + beyond])
-    })
+/// The planes that a figure's dilations are cut by: beyond the ends of a segment, or the sides of a polygon.
+pub(super) fn planes(figure: &Figure, beyond: &[Option<f64>]) -> Box<[Plane]> {
+    let plane = |normal: Point, at: &Point, beyond: f64| [normal[0], normal[1], normal[2], dot(&normal, at) + beyond];
+    let cut = beyond.iter().enumerate().filter_map(|(place, beyond)| beyond.map(|beyond| (place, beyond)));
+    if let Some(polygon) = figure.polygon() {
+        return cut.map(|(side, beyond)| plane(hinges::outward(polygon, side), &polygon.corners[side], beyond)).collect();
+    }
+    let ends = ordered(figure);
+    cut.map(|(end, beyond)| plane(unit(&subtract(&ends[end], &ends[1 - end])), &ends[end], beyond)).collect()
 }
 
 /// The unit vector along a segment, out of one of its ends.
-fn outward(sites: &[Weighted], end: &End) -> Point {
-    let ends = ordered(&sites[end.site as usize].site);
+fn outward(sites: &[Figure], end: &End) -> Point {
+    let ends = ordered(&sites[end.site as usize]);
     let own = end.end.unwrap_or_default();
     unit(&subtract(&ends[own], &ends[1 - own]))
 }
@@ -126,7 +129,8 @@ fn share(site: u32, end: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attractor::cell::distance_squared;
+    use crate::attractor::cell::{Site, distance_squared};
+    use crate::dilation::tree::Weighted;
     use crate::split_mix::Random;
 
     /// Balls around what joints bring together are covered by what is left of each segment's own.
@@ -139,7 +143,7 @@ mod tests {
             let mut unit = || (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
             let mut vector = || -> Point { std::array::from_fn(|_| unit()) };
             let (count, straight) = (2 + round % 5, vector());
-            let sites: Vec<Weighted> = (0..count)
+            let sites: Vec<Figure> = (0..count)
                 .map(|k| {
                     let bend = [1.0, 0.3, 0.05][round % 3];
                     let way = match round % 4 {
@@ -151,12 +155,12 @@ mod tests {
                     };
                     let (centre, deficit) = ([5.0, -7.0, 2.0], if round % 7 == 6 { 0.2 * k as f64 } else { 0.0 });
                     let end = std::array::from_fn(|axis| centre[axis] + way[axis]);
-                    Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }
+                    Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }.into()
                 })
                 .collect();
             let cuts = cuts(&sites, &form, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) });
             let centre = [5.0, -7.0, 2.0];
-            let joint = |k: usize| ordered(&sites[k].site).iter().position(|end| *end == centre).expect("all end there");
+            let joint = |k: usize| ordered(&sites[k]).iter().position(|end| *end == centre).expect("all end there");
             let cut = (0..count).filter(|&k| cuts[k][joint(k)].is_some()).count();
             // One of six is a point.
             assert!(cut + 1 + count / 6 >= count, "{round}");
@@ -165,10 +169,10 @@ mod tests {
             for _ in 0..300 {
                 let x: Point = std::array::from_fn(|axis| centre[axis] + 1.5 * unit());
                 let nearest = sites.iter().map(|site| site.distance_squared(&x)).fold(f64::INFINITY, f64::min).sqrt();
-                let holds = |(weighted, cuts): (&Weighted, &[Option<f64>; 2])| {
-                    let ends = ordered(&weighted.site);
+                let holds = |(figure, cuts): (&Figure, &[Option<f64>; 2])| {
+                    let ends = ordered(figure);
                     let length = distance_squared(&ends[0], &ends[1]).sqrt();
-                    weighted.distance_squared(&x).sqrt() <= nearest * (1.0 + 1e-12)
+                    figure.distance_squared(&x).sqrt() <= nearest * (1.0 + 1e-12)
                         && (0..2).all(|end| {
                             let along = subtract(&ends[end], &ends[1 - end]);
                             cuts[end].is_none_or(|most| dot(&subtract(&x, &ends[end]), &along) <= most * length)

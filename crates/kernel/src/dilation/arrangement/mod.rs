@@ -4,8 +4,11 @@
 //! where all of them are cut across the end of a segment that meets others, see `joints`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does.
 
+mod bodies;
 mod facets;
+mod figure;
 mod form;
+mod hinges;
 mod hull;
 mod joints;
 mod nerve;
@@ -18,23 +21,27 @@ mod triangulate;
 use super::plan::Setting;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
-use crate::attractor::cell::{Cell, ControlPoint, Site, child_points};
+use crate::attractor::cell::{Cell, ControlPoint, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
+use bodies::{Bodies, Common};
+use figure::Figure;
 use form::Form;
-use nerve::{Common, Meeting};
+use nerve::{Doubt, Sets};
 use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
 use std::sync::{Arc, OnceLock};
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at such
 /// sets as far as all their parts meet. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
-const MOST_NEAR: [usize; 2] = [5_000, 200];
+const MOST_NEAR: [usize; 2] = [5_000, 250];
 /// Doubts that polytopes may leave, as a share of the sites, and in any case: more of them are no matter of a few places, and finer polytopes everywhere cost more than a lattice.
 const MOST_DOUBTS: f64 = 0.2;
 const FEW_DOUBTS: f64 = 16.0;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
+/// How far polygons may be from their triangles, as a share of the slack that all bounds leave: this happens again and again.
+const FLATNESS: f64 = 1.0 / 64.0;
 /// Levels at most.
 const LEVELS: u32 = 5;
 /// What is tried where rounding leaves a boundary open.
@@ -50,7 +57,7 @@ pub(super) struct Arrangement<'a> {
     setting: &'a Setting,
     sites: Sites,
     /// How far beyond its ends each of them is cut.
-    beyond: Vec<[Option<f64>; 2]>,
+    beyond: Vec<Box<[Option<f64>]>>,
     near: Lists,
     forms: Forms,
     /// About how many triangles will be made.
@@ -79,17 +86,19 @@ impl<'a> Arrangement<'a> {
             return Ok(None);
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
-        let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
-        let shell = |site: &Weighted| setting.shell(site, State::default());
+        let Some(mut sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
+        sites.list = figure::joined(sites.list, FLATNESS * setting.slack, budget)?;
+        let shell = |figure: &Figure| setting.shell(figure, State::default());
         let forms = Forms::default();
         let Some(form) = forms.of(setting, &sites.list, State::default()) else { return Ok(None) };
-        let beyond = joints::cuts(&sites.list, form, shell);
-        let body = |(weighted, &beyond): (&Weighted, &[Option<f64>; 2])| Body {
-            site: weighted.site,
-            reach: weighted.in_space(setting.outer) + setting.slack,
-            cuts: joints::planes(weighted, beyond),
-        };
-        let bodies: Vec<Body> = sites.list.iter().zip(&beyond).map(body).collect();
+        let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
+        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, form, shell)).filter(|(beyond, _)| beyond.is_empty()) {
+            *beyond = Box::new(cut);
+        }
+        let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
+        let bodies = sites.list.iter().zip(&beyond);
+        let bodies: Vec<Body<'_>> =
+            bodies.map(|(figure, beyond)| Body { figure, reach: reach(figure), cuts: joints::planes(figure, beyond) }).collect();
         let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
         drop(bodies);
         let mut arrangement = Self { setting, sites, beyond, near, forms, triangles: 0.0 };
@@ -154,7 +163,7 @@ const LEAST_TRIANGLES: f64 = 48.0;
 /// All sites of an attractor.
 #[derive(Default)]
 struct Sites {
-    list: Vec<Weighted>,
+    list: Vec<Figure>,
     /// The largest errors of leaves.
     error: SiteError,
     leaves: u64,
@@ -171,7 +180,7 @@ impl Sites {
             while let Some((cell, points)) = open.pop() {
                 if let Some(error) = rule.leaf(&cell, &points) {
                     let deficit = rule.deficit(cell.root);
-                    rule.emit(&cell, &points, &mut |site| found.list.push(Weighted { site, deficit }));
+                    rule.emit(&cell, &points, &mut |site| found.list.push(Weighted { site, deficit }.into()));
                     found.error = found.error.max(error);
                     found.leaves += 1;
                     if found.list.len() > most {
@@ -189,14 +198,6 @@ impl Sites {
         }
         Ok((!found.list.is_empty()).then_some(found))
     }
-}
-
-/// Sites whose polytopes were not shown to have a common point exactly where the dilations have, and whether these have.
-#[derive(Clone, Debug)]
-struct Doubt {
-    /// In ascending order.
-    sites: Vec<u32>,
-    wanted: Common,
 }
 
 /// Which side of the dilation by r a polytope keeps to.
@@ -224,8 +225,8 @@ impl State {
 
 impl Setting {
     /// The band of a site's polytope.
-    fn shell(&self, site: &Weighted, state: State) -> Shell {
-        let [inner, radius, outer] = [self.least, self.reach, self.outer].map(|distance| site.in_space(distance));
+    fn shell(&self, figure: &Figure, state: State) -> Shell {
+        let [inner, radius, outer] = [self.least, self.reach, self.outer].map(|distance| figure.in_space(distance));
         let share = FINER.powi(-(state.level as i32));
         let inner = if state.side == Side::Around { radius } else { radius - share * (radius - inner) };
         let outer = if state.side == Side::Within { radius } else { radius + share * (outer - radius) };
@@ -233,7 +234,7 @@ impl Setting {
     }
 
     /// The form of polytopes for a state, which keep to one side, whichever, or to both; none where none is fine enough.
-    fn form(&self, sites: &[Weighted], state: State) -> Option<Form> {
+    fn form(&self, sites: &[Figure], state: State) -> Option<Form> {
         let sides: &[Side] = if state.side == Side::Both { &[Side::Both] } else { &[Side::Within, Side::Around] };
         let shells = sites.iter().flat_map(|site| sides.iter().map(|&side| self.shell(site, State { side, ..state })));
         Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min))
@@ -246,7 +247,7 @@ struct Forms([[OnceLock<Option<Arc<Form>>>; 2]; LEVELS as usize]);
 
 impl Forms {
     /// The form for a state below [`LEVELS`].
-    fn of(&self, setting: &Setting, sites: &[Weighted], state: State) -> Option<&Arc<Form>> {
+    fn of(&self, setting: &Setting, sites: &[Figure], state: State) -> Option<&Arc<Form>> {
         let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)];
         place.get_or_init(|| setting.form(sites, state).map(Arc::new)).as_ref()
     }
@@ -263,8 +264,8 @@ enum Run {
 
 struct Engine<'a> {
     setting: &'a Setting,
-    sites: &'a [Weighted],
-    beyond: &'a [[Option<f64>; 2]],
+    sites: &'a [Figure],
+    beyond: &'a [Box<[Option<f64>]>],
     near: &'a Lists,
     forms: &'a Forms,
     /// The forms that are in use, cut and whole.
@@ -279,22 +280,22 @@ impl Engine<'_> {
         if !self.begin(budget)? {
             return Ok(Run::Open);
         }
-        let (mut changed, mut doubts) = (vec![true; self.sites.len()], Vec::<Doubt>::new());
+        let (mut changed, mut sets) = (vec![true; self.sites.len()], Sets::default());
         let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
-        let mut meeting = Meeting::default();
         while changed.contains(&true) {
-            let stale = self.near.around(&changed);
-            doubts.retain(|doubt| !stale[doubt.sites[0] as usize]);
-            let more = most.saturating_sub(doubts.len());
-            let found = nerve::doubts(self.setting, &self.polytopes, self.near, &mut meeting, &stale, more, budget)?;
-            let Some(found) = found else { return Ok(Run::Doubtful) };
-            doubts.extend(found);
-            changed = self.refine(&doubts);
+            if !sets.look(&self.bodies(), &changed, most, budget)? {
+                return Ok(Run::Doubtful);
+            }
+            changed = self.refine(sets.doubts());
         }
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
         let Some(boundary) = facets::boundary(&self.polytopes, &pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
-        Ok(Run::Done(Box::new(Arranged { surface, uncertain: doubts.len() as u64 })))
+        Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().len() as u64 })))
+    }
+
+    fn bodies(&self) -> Bodies<'_> {
+        Bodies { setting: self.setting, figures: self.sites, polytopes: &self.polytopes, near: self.near }
     }
 
     /// Makes the first polytopes; whether there are such.
@@ -322,15 +323,16 @@ impl Engine<'_> {
 
     /// A site's polytope in a state; none where no form is fine enough.
     fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
-        let (site, beyond) = (self.sites[index], self.beyond[index]);
-        let (shell, is_cut) = (self.setting.shell(&site, state), beyond.map(|beyond| beyond.is_some()));
+        let (figure, beyond) = (&self.sites[index], &self.beyond[index]);
+        let shell = self.setting.shell(figure, state);
+        let is_cut = [0, 1].map(|end| beyond[end].is_some());
         let seed = (self.trial << 8 | state.form(is_cut) as u64) << 32 | index as u64;
-        if matches!(site.site, Site::Triangle(_)) {
-            return Polytope::around(site, shell, seed);
+        if figure.polygon().is_some() {
+            return Polytope::around(figure, beyond, shell, seed);
         }
         let form = self.form(state, is_cut)?;
-        let most = self.setting.shell(&site, State::default()).outer;
-        Polytope::new(site, &form, shell, Cut { beyond: beyond.map(Option::unwrap_or_default), most }, seed)
+        let most = self.setting.shell(figure, State::default()).outer;
+        Polytope::new(figure, &form, shell, Cut { beyond: [0, 1].map(|end| beyond[end].unwrap_or_default()), most }, seed)
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

@@ -1,129 +1,141 @@
-//! Whether a union of polytopes has the topology of the dilation, by their nerves.
+//! The sets of up to four bodies by which a union of polytopes is shown to have the topology of the dilation.
 //!
-//! The union of convex bodies has the homotopy type of their nerve, the simplices of which are the sets of bodies with a common point (Leray, 1945; Borsuk, "On the imbedding of systems of compacta in
-//! simplicial complexes", Fund. Math. 35, 1948). Let P_i be the polytope of site S_i and D_i its dilation by r, cut as `joints` says. If sets of polytopes have a common point exactly where these sites'
-//! D_i have, both unions have as many components, handles and voids. In space sets of up to four tell (Helly, 1923).
+//! Let P_i be the polytope of figure S_i and D_i its dilation by r, cut as `joints` and `hinges` say: all are convex. Let the D_i shrink to the E_i = D_i n P_i, all at the same time, each to (1 - t) D_i + t E_i, and these grow to the P_i in the
+//! same way. The union keeps its form unless, at some time, a point of its boundary has outward normals, of the bodies that have it on theirs, with 0 in their hull: everywhere else these have a common direction against which the boundary moves on
+//! (the union is where the least of the bodies' signed distances is at most 0, and 0 is a regular value of that: Clarke, "Optimization and Nonsmooth Analysis", 1983; Gershkovich and Rubinstein, "Morse theory for min-type functions", Asian J. Math. 1, 1997).
+//! Four such normals are enough (Caratheodory), no body has all of them, and the interiors of those that have them have no common point. So a set of two to four bodies does nothing of that kind if
 //!
-//! How far a point is from the farthest of some sites is a convex function, and so is how high it is above the highest plane of some polytopes. Where dilations are cut, r and the height above the
-//! plane is a distance, too: the greatest is at most r in the same places, at least s where a ball by s is deeper below the plane than r - s, and at most the band's outer end in all of those of polytopes.
-//! Their minima are enclosed between bounds by the method of ellipsoids (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). A common point of the dilations by s, which lie in both
-//! kinds of bodies, settles most sets, and none of those by the band's outer end others.
+//! * (both meet) the E_i have a common interior point, which all bodies have all the time,
+//! * (neither meets) neither the D_i have a common point, nor the P_i: every body is within one of these, or
+//! * (hidden) all common points of the D_i, and all of the P_i, are in the interior of some E_j, and so in that of the union, all the time.
+//!
+//! If that is shown of all sets, both unions have as many components, handles and voids. Sets that hold one which does not meet, or which is hidden, are so, too.
 
-use super::Doubt;
-use super::pieces::{Lists, ends};
-use super::polytopes::Polytope;
-use super::polytopes::{Polytopes, height, normal};
-use crate::attractor::cell::{Point, between, dot, subtract};
+use super::bodies::{Bodies, Common, Verdict};
+use crate::attractor::cell::{Point, between};
 use crate::budget::{Budget, Stopped};
-use crate::dilation::plan::Setting;
 use rayon::prelude::*;
 
-/// Ellipsoids at most, to decide one question.
-const MOST_ELLIPSOIDS: usize = 400;
-/// Distances are told this well, as a share of the band's width, before polytopes are asked.
-const CLOSE: f64 = 0.1;
-/// Steps towards a common point, before.
-const STEPS: usize = 12;
-/// Bodies of a simplex at most.
+/// Bodies of a set at most.
 const MOST_BODIES: usize = 4;
-
 /// Sites that are looked at before doubts are counted.
 const AT_A_TIME: usize = 16;
 
-/// Of every site the later ones whose dilations have a point in common with its own, as far as is told.
+/// A set of sites whose polytopes were not shown to have a common point exactly where the dilations have, and whether these have.
+#[derive(Clone, Debug)]
+pub(super) struct Doubt {
+    /// In ascending order.
+    pub(super) sites: Vec<u32>,
+    pub(super) wanted: Common,
+}
+
+/// What is known of the sets of sites, while polytopes change.
 #[derive(Debug, Default)]
-pub(super) struct Meeting(Vec<Vec<u32>>);
-
-impl Meeting {
-    fn after(&self, index: u32) -> &[u32] {
-        &self.0[index as usize]
-    }
-
-    fn has(&self, first: u32, second: u32) -> bool {
-        self.after(first).binary_search(&second).is_ok()
-    }
+pub(super) struct Sets {
+    /// Of every site the later ones whose dilations have a point in common with its own that is not hidden, as far as is told.
+    meeting: Vec<Vec<u32>>,
+    doubts: Doubts,
 }
 
-/// The sets of sites whose polytopes were not shown to have a common point exactly where the dilations have: those whose first site is `stale`. `None` where there are more than `most`.
-/// Which pairs meet is told by the sites alone: it is asked for the first time, when all are stale, and kept.
-///
-/// # Errors
-/// [`Stopped`].
-pub(super) fn doubts(
-    setting: &Setting,
-    polytopes: &Polytopes,
-    near: &Lists,
-    meeting: &mut Meeting,
-    stale: &[bool],
-    most: usize,
-    budget: &Budget,
-) -> Result<Option<Vec<Doubt>>, Stopped> {
-    let nerve = Nerve { setting, polytopes };
-    let sites: Vec<u32> = (0..polytopes.count()).filter(|&site| stale[site as usize]).collect();
-    let mut doubts = Vec::new();
-    meeting.0.resize(polytopes.all.len(), Vec::new());
-    for some in sites.chunks(AT_A_TIME) {
-        let pairs = |&first: &u32| {
+/// Those that are open, and those that do not matter as they are hidden: this needs to be shown again when others change.
+#[derive(Debug, Default)]
+struct Doubts {
+    open: Vec<Doubt>,
+    hidden: Vec<Doubt>,
+}
+
+impl Sets {
+    /// Those that are in doubt.
+    pub(super) fn doubts(&self) -> &[Doubt] {
+        &self.doubts.open
+    }
+
+    fn meet(&self, first: u32, second: u32) -> bool {
+        self.meeting[first as usize].binary_search(&second).is_ok()
+    }
+
+    /// Looks at the sets that have one of the sites that are `changed`, at first all of them. False where more than `most` are in doubt.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn look(&mut self, bodies: &Bodies<'_>, changed: &[bool], most: usize, budget: &Budget) -> Result<bool, Stopped> {
+        let stale = bodies.near.around(changed);
+        self.forget(bodies, changed, &stale, budget)?;
+        let sites: Vec<u32> = (0..bodies.polytopes.count()).filter(|&site| stale[site as usize]).collect();
+        self.meeting.resize(stale.len(), Vec::new());
+        for some in sites.chunks(AT_A_TIME) {
+            let pairs = |&first: &u32| {
+                budget.cancel.check()?;
+                let later = bodies.near.of(first).iter().copied().filter(|&other| other > first).collect();
+                let mut search = Search::new(bodies, first, later, changed);
+                Ok((search.pairs(self), search.found))
+            };
+            let found: Vec<(Vec<u32>, Doubts)> = some.par_iter().map(pairs).collect::<Result<_, Stopped>>()?;
+            for (&first, (after, found)) in some.iter().zip(found) {
+                self.meeting[first as usize] = after;
+                self.doubts.extend(found);
+            }
+            if self.doubts.open.len() > most {
+                return Ok(false);
+            }
+        }
+        for some in sites.chunks(AT_A_TIME) {
+            let larger = |&first: &u32| {
+                let mut search = Search::new(bodies, first, self.meeting[first as usize].clone(), changed);
+                search.triples_and_more(self, budget)?;
+                Ok(search.found)
+            };
+            let found: Vec<Doubts> = some.par_iter().map(larger).collect::<Result<_, Stopped>>()?;
+            found.into_iter().for_each(|found| self.doubts.extend(found));
+            if self.doubts.open.len() > most {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Forgets the doubts about sets that have one of the sites that are `changed`, and shows again that others are hidden where one near to them, and so to their first site, did.
+    fn forget(&mut self, bodies: &Bodies<'_>, changed: &[bool], stale: &[bool], budget: &Budget) -> Result<(), Stopped> {
+        let Doubts { open, hidden } = &mut self.doubts;
+        let is_new = |doubt: &Doubt| doubt.sites.iter().any(|&site| changed[site as usize]);
+        open.retain(|doubt| !is_new(doubt));
+        hidden.retain(|doubt| !is_new(doubt));
+        let is_hidden = |doubt: &Doubt| {
             budget.cancel.check()?;
-            let later = near.of(first).iter().copied().filter(|&other| other > first).collect();
-            let mut search = Search::new(&nerve, first, later);
-            Ok((search.pairs(), search.found))
+            Ok(!stale[doubt.sites[0] as usize] || bodies.is_hidden(&doubt.sites, doubt.wanted))
         };
-        let found: Vec<(Vec<u32>, Vec<Doubt>)> = some.par_iter().map(pairs).collect::<Result<_, Stopped>>()?;
-        for (&first, (after, own)) in some.iter().zip(found) {
-            meeting.0[first as usize] = after;
-            doubts.extend(own);
-        }
-        if doubts.len() > most {
-            return Ok(None);
-        }
+        let mut is_hidden = hidden.par_iter().map(is_hidden).collect::<Result<Vec<bool>, Stopped>>()?.into_iter();
+        open.extend(hidden.extract_if(.., |_| !is_hidden.next().unwrap_or_default()));
+        Ok(())
     }
-    for some in sites.chunks(AT_A_TIME) {
-        let sets = |&first: &u32| {
-            let mut search = Search::new(&nerve, first, meeting.after(first).to_vec());
-            search.triples_and_more(meeting, budget)?;
-            Ok(search.found)
-        };
-        let found: Vec<Vec<Doubt>> = some.par_iter().map(sets).collect::<Result<_, Stopped>>()?;
-        doubts.extend(found.into_iter().flatten());
-        if doubts.len() > most {
-            return Ok(None);
-        }
+}
+
+impl Doubts {
+    fn extend(&mut self, other: Self) {
+        self.open.extend(other.open);
+        self.hidden.extend(other.hidden);
     }
-    Ok(Some(doubts))
 }
 
-struct Nerve<'a> {
-    setting: &'a Setting,
-    polytopes: &'a Polytopes,
-}
-
-/// What is known of some bodies' common points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Common {
-    Some,
-    None,
-    Unknown,
-}
-
-/// The simplices with a first body.
+/// The sets with a first body.
 ///
 /// Most are settled by a place that is in many bodies, a *hub*: any of these have a common point. And most others are not looked at, as sets that hold one without a common point have none.
 struct Search<'a> {
-    nerve: &'a Nerve<'a>,
+    bodies: &'a Bodies<'a>,
     first: u32,
     /// The bodies that may follow, in ascending order, and of each the hubs in it, bit by bit; all hubs are in the first body.
     later: Vec<u32>,
     hubs: Vec<u64>,
     count: u32,
-    found: Vec<Doubt>,
+    changed: &'a [bool],
+    found: Doubts,
 }
 
 impl<'a> Search<'a> {
     /// Begins with the hubs that the first site itself suggests: its corners, and the middles between them.
-    fn new(nerve: &'a Nerve<'a>, first: u32, later: Vec<u32>) -> Self {
-        let mut search = Self { nerve, first, hubs: vec![0; later.len()], count: 0, later, found: Vec::new() };
-        let corners = ends(&nerve.polytopes.of(first).site.site);
+    fn new(bodies: &'a Bodies<'a>, first: u32, later: Vec<u32>, changed: &'a [bool]) -> Self {
+        let mut search = Self { bodies, first, hubs: vec![0; later.len()], count: 0, later, changed, found: Doubts::default() };
+        let corners = bodies.figures[first as usize].corners();
         for p in 0..corners.len() {
             for q in 0..=p {
                 search.add_hub(&between(&corners[p], &corners[q], 0.5));
@@ -134,43 +146,60 @@ impl<'a> Search<'a> {
 
     /// Adds a hub, if it is in the first body.
     fn add_hub(&mut self, x: &Point) {
-        if self.count == u64::BITS || !self.nerve.is_in(self.first, x) {
+        if self.count == u64::BITS || !self.bodies.is_in(self.first, x) {
             return;
         }
         for (&body, hubs) in self.later.iter().zip(&mut self.hubs) {
-            *hubs |= u64::from(self.nerve.is_in(body, x)) << self.count;
+            *hubs |= u64::from(self.bodies.is_in(body, x)) << self.count;
         }
         self.count += 1;
     }
 
-    /// Whether the first body and some that follow may have a common point.
+    /// Whether the first body and some that follow may have a common point that is not hidden.
     fn may_meet(&mut self, others: &[usize]) -> bool {
         if others.iter().fold(u64::MAX, |common, &other| common & self.hubs[other]) != 0 {
             return true;
         }
-        let mut simplex = [self.first; MOST_BODIES];
-        for (slot, &other) in simplex[1..].iter_mut().zip(others) {
+        let mut set = [self.first; MOST_BODIES];
+        for (slot, &other) in set[1..].iter_mut().zip(others) {
             *slot = self.later[other];
         }
-        let simplex = &simplex[..=others.len()];
-        let (common, doubt, x) = self.nerve.common(simplex);
-        if doubt {
-            self.found.push(Doubt { sites: simplex.to_vec(), wanted: common });
+        let set = &set[..=others.len()];
+        let Verdict { common, is_doubtful, hub } = self.bodies.verdict(set);
+        if let Some(hub) = hub {
+            self.add_hub(&hub);
         }
-        if let Some(x) = x {
-            self.add_hub(&x);
+        if !is_doubtful {
+            return common != Common::None;
         }
+        let doubt = Doubt { sites: set.to_vec(), wanted: common };
+        if self.bodies.is_hidden(set, common) {
+            self.found.hidden.push(doubt);
+            return false;
+        }
+        self.found.open.push(doubt);
         common != Common::None
     }
 
     /// Looks at all pairs; returns the bodies that meet the first.
-    fn pairs(&mut self) -> Vec<u32> {
-        let meet: Vec<usize> = (0..self.later.len()).filter(|&other| self.may_meet(&[other])).collect();
-        meet.into_iter().map(|other| self.later[other]).collect()
+    fn pairs(&mut self, sets: &Sets) -> Vec<u32> {
+        let mut meet = Vec::new();
+        for place in 0..self.later.len() {
+            let other = self.later[place];
+            let is_met = if self.is_changed(&[place]) { self.may_meet(&[place]) } else { sets.meet(self.first, other) };
+            if is_met {
+                meet.push(other);
+            }
+        }
+        meet
+    }
+
+    fn is_changed(&self, others: &[usize]) -> bool {
+        self.changed[self.first as usize] || others.iter().any(|&other| self.changed[self.later[other] as usize])
     }
 
     /// Looks at the larger sets of bodies of which all pairs meet.
-    fn triples_and_more(&mut self, meeting: &Meeting, budget: &Budget) -> Result<(), Stopped> {
+    fn triples_and_more(&mut self, sets: &Sets, budget: &Budget) -> Result<(), Stopped> {
         let count = self.later.len();
         // Of every second body the third ones.
         let mut thirds: Vec<Vec<usize>> = Vec::with_capacity(count);
@@ -178,7 +207,10 @@ impl<'a> Search<'a> {
             budget.cancel.check()?;
             let mut own = Vec::new();
             for third in second + 1..count {
-                if meeting.has(self.later[second], self.later[third]) && self.may_meet(&[second, third]) {
+                // What is the same as before was looked at then.
+                if sets.meet(self.later[second], self.later[third])
+                    && (!self.is_changed(&[second, third]) || self.may_meet(&[second, third]))
+                {
                     own.push(third);
                 }
             }
@@ -194,142 +226,12 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 for &fourth in fourths {
-                    if thirds[third].binary_search(&fourth).is_ok() {
+                    if self.is_changed(&[second, third, fourth]) && thirds[third].binary_search(&fourth).is_ok() {
                         self.may_meet(&[second, third, fourth]);
                     }
                 }
             }
         }
         Ok(())
-    }
-}
-
-impl Nerve<'_> {
-    /// Whether a place is surely in the dilation of a site by the band's inner end.
-    fn is_in(&self, index: u32, x: &Point) -> bool {
-        let Setting { least, slack, .. } = *self.setting;
-        let body = self.polytopes.of(index);
-        let is_cut_off = || body.cuts.iter().flatten().any(|plane| height(plane, x) > -slack);
-        body.site.distance_squared(x).sqrt() + slack < least && !is_cut_off()
-    }
-
-    /// Whether the dilations have a common point, whether it is in doubt that the polytopes have one exactly then, and a place in all dilations by the band's inner end, if one was met.
-    fn common(&self, simplex: &[u32]) -> (Common, bool, Option<Point>) {
-        let Setting { least, reach, outer, slack, .. } = *self.setting;
-        let bodies = || simplex.iter().map(|&index| self.polytopes.of(index));
-        let bounds = |distance: f64| {
-            let mut common = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
-            for body in bodies() {
-                let [low, high] = body.site_box();
-                let by = body.site.in_space(distance) + slack;
-                for axis in 0..3 {
-                    common[0][axis] = common[0][axis].max(low[axis] - by);
-                    common[1][axis] = common[1][axis].min(high[axis] + by);
-                }
-            }
-            common
-        };
-        let within = bounds(outer);
-        if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
-            return (Common::None, false, None);
-        }
-        let highest = |x: &Point| {
-            let planes = bodies().flat_map(|body| body.cuts.iter().flatten());
-            planes.map(|plane| (height(plane, x), plane)).max_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        // Steps towards the farthest site end where the farthest is nearest; where that is cut off, the way leads to the plane.
-        let mut x = between(&within[0], &within[1], 0.5);
-        for step in 0..STEPS {
-            let far = bodies().map(|body| (body.site.distance_squared(&x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((square, body)) = far else { return (Common::Unknown, true, None) };
-            if square.sqrt() + slack >= least {
-                x = between(&x, &body.site.closest(&x), 1.0 / (step + 2) as f64);
-                continue;
-            }
-            let Some((height, plane)) = highest(&x).filter(|(height, _)| *height > -slack) else { return (Common::Some, false, Some(x)) };
-            let normal = normal(plane);
-            x = std::array::from_fn(|axis| x[axis] - (height + 4.0 * slack) * normal[axis]);
-        }
-        let distance = |x: &Point| -> (f64, Point) {
-            let far = bodies().map(|body| (body.site.distance_squared(x), body)).max_by(|a, b| a.0.total_cmp(&b.0));
-            let (distance, slope) = far.map_or((0.0, [0.0; 3]), |(square, body)| {
-                let distance = square.sqrt();
-                (distance, subtract(x, &body.site.closest(x)).map(|part| part / distance.max(f64::MIN_POSITIVE)))
-            });
-            match highest(x).map(|(height, plane)| (reach + height, plane)) {
-                Some((beyond, plane)) if beyond > distance => (beyond, normal(plane)),
-                _ => (distance, slope),
-            }
-        };
-        let side = |bounds: [f64; 2], of: f64| {
-            if bounds[1] < of - slack {
-                Common::Some
-            } else if bounds[0] > of + slack {
-                Common::None
-            } else {
-                Common::Unknown
-            }
-        };
-        let is_settled = |bounds: [f64; 2]| side(bounds, least) == Common::Some || side(bounds, outer) == Common::None;
-        let close = CLOSE * (outer - least);
-        let is_known = |bounds: [f64; 2]| side(bounds, reach) != Common::Unknown && bounds[1] - bounds[0] < close;
-        let bounds = least_value(within, distance, |bounds| is_settled(bounds) || is_known(bounds));
-        let common = side(bounds, reach);
-        if is_settled(bounds) {
-            return (common, false, None);
-        }
-        let beyond = |x: &Point| -> (f64, Point) {
-            let planes = bodies().flat_map(|body| body.planes.iter());
-            let highest = planes.map(|plane| (height(plane, x), plane)).max_by(|a, b| a.0.total_cmp(&b.0));
-            highest.map_or((0.0, [0.0; 3]), |(height, plane)| (height, normal(plane)))
-        };
-        let polytopes = side(least_value(within, beyond, |bounds| side(bounds, 0.0) != Common::Unknown), 0.0);
-        (common, common == Common::Unknown || common != polytopes, None)
-    }
-}
-
-/// Bounds of the least value in a box of a convex function, given with subgradients no longer than 1, that are as close as is `enough`, or as they come. Values found anywhere are upper bounds.
-///
-/// The ellipsoid {y: (y - x)^T P^-1 (y - x) <= 1} holds all points of the box where the function is less than the best value yet; there it is at least f(x) - sqrt(g^T P g).
-fn least_value([low, high]: [Point; 2], function: impl Fn(&Point) -> (f64, Point), enough: impl Fn([f64; 2]) -> bool) -> [f64; 2] {
-    let mut x = between(&low, &high, 0.5);
-    // The ball around a box is an ellipsoid with the sides' half lengths times the root of 3.
-    let mut shape = [[0.0; 3]; 3];
-    (0..3).for_each(|axis| shape[axis][axis] = 0.75 * (high[axis] - low[axis]).powi(2) * (1.0 + 1e-9) + f64::MIN_POSITIVE);
-    let mut bounds = [f64::NEG_INFINITY, f64::INFINITY];
-    for _ in 0..MOST_ELLIPSOIDS {
-        let (value, slope) = function(&x);
-        let image = shape.map(|row| dot(&row, &slope));
-        let reach = dot(&slope, &image).max(0.0).sqrt();
-        // What was cut off is no better than the best: the least value is the best one, or in the ellipsoid.
-        bounds[1] = bounds[1].min(value);
-        bounds[0] = bounds[0].max(value - reach).min(bounds[1]);
-        if enough(bounds) || reach <= f64::EPSILON * value.abs() {
-            break;
-        }
-        // Points that are no better than the best are cut off.
-        let depth = (value - bounds[1]) / reach;
-        if depth >= 1.0 {
-            break;
-        }
-        let step = (1.0 + 3.0 * depth) / 4.0;
-        let grown = 9.0 / 8.0 * (1.0 - depth * depth) * (1.0 + 1e-12);
-        let flattened = 2.0 * (1.0 + 3.0 * depth) / (4.0 * (1.0 + depth));
-        for axis in 0..3 {
-            x[axis] -= step * image[axis] / reach;
-        }
-        shape = std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
-    }
-    bounds
-}
-
-impl Polytope {
-    /// The box of its site.
-    fn site_box(&self) -> [Point; 2] {
-        let ends = || ends(&self.site.site).iter();
-        [
-            std::array::from_fn(|axis| ends().map(|end| end[axis]).fold(f64::INFINITY, f64::min)),
-            std::array::from_fn(|axis| ends().map(|end| end[axis]).fold(f64::NEG_INFINITY, f64::max)),
-        ]
     }
 }

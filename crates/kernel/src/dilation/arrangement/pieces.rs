@@ -4,8 +4,9 @@
 //! to intervals. Their ends are corners of polytopes, places where an edge pierces a facet, and places where facets of three polytopes meet: each is named by what meets there, whichever
 //! line it is found on, and ends with one name are one vertex. So the union's boundary is closed if every comparison of heights has one outcome only, which is checked by what comes out: see `facets`.
 
+use super::figure::Figure;
 use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
-use crate::attractor::cell::{Point, Site, between, cross, dot, subtract};
+use crate::attractor::cell::{Point, between, cross, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
@@ -60,23 +61,24 @@ impl Lists {
     }
 }
 
-/// A site, how far its dilation reaches, and the planes that this is cut by.
-pub(super) struct Body {
-    pub(super) site: Site,
+/// A figure, how far its dilation reaches, and the planes that this is cut by.
+pub(super) struct Body<'a> {
+    pub(super) figure: &'a Figure,
     pub(super) reach: f64,
-    pub(super) cuts: [Option<Plane>; 2],
+    pub(super) cuts: Box<[Plane]>,
 }
 
-/// Of every site, those whose dilations may meet its own. `None` where that is too much for an arrangement: the squares of the numbers of neighbours, or the sets of up to four sites
+/// Of every figure, those whose dilations may meet its own. `None` where that is too much for an arrangement: the squares of the numbers of neighbours, or the sets of up to four sites
 /// that are near to each other, are more than `most` on average. Where there are few sites, more are allowed.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn near(bodies: &[Body], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
-    let grown = |body: &Body| {
-        ends(&body.site).iter().flat_map(|end| [-body.reach, body.reach].map(|by| end.map(|x| x + by))).collect::<Vec<Point>>()
+pub(super) fn near(bodies: &[Body<'_>], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
+    let grown = |body: &Body<'_>| {
+        let [low, high] = body.figure.bounds();
+        Box32::of(&[low.map(|x| x - body.reach), high.map(|x| x + body.reach)])
     };
-    let boxes: Vec<Box32> = bodies.iter().map(|body| Box32::of(&grown(body))).collect();
+    let boxes: Vec<Box32> = bodies.iter().map(grown).collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
     let [squares, sets] = most.map(|most| most.saturating_mul(bodies.len() + FEW));
@@ -128,33 +130,24 @@ pub(super) fn near(bodies: &[Body], most: [usize; 2], budget: &Budget) -> Result
     Ok((total.into_inner() <= sets).then_some(lists))
 }
 
-/// The corners of a site.
-pub(super) fn ends(site: &Site) -> &[Point] {
-    match site {
-        Site::Point(a) => std::slice::from_ref(a),
-        Site::Segment(ends) => ends,
-        Site::Triangle(corners) => corners,
-    }
-}
-
-impl Body {
-    /// Whether it surely does not meet another: one is beyond a plane that the other is cut by, or the sites are too far from each other.
+impl Body<'_> {
+    /// Whether it surely does not meet another: one is beyond a plane that the other is cut by, or the figures are too far from each other.
     fn is_apart(&self, other: &Self) -> bool {
         let is_cut_off = |by: &Self, body: &Self| {
-            by.cuts.iter().flatten().any(|plane| ends(&body.site).iter().all(|end| height(plane, end) > body.reach))
+            by.cuts.iter().any(|plane| body.figure.corners().iter().all(|corner| height(plane, corner) > body.reach))
         };
-        is_cut_off(self, other) || is_cut_off(other, self) || are_apart(&self.site, &other.site, self.reach + other.reach)
+        is_cut_off(self, other) || is_cut_off(other, self) || are_apart(self.figure, other.figure, self.reach + other.reach)
     }
 }
 
-/// Whether a plane shows that sites are farther from each other than a distance. Alternating projections converge to a closest pair, and the plane across it parts them best.
-fn are_apart(one: &Site, other: &Site, distance: f64) -> bool {
-    let mut x = ends(one)[0];
+/// Whether a plane shows that figures are farther from each other than a distance. Alternating projections converge to a closest pair, and the plane across it parts them best.
+fn are_apart(one: &Figure, other: &Figure, distance: f64) -> bool {
+    let mut x = one.corners()[0];
     for _ in 0..MOST_PROJECTIONS {
         let y = other.closest(&x);
         x = one.closest(&y);
         let across = subtract(&x, &y);
-        let least = |site: &Site, w: &Point| ends(site).iter().map(|end| dot(end, w)).fold(f64::INFINITY, f64::min);
+        let least = |figure: &Figure, w: &Point| figure.corners().iter().map(|corner| dot(corner, w)).fold(f64::INFINITY, f64::min);
         let gap = least(one, &across) + least(other, &across.map(|part| -part));
         let length = dot(&across, &across).sqrt();
         if gap > distance * length {

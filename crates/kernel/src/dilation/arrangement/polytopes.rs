@@ -1,8 +1,8 @@
-//! The polytopes of sites: what stands for their dilations by a ball.
+//! The polytopes of figures: what stands for their dilations by a ball.
 
+use super::figure::{Figure, Outline};
 use super::form::{Corner, Form, MOST_FACETS, Structure, meeting};
-use crate::attractor::cell::{Point, Site, cross, dot, subtract};
-use crate::dilation::tree::Weighted;
+use crate::attractor::cell::{Point, cross, dot, subtract};
 use crate::split_mix::number;
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -89,27 +89,26 @@ pub(super) fn owner(facet: u32) -> (u32, usize) {
     (facet >> FACET_BITS, facet as usize & (MOST_FACETS - 1))
 }
 
-/// What stands for the dilation of a site.
+/// What stands for the dilation of a figure.
 #[derive(Debug)]
 pub(super) struct Polytope {
-    pub(super) site: Weighted,
     pub(super) structure: Arc<Structure>,
     pub(super) planes: Box<[Plane]>,
-    /// Those that its dilation is cut by, too: see `joints`.
-    pub(super) cuts: [Option<Plane>; 2],
+    /// Those that its dilation is cut by, too: see `joints` and `hinges`.
+    pub(super) cuts: Box<[Plane]>,
     pub(super) corners: Box<[Point]>,
     /// Its box.
     low: Point,
     high: Point,
 }
 
-/// The polytopes of all sites.
+/// The polytopes of all figures.
 #[derive(Debug, Default)]
 pub(super) struct Polytopes {
     pub(super) all: Vec<Polytope>,
 }
 
-/// The radii of balls around a site that its polytope lies between.
+/// The radii of balls around a figure that its polytope lies between.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shell {
     pub(super) inner: f64,
@@ -131,11 +130,11 @@ pub(super) struct Cut {
 }
 
 /// The ends of a point, both the same, or of a segment, in an order that does not depend on how it is stated.
-pub(super) fn ordered(site: &Site) -> [Point; 2] {
-    match *site {
-        Site::Segment([a, b]) if b.partial_cmp(&a) == Some(Ordering::Less) => [b, a],
-        Site::Segment(ends) => ends,
-        Site::Point(a) | Site::Triangle([a, ..]) => [a, a],
+pub(super) fn ordered(figure: &Figure) -> [Point; 2] {
+    match figure.outline {
+        Outline::Segment([a, b]) if b.partial_cmp(&a) == Some(Ordering::Less) => [b, a],
+        Outline::Segment(ends) => ends,
+        _ => [figure.corners()[0]; 2],
     }
 }
 
@@ -167,8 +166,8 @@ impl Polytope {
     /// Facets are shifted outwards by numbers that look random, so that no four planes meet in a point but by chance: each polytope as a whole, so that facets
     /// of neighbours which would coincide lie one above the other, and its facets against each other a little. Those where it is cut are as far beyond its ends as is said, and no
     /// corner is farther than `most`.
-    pub(super) fn new(site: Weighted, shape: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
-        let ends = ordered(&site.site);
+    pub(super) fn new(figure: &Figure, shape: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
+        let ends = ordered(figure);
         let frame = frame(&subtract(&ends[1], &ends[0]));
         let flat = |facet: usize| (0..2).find(|&end| shape.flats[end].map(usize::from) == Some(facet));
         let mut room = (shell.outer / shape.reach - shell.inner).max(0.0);
@@ -198,21 +197,20 @@ impl Polytope {
             hang_together(&shape.structure.corners, &corners, &planes, 0.0).then_some((planes, corners))
         };
         let (planes, corners) = (0..SHIFTS).find_map(|number| shifted(own * 0.25_f64.powi(number)))?;
-        let cuts = shape.flats.map(|flat| flat.map(|facet| planes[usize::from(facet)]));
-        Some(Self::with(site, Arc::clone(&shape.structure), planes, cuts, corners))
+        let cuts = shape.flats.iter().flatten().map(|&facet| planes[usize::from(facet)]).collect();
+        Some(Self::with(Arc::clone(&shape.structure), planes, cuts, corners))
     }
 
     /// One with these facets and corners.
-    pub(super) fn with(
-        site: Weighted,
-        structure: Arc<Structure>,
-        planes: Box<[Plane]>,
-        cuts: [Option<Plane>; 2],
-        corners: Box<[Point]>,
-    ) -> Self {
+    pub(super) fn with(structure: Arc<Structure>, planes: Box<[Plane]>, cuts: Box<[Plane]>, corners: Box<[Point]>) -> Self {
         let low = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::INFINITY, f64::min));
         let high = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
-        Self { site, structure, planes, cuts, corners, low, high }
+        Self { structure, planes, cuts, corners, low, high }
+    }
+
+    /// Its box.
+    pub(super) fn bounds(&self) -> [Point; 2] {
+        [self.low, self.high]
     }
 
     /// Whether its box meets that of two points.

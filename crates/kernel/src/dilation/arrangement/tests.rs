@@ -1,3 +1,5 @@
+use super::bodies::Common;
+use super::polytopes::height;
 use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
 use crate::dilation::plan::{Balls, Plan};
@@ -322,4 +324,57 @@ fn panels_keep_their_bounds_and_agree_with_the_lattice() {
         assert!(triangles[0] < triangles[1], "{round}: {triangles:?}");
     }
     assert!(compared > 18 && left < 4, "{compared} compared, {left} left to the lattice");
+}
+
+/// Segments all over each other: what is said to be hidden is within others, and what is said to meet does.
+#[test]
+fn hidden_places_are_hidden() {
+    let mut random = Random(41);
+    let (mut hidden, mut shown, mut agreed) = (0, 0, 0);
+    for round in 0..6 {
+        let size = 1.0 + 0.5 * f64::from(round);
+        let segments: Vec<[DVec3; 2]> = (0..24)
+            .map(|_| {
+                let at = place(&mut random, size);
+                [at, at + place(&mut random, 1.0)]
+            })
+            .collect();
+        let (shape, budget) = (wires(&segments), Budget::default());
+        let plan = plan(&shape, 1.0, 0.1);
+        let setting = plan.setting(plan.pitch(), &budget);
+        let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
+        let mut engine = arrangement.engine(0);
+        assert!(engine.begin(&budget).unwrap());
+        let bodies = engine.bodies();
+        let count = segments.len() as u32;
+        for _ in 0..400 {
+            let mut set: Vec<u32> = (0..2 + random.next() % 3).map(|_| (random.next() % u64::from(count)) as u32).collect();
+            set.sort_unstable();
+            set.dedup();
+            let verdict = bodies.verdict(&set);
+            let is_in = |body: u32, x: &DVec3| {
+                let figure = &arrangement.sites.list[body as usize];
+                let is_kept = engine.polytopes.of(body).cuts.iter().all(|plane| height(plane, &x.to_array()) <= 0.0);
+                [figure.distance_squared(&x.to_array()).sqrt() <= 1.0 && is_kept, engine.polytopes.of(body).contains(&x.to_array())]
+            };
+            let places: Vec<DVec3> = (0..300).map(|_| place(&mut random, size + 3.0) - DVec3::ONE).collect();
+            let common = |kind: usize| places.iter().filter(|x| set.iter().all(|&body| is_in(body, x)[kind])).collect::<Vec<_>>();
+            let [of_dilations, of_polytopes] = [common(0), common(1)];
+            if verdict.common == Common::None {
+                assert!(of_dilations.is_empty(), "{round}: {set:?}");
+            }
+            if !verdict.is_doubtful {
+                assert!(verdict.common != Common::None || of_polytopes.is_empty(), "{round}: {set:?}");
+                agreed += 1;
+            }
+            if bodies.is_hidden(&set, verdict.common) {
+                hidden += 1;
+                for x in of_dilations.into_iter().chain(of_polytopes) {
+                    assert!((0..count).any(|body| is_in(body, x) == [true; 2]), "{round}: {set:?} {x}");
+                    shown += 1;
+                }
+            }
+        }
+    }
+    assert!(hidden > 300 && shown > 500 && agreed > 500, "{hidden} hidden, {shown} places, {agreed} agreed");
 }

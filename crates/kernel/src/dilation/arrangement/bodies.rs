@@ -1,0 +1,232 @@
+//! What is known of the common points of some bodies: of their dilations, of their polytopes, and of both together.
+//!
+//! How far a point is from the farthest of some figures is a convex function, and so is how high it is above the highest plane of some polytopes: whether they are anywhere low enough is told by the method of ellipsoids
+//! (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). Whether some bodies' common points are all within others is told by halving boxes.
+
+use super::figure::Figure;
+use super::pieces::Lists;
+use super::polytopes::{Plane, Polytopes, height, normal};
+use crate::attractor::cell::{Point, between, distance_squared, dot, subtract};
+use crate::dilation::plan::Setting;
+
+/// Ellipsoids at most, to decide one question.
+const MOST_ELLIPSOIDS: usize = 400;
+/// Steps towards a common point, before.
+const STEPS: usize = 12;
+/// Halvings of a box that is looked at for places that are not hidden.
+const HALVINGS: usize = 12;
+
+/// The figures and what stands for them.
+pub(super) struct Bodies<'a> {
+    pub(super) setting: &'a Setting,
+    pub(super) figures: &'a [Figure],
+    pub(super) polytopes: &'a Polytopes,
+    pub(super) near: &'a Lists,
+}
+
+/// Whether some bodies have a common point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Common {
+    Some,
+    None,
+    Unknown,
+}
+
+/// What is known of a set.
+pub(super) struct Verdict {
+    /// Of the dilations.
+    pub(super) common: Common,
+    /// Whether it was not shown that the polytopes have a common point exactly when the dilations have one, and that both then have one together.
+    pub(super) is_doubtful: bool,
+    /// A place in all dilations by the band's inner end, if one was met: it is in all polytopes, too.
+    pub(super) hub: Option<Point>,
+}
+
+/// What a body is asked for.
+#[derive(Clone, Copy)]
+enum Kind {
+    Dilation,
+    Polytope,
+}
+
+impl Bodies<'_> {
+    /// Whether a place is surely in the dilation of a body by the band's inner end.
+    pub(super) fn is_in(&self, body: u32, x: &Point) -> bool {
+        let Setting { least, slack, .. } = *self.setting;
+        let is_cut_off = || self.polytopes.of(body).cuts.iter().any(|plane| height(plane, x) > -slack);
+        self.figures[body as usize].distance_squared(x).sqrt() + slack < least && !is_cut_off()
+    }
+
+    /// What is known of a set.
+    pub(super) fn verdict(&self, set: &[u32]) -> Verdict {
+        let settled = |common: Common| Verdict { common, is_doubtful: false, hub: None };
+        let Setting { reach, outer, slack, .. } = *self.setting;
+        let within = self.common_box(set, |body| self.figures[body as usize].bounds_of_dilation(outer + slack));
+        if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
+            return settled(Common::None);
+        }
+        let planes = |x: &Point, than: f64| highest(x, set.iter().flat_map(|&body| self.polytopes.of(body).planes.iter()), than);
+        let far = match self.hub(set, between(&within[0], &within[1], 0.5)) {
+            Ok(hub) => return Verdict { hub: Some(hub), ..settled(Common::Some) },
+            Err(far) => far,
+        };
+        if far > outer && common_point(within, |x| self.beyond(set, x, outer + slack)) == Common::None {
+            return settled(Common::None);
+        }
+        if common_point(within, |x| self.beyond(set, x, reach - slack).or_else(|| planes(x, -slack))) == Common::Some {
+            return settled(Common::Some);
+        }
+        if common_point(within, |x| self.beyond(set, x, reach + slack)) == Common::None {
+            let is_doubtful = common_point(within, |x| planes(x, slack)) != Common::None;
+            return Verdict { is_doubtful, ..settled(Common::None) };
+        }
+        let is_common = common_point(within, |x| self.beyond(set, x, reach - slack)) == Common::Some;
+        Verdict { common: if is_common { Common::Some } else { Common::Unknown }, is_doubtful: true, hub: None }
+    }
+
+    /// The farthest figure of a set, and how far it is, the deficit included.
+    fn farthest(&self, set: &[u32], x: &Point) -> Option<(f64, &Figure)> {
+        let far = set.iter().map(|&body| &self.figures[body as usize]).map(|figure| (figure.distance_squared(x), figure));
+        far.reduce(|a, b| if b.0 > a.0 { b } else { a }).map(|(square, figure)| (square.sqrt(), figure))
+    }
+
+    /// The highest plane above -slack, or more, that dilations of a set are cut by.
+    fn cut_off(&self, set: &[u32], x: &Point, than: f64) -> Option<(f64, Point)> {
+        highest(x, set.iter().flat_map(|&body| self.polytopes.of(body).cuts.iter()), than)
+    }
+
+    /// A place in the dilations of a set by the band's inner end, or how far the farthest site is from where none was met. Steps towards the farthest site end where the farthest is nearest; where that is cut off, the way
+    /// leads to the plane.
+    fn hub(&self, set: &[u32], mut x: Point) -> Result<Point, f64> {
+        let Setting { least, slack, .. } = *self.setting;
+        let mut far = f64::INFINITY;
+        for step in 0..STEPS {
+            let Some((distance, figure)) = self.farthest(set, &x) else { break };
+            far = distance;
+            if distance + slack >= least {
+                x = between(&x, &figure.closest(&x), 1.0 / (step + 2) as f64);
+                continue;
+            }
+            let Some((above, normal)) = self.cut_off(set, &x, -slack) else { return Ok(x) };
+            x = std::array::from_fn(|axis| x[axis] - (above + 3.0 * slack) * normal[axis]);
+        }
+        Err(far)
+    }
+
+    /// How far a place is beyond the dilations of a set by a distance, with a subgradient; none where it is in all of them.
+    fn beyond(&self, set: &[u32], x: &Point, by: f64) -> Option<(f64, Point)> {
+        let (distance, figure) = self.farthest(set, x)?;
+        if distance > by {
+            return Some((distance - by, subtract(x, &figure.closest(x)).map(|part| part / distance)));
+        }
+        self.cut_off(set, x, by - self.setting.reach)
+    }
+
+    fn common_box(&self, set: &[u32], of: impl Fn(u32) -> [Point; 2]) -> [Point; 2] {
+        set.iter().map(|&body| of(body)).fold([[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]], |[low, high], own| {
+            [std::array::from_fn(|axis| low[axis].max(own[0][axis])), std::array::from_fn(|axis| high[axis].min(own[1][axis]))]
+        })
+    }
+
+    /// Whether the places that the dilations of a set have in common, unless they have none, and those that its polytopes have, are all in the interior of others, of their dilation and their polytope.
+    pub(super) fn is_hidden(&self, set: &[u32], common: Common) -> bool {
+        let around: Vec<u32> = self.near.of(set[0]).iter().copied().chain([set[0]]).collect();
+        let Setting { reach, slack, .. } = *self.setting;
+        let dilations = self.common_box(set, |body| self.figures[body as usize].bounds_of_dilation(reach + slack));
+        let polytopes = self.common_box(set, |body| self.polytopes.of(body).bounds());
+        (common == Common::None || self.are_hidden(set, Kind::Dilation, dilations, &around, HALVINGS))
+            && self.are_hidden(set, Kind::Polytope, polytopes, &around, HALVINGS)
+    }
+
+    /// How far a place is beyond a body, or less; as far as it is within, or less, where that is negative.
+    fn above(&self, kind: Kind, body: u32, x: &Point) -> f64 {
+        let (figure, polytope) = (&self.figures[body as usize], self.polytopes.of(body));
+        let highest = |planes: &[Plane]| planes.iter().map(|plane| height(plane, x)).fold(f64::NEG_INFINITY, f64::max);
+        match kind {
+            Kind::Dilation => {
+                (distance_squared(x, &figure.closest(x)).sqrt() - figure.in_space(self.setting.reach)).max(highest(&polytope.cuts))
+            }
+            Kind::Polytope => highest(&polytope.planes),
+        }
+    }
+
+    /// Whether the places in a box that bodies of a set have in common are all hidden by one of those around.
+    fn are_hidden(&self, set: &[u32], kind: Kind, [low, high]: [Point; 2], around: &[u32], halvings: usize) -> bool {
+        if (0..3).any(|axis| low[axis] > high[axis]) {
+            return true;
+        }
+        let (centre, size, slack) = (between(&low, &high, 0.5), subtract(&high, &low), self.setting.slack);
+        // All of the box is no farther from its centre.
+        let half = 0.5 * dot(&size, &size).sqrt() + 2.0 * slack;
+        let mut deepest = f64::NEG_INFINITY;
+        for &body in set {
+            let above = self.above(kind, body, &centre);
+            if above > half {
+                return true;
+            }
+            deepest = deepest.max(above);
+        }
+        let (mut left, mut is_centre_hidden) = (Vec::new(), false);
+        for &body in around {
+            let in_dilation = self.above(Kind::Dilation, body, &centre);
+            if in_dilation >= half {
+                continue;
+            }
+            let above = in_dilation.max(self.above(Kind::Polytope, body, &centre));
+            if above < -half {
+                return true;
+            }
+            if above < half {
+                left.push(body);
+            }
+            is_centre_hidden |= above < -slack;
+        }
+        if halvings == 0 || left.is_empty() || (deepest <= 0.0 && !is_centre_hidden) {
+            return false;
+        }
+        let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or_default();
+        let (mut below, mut above) = (high, low);
+        (below[axis], above[axis]) = (centre[axis], centre[axis]);
+        [[low, below], [above, high]].into_iter().all(|part| self.are_hidden(set, kind, part, &left, halvings - 1))
+    }
+}
+
+/// The highest plane of some at a place, if it is higher than something: by how much, and its normal.
+fn highest<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>, than: f64) -> Option<(f64, Point)> {
+    let highest = planes.map(|plane| (height(plane, x), plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+    highest.filter(|&(height, _)| height > than).map(|(height, plane)| (height - than, normal(plane)))
+}
+
+/// Whether convex functions are all at most 0 somewhere in a box. `above` gives, for a place where one is not, its value and a subgradient there that is no longer than 1.
+///
+/// The ellipsoid {y: (y - x)^T P^-1 (y - x) <= 1} holds all places of the box where they are; there the function is at least f(x) - sqrt(g^T P g).
+fn common_point([low, high]: [Point; 2], above: impl Fn(&Point) -> Option<(f64, Point)>) -> Common {
+    let mut x = between(&low, &high, 0.5);
+    // The ball around a box is an ellipsoid with the sides' half lengths times the root of 3.
+    let mut shape = [[0.0; 3]; 3];
+    (0..3).for_each(|axis| shape[axis][axis] = 0.75 * (high[axis] - low[axis]).powi(2) * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+    for _ in 0..MOST_ELLIPSOIDS {
+        let Some((value, slope)) = above(&x) else { return Common::Some };
+        let image = shape.map(|row| dot(&row, &slope));
+        let reach = dot(&slope, &image).max(0.0).sqrt();
+        if value > reach * (1.0 + 1e-9) {
+            return Common::None;
+        }
+        if reach <= f64::EPSILON * value {
+            break;
+        }
+        // Places where the function is not at most 0 are cut off.
+        let depth = value / reach;
+        if depth >= 1.0 {
+            break;
+        }
+        let step = (1.0 + 3.0 * depth) / 4.0;
+        let grown = 9.0 / 8.0 * (1.0 - depth * depth) * (1.0 + 1e-12);
+        let flattened = 2.0 * (1.0 + 3.0 * depth) / (4.0 * (1.0 + depth));
+        for axis in 0..3 {
+            x[axis] -= step * image[axis] / reach;
+        }
+        shape = std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
+    }
+    Common::Unknown
+}

@@ -1,0 +1,332 @@
+//! What polytopes stand around: points, segments, and convex polygons, which coplanar triangles are joined to where they can be.
+//!
+//! The dilation of a union is the union of the dilations, and that of a convex polygon is convex as that of a triangle: so a polygon stands for its triangles, and no bound, nor what is known of the
+//! topology, changes. What changes is that there are fewer bodies: the sets of them that the nerve looks at grow with the fourth power of how many are near to each other.
+
+use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract};
+use crate::budget::{Budget, Stopped};
+use crate::dilation::tree::{Weighted, in_space};
+use crate::measure::triangle::closest_on_triangle;
+use std::cmp::Ordering;
+
+/// Corners of a polygon at most: polytopes have room for their facets.
+const MOST_CORNERS: usize = 24;
+/// The least sine by which a side of what is joined turns from the one before it, unless it goes straight on: facets across sides that hardly turn meet far away.
+const LEAST_TURN: f64 = 0.02;
+/// Rounds of joining, each of which may double a polygon.
+const ROUNDS: usize = 24;
+/// Polygons with a common side that are looked at: at any number of them most lie in planes of their own.
+const MOST_AT_A_SIDE: usize = 8;
+
+/// A site, or several that are one convex set.
+#[derive(Clone, Debug)]
+pub(super) struct Figure {
+    pub(super) outline: Outline,
+    /// See [`Weighted`].
+    pub(super) deficit: f64,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Outline {
+    Point(Point),
+    Segment([Point; 2]),
+    Polygon(Polygon),
+}
+
+/// A convex polygon.
+#[derive(Clone, Debug)]
+pub(super) struct Polygon {
+    /// Counter-clockwise about `up`.
+    pub(super) corners: Box<[Point]>,
+    /// Its unit normal; 0 where there is none.
+    pub(super) up: Point,
+}
+
+impl From<Weighted> for Figure {
+    fn from(Weighted { site, deficit }: Weighted) -> Self {
+        let outline = match site {
+            Site::Point(at) => Outline::Point(at),
+            Site::Segment(ends) => Outline::Segment(ends),
+            Site::Triangle(corners) => Outline::Polygon(Polygon::of(&corners)),
+        };
+        Self { outline, deficit }
+    }
+}
+
+impl Figure {
+    /// The convex hull of these is the figure.
+    pub(super) fn corners(&self) -> &[Point] {
+        match &self.outline {
+            Outline::Point(at) => std::slice::from_ref(at),
+            Outline::Segment(ends) => ends,
+            Outline::Polygon(polygon) => &polygon.corners,
+        }
+    }
+
+    /// The point of the figure that is closest to x.
+    #[inline]
+    pub(super) fn closest(&self, x: &Point) -> Point {
+        match &self.outline {
+            Outline::Point(at) => *at,
+            Outline::Segment([a, b]) => closest_on_segment(x, a, b),
+            Outline::Polygon(polygon) => polygon.closest(x),
+        }
+    }
+
+    /// The squared distance of x, the deficit included.
+    #[inline]
+    pub(super) fn distance_squared(&self, x: &Point) -> f64 {
+        distance_squared(x, &self.closest(x)) + self.deficit
+    }
+
+    /// The distance in space where that with the deficit is `distance`.
+    #[inline]
+    pub(super) fn in_space(&self, distance: f64) -> f64 {
+        in_space(distance, self.deficit)
+    }
+
+    /// The box of its dilation by a radius, the deficit included.
+    pub(super) fn bounds_of_dilation(&self, radius: f64) -> [Point; 2] {
+        let ([low, high], by) = (self.bounds(), self.in_space(radius));
+        [low.map(|x| x - by), high.map(|x| x + by)]
+    }
+
+    /// Its box.
+    pub(super) fn bounds(&self) -> [Point; 2] {
+        let extreme = |first: f64, choose: fn(f64, f64) -> f64| -> Point {
+            std::array::from_fn(|axis| self.corners().iter().map(|corner| corner[axis]).fold(first, choose))
+        };
+        [extreme(f64::INFINITY, f64::min), extreme(f64::NEG_INFINITY, f64::max)]
+    }
+}
+
+impl Polygon {
+    fn of(corners: &[Point; 3]) -> Self {
+        let across = cross(&subtract(&corners[1], &corners[0]), &subtract(&corners[2], &corners[0]));
+        let length = dot(&across, &across).sqrt();
+        let up = if length > 0.0 { across.map(|part| part / length) } else { [0.0; 3] };
+        Self { corners: Box::new(*corners), up }
+    }
+
+    /// The same with all places less `origin`.
+    pub(super) fn from(&self, origin: &Point) -> Self {
+        Self { corners: self.corners.iter().map(|corner| subtract(corner, origin)).collect(), up: self.up }
+    }
+
+    #[inline]
+    pub(super) fn closest(&self, x: &Point) -> Point {
+        if let [a, b, c] = &*self.corners {
+            return closest_on_triangle(x, a, b, c);
+        }
+        let mut best: Option<(f64, Point)> = None;
+        let mut from = &self.corners[self.corners.len() - 1];
+        for to in &self.corners {
+            // Beyond sides, the closest point is on one of these.
+            if dot(&cross(&subtract(to, from), &self.up), &subtract(x, from)) > 0.0 {
+                let on = closest_on_segment(x, from, to);
+                let square = distance_squared(x, &on);
+                if best.is_none_or(|(least, _)| square < least) {
+                    best = Some((square, on));
+                }
+            }
+            from = to;
+        }
+        best.map_or_else(
+            || {
+                let height = self.height(x);
+                std::array::from_fn(|axis| x[axis] - height * self.up[axis])
+            },
+            |(_, on)| on,
+        )
+    }
+
+    /// How high x is above its plane.
+    fn height(&self, x: &Point) -> f64 {
+        dot(&self.up, &subtract(x, &self.corners[0]))
+    }
+
+    /// Twice its area.
+    fn double(&self) -> f64 {
+        let origin = &self.corners[0];
+        let fan = self.corners.windows(2).map(|pair| dot(&self.up, &cross(&subtract(&pair[0], origin), &subtract(&pair[1], origin))));
+        fan.sum()
+    }
+
+    /// The corners in their order about a normal, from the second end of a side, given by its first end, to the first.
+    fn starting_after(&self, up: &Point, side: [&Point; 2]) -> Option<Vec<Point>> {
+        let mut corners = self.corners.to_vec();
+        if dot(&self.up, up) < 0.0 {
+            corners.reverse();
+        }
+        let first = corners.iter().position(|corner| corner == side[1])?;
+        corners.rotate_left(first);
+        (corners.last() == Some(side[0])).then_some(corners)
+    }
+
+    /// The union with a polygon across a side, if it is convex and flat to within `flatness`.
+    fn joined(&self, other: &Self, [p, q]: [&Point; 2], flatness: f64) -> Option<Self> {
+        let up = if self.double() >= other.double() { self.up } else { other.up };
+        let plane = if self.double() >= other.double() { self } else { other };
+        if up == [0.0; 3] || self.corners.iter().chain(&other.corners).any(|corner| plane.height(corner).abs() > flatness) {
+            return None;
+        }
+        // Both have the side, in opposite directions if they lie on opposite sides of it.
+        let (own, theirs) = match (self.starting_after(&up, [p, q]), other.starting_after(&up, [q, p])) {
+            (Some(own), Some(theirs)) => (own, theirs),
+            _ => (self.starting_after(&up, [q, p])?, other.starting_after(&up, [p, q])?),
+        };
+        let kept = |before: &Point, corner: &Point, after: &Point| turn(&up, before, corner, after, flatness);
+        let (last, end) = (own.len() - 1, theirs.len() - 1);
+        let keeps_first = kept(&theirs[end - 1], &own[0], &own[1])?;
+        let keeps_last = kept(&own[last - 1], &own[last], &theirs[1])?;
+        let mut corners = own[usize::from(!keeps_first)..last].to_vec();
+        corners.extend(keeps_last.then_some(own[last]));
+        corners.extend(&theirs[1..end]);
+        (3..=MOST_CORNERS).contains(&corners.len()).then(|| Self { corners: corners.into(), up })
+    }
+}
+
+/// Whether a corner is one where the outline turns left, rather than one where it goes straight on; none where it turns right, or hardly.
+fn turn(up: &Point, before: &Point, corner: &Point, after: &Point, flatness: f64) -> Option<bool> {
+    let (from, to, along) = (subtract(corner, before), subtract(after, corner), subtract(after, before));
+    let twice = dot(up, &cross(&from, &to));
+    if twice.abs() <= flatness * dot(&along, &along).sqrt() && dot(&from, &to) > 0.0 {
+        return Some(false);
+    }
+    (twice > LEAST_TURN * (dot(&from, &from) * dot(&to, &to)).sqrt()).then_some(true)
+}
+
+/// A side of a polygon.
+struct Side {
+    square: f64,
+    /// In ascending order, whichever way the polygon goes.
+    ends: [Point; 2],
+    figure: u32,
+}
+
+fn order(a: &Point, b: &Point) -> Ordering {
+    (0..3).map(|axis| a[axis].total_cmp(&b[axis])).fold(Ordering::Equal, Ordering::then)
+}
+
+/// Figures with polygons of one radius joined across their common sides, the longest first, as far as unions are convex and flat to within `flatness`.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, budget: &Budget) -> Result<Vec<Figure>, Stopped> {
+    for figure in &mut figures {
+        if let Outline::Polygon(polygon) = &mut figure.outline {
+            // Zeros have two signs.
+            polygon.corners.iter_mut().flatten().for_each(|x| *x += 0.0);
+        }
+    }
+    for _ in 0..ROUNDS {
+        budget.cancel.check()?;
+        let mut sides = Vec::new();
+        for (figure, polygon) in (0..).zip(&figures).filter_map(|(index, figure)| figure.polygon().map(|polygon| (index, polygon))) {
+            let corners = &polygon.corners;
+            for (k, from) in corners.iter().enumerate() {
+                let to = &corners[(k + 1) % corners.len()];
+                let ends = if order(from, to).is_lt() { [*from, *to] } else { [*to, *from] };
+                sides.push(Side { square: distance_squared(from, to), ends, figure });
+            }
+        }
+        let same = |a: &Side, b: &Side| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
+        sides.sort_unstable_by(|a, b| b.square.total_cmp(&a.square).then_with(|| same(a, b)).then(a.figure.cmp(&b.figure)));
+        let mut is_taken = vec![false; figures.len()];
+        let mut gone = vec![false; figures.len()];
+        for around in sides.chunk_by(|a, b| same(a, b).is_eq()).filter(|around| around.len() <= MOST_AT_A_SIDE) {
+            for (place, one) in around.iter().enumerate() {
+                for other in &around[place + 1..] {
+                    let [own, theirs] = [one, other].map(|side| side.figure as usize);
+                    if own == theirs
+                        || is_taken[own]
+                        || is_taken[theirs]
+                        || figures[own].deficit.to_bits() != figures[theirs].deficit.to_bits()
+                    {
+                        continue;
+                    }
+                    let (Some(first), Some(second)) = (figures[own].polygon(), figures[theirs].polygon()) else { continue };
+                    let Some(union) = first.joined(second, [&one.ends[0], &one.ends[1]], flatness) else { continue };
+                    figures[own].outline = Outline::Polygon(union);
+                    gone[theirs] = true;
+                    (is_taken[own], is_taken[theirs]) = (true, true);
+                }
+            }
+        }
+        if !gone.contains(&true) {
+            break;
+        }
+        let mut gone = gone.into_iter();
+        figures.retain(|_| !gone.next().unwrap_or_default());
+    }
+    Ok(figures)
+}
+
+impl Figure {
+    pub(super) fn polygon(&self) -> Option<&Polygon> {
+        if let Outline::Polygon(polygon) = &self.outline { Some(polygon) } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::split_mix::Random;
+
+    fn number(random: &mut Random) -> f64 {
+        (random.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn joined_of(triangles: &[[Point; 3]]) -> Vec<Figure> {
+        let figures = triangles.iter().map(|corners| Weighted { site: Site::Triangle(*corners), deficit: 0.0 }.into()).collect();
+        joined(figures, 1e-12, &Budget::default()).unwrap()
+    }
+
+    /// What is joined is the same set: places are as far from it as from the triangles.
+    #[test]
+    fn joined_polygons_are_as_far_as_their_triangles() {
+        let mut random = Random(3);
+        for round in 0..40 {
+            let (side, mut triangles) = (2 + round % 5, Vec::new());
+            // A grid in a plane of its own, with holes, and some triangles turned over or in another plane.
+            let tilt = if round % 2 == 0 { 0.0 } else { 0.4 };
+            let at = |i: usize, j: usize| -> Point { [i as f64, j as f64, tilt * i as f64] };
+            for j in 0..side {
+                for i in 0..side {
+                    if random.next().is_multiple_of(5) {
+                        continue;
+                    }
+                    let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                    let lifted = if random.next().is_multiple_of(7) { [b[0], b[1], b[2] + 0.3] } else { b };
+                    triangles.push([a, lifted, c]);
+                    triangles.push(if random.next().is_multiple_of(2) { [a, c, d] } else { [d, c, a] });
+                }
+            }
+            if triangles.is_empty() {
+                continue;
+            }
+            let figures = joined_of(&triangles);
+            assert!(side < 3 || figures.len() < triangles.len(), "{round}");
+            for _ in 0..200 {
+                let x: Point = std::array::from_fn(|_| (side as f64 + 2.0) * number(&mut random) - 1.0);
+                let of_triangles = triangles.iter().map(|[a, b, c]| distance_squared(&x, &closest_on_triangle(&x, a, b, c)));
+                let least = of_triangles.fold(f64::INFINITY, f64::min).sqrt();
+                let joined = figures.iter().map(|figure| figure.distance_squared(&x)).fold(f64::INFINITY, f64::min).sqrt();
+                assert!((least - joined).abs() < 1e-9, "{round}: {x:?} {least} {joined}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_plate_with_a_hole_is_a_few_rectangles_and_radii_stay_apart() {
+        let at = |i: usize, j: usize| -> Point { [i as f64, j as f64, 0.0] };
+        let cells = (0..36).map(|cell| (cell % 6, cell / 6)).filter(|&(i, j)| !((2..4).contains(&i) && (2..4).contains(&j)));
+        let triangles: Vec<[Point; 3]> =
+            cells.flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]).collect();
+        assert_eq!(triangles.len(), 64);
+        assert!(joined_of(&triangles).len() <= 12, "{}", joined_of(&triangles).len());
+        let two =
+            [0.0, 0.5].into_iter().zip(&triangles).map(|(deficit, corners)| Weighted { site: Site::Triangle(*corners), deficit }.into());
+        assert_eq!(joined(two.collect(), 1e-12, &Budget::default()).unwrap().len(), 2);
+    }
+}

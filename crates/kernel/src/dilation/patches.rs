@@ -1,0 +1,195 @@
+//! Simplification of a closed surface that no lattice divides: space is halved until few triangles are in each part, the parts are simplified side by side, and then what lies between them, part by part again.
+//!
+//! A part has all triangles whose boxes meet its own. It changes triangles only that are inside with all corners: no other part has these.
+
+use super::plan::Setting;
+use super::simplify::{Core, OF_POLYTOPES, Simplifier};
+use super::surface::BlockSurface;
+use super::tree::Candidates;
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Ball, Point, distance_squared};
+use crate::attractor::sites::SiteRule;
+use crate::budget::{Budget, Stopped};
+use std::sync::Mutex;
+
+/// Triangles of a part that is not halved, about.
+const MOST_TRIANGLES: usize = 8_192;
+/// Halvings between parts that are simplified: an eighth of each.
+const STEP: usize = 3;
+/// Halvings at most, as large triangles are in many parts.
+const MOST_HALVINGS: usize = 7 * STEP;
+
+/// Simplifies a closed surface within the band; `core` holds all of it.
+///
+/// # Errors
+/// [`Stopped`]; the surface is lost then.
+pub(super) fn simplify(
+    setting: &Setting,
+    rule: &SiteRule<'_>,
+    core: Core,
+    candidates: &Candidates,
+    surface: &mut BlockSurface,
+    budget: &Budget,
+) -> Result<(), Stopped> {
+    let all = Part { core, triangles: (0..surface.triangles.len() as u32).collect(), halvings: 0 };
+    let patches = Patches { setting, rule, surface, idle: Mutex::new(Vec::new()), budget };
+    surface.triangles = patches.of(all, candidates)?.inside;
+    surface.drop_unused();
+    Ok(())
+}
+
+/// A part of space, and the triangles that may meet it.
+struct Part {
+    core: Core,
+    triangles: Vec<u32>,
+    halvings: usize,
+}
+
+/// What became of the triangles of a part. Vertices are numbered as they are in all of the surface.
+#[derive(Default)]
+struct Patch {
+    /// Those inside, some of which are others now.
+    inside: Vec<[u32; 3]>,
+    /// The numbers of the others, in ascending order: they are as they were.
+    across: Vec<u32>,
+    /// Vertices that were tried with all of their stars, see [`BlockSurface::settled`].
+    settled: Vec<u32>,
+}
+
+struct Patches<'a> {
+    setting: &'a Setting,
+    rule: &'a SiteRule<'a>,
+    surface: &'a BlockSurface,
+    /// Working memories that no thread uses now.
+    idle: Mutex<Vec<Simplifier<'a>>>,
+    budget: &'a Budget,
+}
+
+impl Patches<'_> {
+    fn of(&self, part: Part, candidates: &Candidates) -> Result<Patch, Stopped> {
+        self.budget.cancel.check()?;
+        // Sites that are farther from all places inside cover none of them.
+        let near = candidates.near(self.rule.attractor(), &part.core, self.setting.near);
+        let (core, halvings) = (part.core, part.halvings);
+        let patch = match self.halves(part) {
+            Ok([below, above]) => {
+                let (below, above) = rayon::join(|| self.of(below, &near), || self.of(above, &near));
+                let patch = self.joined(below?, above?, &core);
+                if !halvings.is_multiple_of(STEP) {
+                    return Ok(patch);
+                }
+                patch
+            }
+            Err(part) => {
+                let (inside, across): (Vec<u32>, Vec<u32>) =
+                    part.triangles.iter().partition(|&&triangle| self.surface.is_within(triangle, &core));
+                Patch {
+                    inside: inside.into_iter().map(|triangle| self.surface.triangles[triangle as usize]).collect(),
+                    across,
+                    settled: Vec::new(),
+                }
+            }
+        };
+        self.simplified(&core, &near, patch)
+    }
+
+    /// The halves of a part across its longest side, as many triangles in one as in the other; the part itself where it has few.
+    fn halves(&self, part: Part) -> Result<[Part; 2], Part> {
+        let Part { core, triangles, halvings } = &part;
+        if *halvings == MOST_HALVINGS || triangles.len() <= MOST_TRIANGLES {
+            return Err(part);
+        }
+        let extreme = |triangle: u32, axis: usize, choose: fn(f64, f64) -> f64| {
+            let [a, b, c] = self.surface.corners(triangle).map(|corner| corner[axis]);
+            choose(choose(a, b), c)
+        };
+        let spread = |axis: usize| {
+            let begins = triangles.iter().map(|&triangle| extreme(triangle, axis, f64::min).max(core.low[axis]));
+            let (low, high) = begins.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (at.min(low), at.max(high)));
+            high - low
+        };
+        let spreads: [f64; 3] = std::array::from_fn(spread);
+        let axis = (0..3).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or_default();
+        let mut begins: Vec<f64> = triangles.iter().map(|&triangle| extreme(triangle, axis, f64::min)).collect();
+        let (_, &mut plane, _) = begins.select_nth_unstable_by(triangles.len() / 2, f64::total_cmp);
+        if plane <= core.low[axis] || plane >= core.high[axis] {
+            return Err(part);
+        }
+        let (mut below, mut above) = (*core, *core);
+        (below.high[axis], above.low[axis]) = (plane, plane);
+        let lower = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::min) <= plane).collect();
+        let upper = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::max) >= plane).collect();
+        let half = |core, triangles| Part { core, triangles, halvings: halvings + 1 };
+        Ok([half(below, lower), half(above, upper)])
+    }
+
+    /// Both halves as one patch.
+    fn joined(&self, below: Patch, above: Patch, core: &Core) -> Patch {
+        let Patch { mut inside, across: mut rest, mut settled } = below;
+        inside.extend(above.inside);
+        settled.extend(above.settled);
+        rest.extend(above.across);
+        rest.sort_unstable();
+        rest.dedup();
+        // What is across the plane between them was in both.
+        let (between, across): (Vec<u32>, Vec<u32>) = rest.into_iter().partition(|&triangle| self.surface.is_within(triangle, core));
+        inside.extend(between.into_iter().map(|triangle| self.surface.triangles[triangle as usize]));
+        Patch { inside, across, settled }
+    }
+
+    fn simplified(&self, core: &Core, candidates: &Candidates, patch: Patch) -> Result<Patch, Stopped> {
+        let Patch { inside, across, settled } = patch;
+        let triangles: Vec<[u32; 3]> =
+            inside.into_iter().chain(across.iter().map(|&triangle| self.surface.triangles[triangle as usize])).collect();
+        let mut names: Vec<u32> = triangles.iter().flatten().copied().collect();
+        names.sort_unstable();
+        names.dedup();
+        let number = |vertex: &u32| names.binary_search(vertex).unwrap_or_default();
+        let mut own = BlockSurface {
+            vertices: names.iter().map(|&vertex| self.surface.vertices[vertex as usize]).collect(),
+            triangles: triangles.iter().map(|corners| corners.map(|corner| number(&corner) as u32)).collect(),
+            shared: names.iter().zip(0..).map(|(&vertex, number)| (vertex.into(), number)).collect(),
+            settled: vec![false; names.len()],
+            ..BlockSurface::default()
+        };
+        settled.iter().for_each(|vertex| own.settled[number(vertex)] = true);
+        let idle = self.idle.lock().map(|mut idle| idle.pop()).unwrap_or_default();
+        let mut simplifier = idle.unwrap_or_else(|| Simplifier::new(self.rule, self.setting));
+        simplifier.run(self.setting, &OF_POLYTOPES, core, candidates, &mut own, self.budget)?;
+        if let Ok(mut idle) = self.idle.lock() {
+            idle.push(simplifier);
+        }
+        own.shared.iter().for_each(|&(name, number)| names[number as usize] = name as u32);
+        let inside = (0..own.triangles.len() as u32).filter(|&triangle| own.is_within(triangle, core));
+        Ok(Patch {
+            inside: inside.map(|triangle| own.triangles[triangle as usize].map(|corner| names[corner as usize])).collect(),
+            across,
+            settled: names.iter().zip(&own.settled).filter(|(_, settled)| **settled).map(|(&name, _)| name).collect(),
+        })
+    }
+}
+
+impl BlockSurface {
+    fn corners(&self, triangle: u32) -> [&Point; 3] {
+        self.triangles[triangle as usize].map(|corner| &self.vertices[corner as usize])
+    }
+
+    fn is_within(&self, triangle: u32, core: &Core) -> bool {
+        self.corners(triangle).iter().all(|corner| core.contains(corner))
+    }
+}
+
+impl Candidates {
+    /// Those whose balls come within a distance of a box.
+    fn near(&self, attractor: &Attractor, core: &Core, distance: f64) -> Self {
+        let mut kept = Self::default();
+        for candidate in &self.cells {
+            let Ball { centre, radius } = candidate.cell.ball;
+            let closest: Point = std::array::from_fn(|axis| centre[axis].clamp(core.low[axis], core.high[axis]));
+            if distance_squared(&centre, &closest) <= (radius + distance).powi(2) {
+                kept.push(candidate.cell, self.points_of(attractor, candidate), candidate.leaf);
+            }
+        }
+        kept
+    }
+}
