@@ -5,7 +5,7 @@
 //! * every point of the side is in a figure that comes earlier and has the same radius, and
 //! * c_k >= T max(0, n_m . n_k) for all other sides m.
 //!
-//! Then D_t(S) is the union of what is left of the D_t(S_i). For let x be in it, q the point of S that is closest to x, and S_j the first of the figures that q is in. Were x beyond a plane that D_t(S_j) is cut by, that of side k,
+//! Then D_t(S) is the union of what is left of the D_t(S_i). For let x be in it, q a point of S that is nearest to x, as the radii have it, and S_j the first of the figures with that radius that q is in: x is in D_t(S_j), and q its closest point. Were x beyond a plane that this is cut by, that of side k,
 //! then q would be on this side: x - q is in the cone of the normals at q, so elsewhere it is, along n_k, a part of |x - q| <= T that is no more than the largest n_m . n_k, and q is no higher along n_k than the side.
 //! But what is on the side is in an earlier figure, and S_j is the first.
 //!

@@ -1,7 +1,7 @@
-//! Thickening of points, segments and triangles by the union of a polytope around each: where few sites are near to each other, the boundary is found facet by facet, without a lattice.
+//! Thickening of points, segments and polygons by the union of a polytope around each: where few are near to each other, the boundary is found facet by facet, without a lattice.
 //!
-//! With s < r < outer the ends of the band, site S_i has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
-//! where all of them are cut across the end of a segment that meets others, see `joints`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
+//! With s < r < outer the ends of the band, figure S_i (see `figure`) has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
+//! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does.
 
 mod bodies;
@@ -32,8 +32,8 @@ use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
 use std::sync::{Arc, OnceLock};
 
-/// The mean square of the number of neighbours, and the mean number of sets of up to four sites that are near to each other, at most: lines are cut by all neighbours, and the nerve looks at such
-/// sets as far as all their parts meet. Where sites have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
+/// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
+/// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
 const MOST_NEAR: [usize; 2] = [5_000, 250];
 /// Doubts that polytopes may leave, as a share of the sites, and in any case: more of them are no matter of a few places, and finer polytopes everywhere cost more than a lattice.
 const MOST_DOUBTS: f64 = 0.2;
