@@ -10,7 +10,7 @@ use crate::measure::triangle::closest_on_triangle;
 use std::cmp::Ordering;
 
 /// Corners of a polygon at most: polytopes have room for their facets.
-const MOST_CORNERS: usize = 24;
+const MOST_CORNERS: usize = 12;
 /// The least sine by which a side of what is joined turns from the one before it, unless it goes straight on: facets across sides that hardly turn meet far away.
 const LEAST_TURN: f64 = 0.02;
 /// Rounds of joining, each of which may double a polygon.

@@ -35,7 +35,8 @@ impl Polytope {
         // Faces have nothing beyond them that would make up for what they lack: they are in the band's middle, where panels are as thick as they should be.
         let lift = |facet: usize| if facet < FACES { 0.5 * (shell.outer - shell.inner - room) } else { 0.0 };
         let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
-        let outside = |facet: usize| facet.checked_sub(FACES).and_then(|side| beyond[side]).unwrap_or_else(|| offset(facet));
+        // Sides that hardly turn would meet elsewhere, were they shifted against each other.
+        let outside = |facet: usize| facet.checked_sub(FACES).map_or_else(|| offset(facet), |side| beyond[side].unwrap_or(all));
         let mut hull = Hull::prism(&polygon, outside)?;
         let noise = NOISE * shell.outer;
         // A polygon around a circle: half of it between both faces.
