@@ -16,8 +16,10 @@ use std::sync::Mutex;
 const MOST_TRIANGLES: usize = 8_192;
 /// Halvings between parts that are simplified: an eighth of each.
 const STEP: usize = 3;
-/// Halvings at most, as large triangles are in many parts.
+/// Halvings at most.
 const MOST_HALVINGS: usize = 7 * STEP;
+/// Both halves of a part have so many half times its triangles at most, as what is across is in both.
+const MOST_SHARED: usize = 3;
 
 /// Simplifies a closed surface within the band; `core` holds all of it.
 ///
@@ -33,7 +35,9 @@ pub(super) fn simplify(
 ) -> Result<(), Stopped> {
     let all = Part { core, triangles: (0..surface.triangles.len() as u32).collect(), halvings: 0 };
     let patches = Patches { setting, rule, surface, idle: Mutex::new(Vec::new()), budget };
-    surface.triangles = patches.of(all, candidates)?.inside;
+    let Patch { inside, across, .. } = patches.of(all, candidates)?;
+    let across = across.into_iter().map(|triangle| surface.triangles[triangle as usize]);
+    surface.triangles = inside.into_iter().chain(across).collect();
     surface.drop_unused();
     Ok(())
 }
@@ -93,7 +97,7 @@ impl Patches<'_> {
         self.simplified(&core, &near, patch)
     }
 
-    /// The halves of a part across its longest side, as many triangles in one as in the other; the part itself where it has few.
+    /// The halves of a part, across the axis along which its triangles are spread most, as many in one as in the other; the part itself where it has few, or most are in both.
     fn halves(&self, part: Part) -> Result<[Part; 2], Part> {
         let Part { core, triangles, halvings } = &part;
         if *halvings == MOST_HALVINGS || triangles.len() <= MOST_TRIANGLES {
@@ -103,22 +107,23 @@ impl Patches<'_> {
             let [a, b, c] = self.surface.corners(triangle).map(|corner| corner[axis]);
             choose(choose(a, b), c)
         };
-        let spread = |axis: usize| {
-            let begins = triangles.iter().map(|&triangle| extreme(triangle, axis, f64::min).max(core.low[axis]));
-            let (low, high) = begins.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (at.min(low), at.max(high)));
-            high - low
+        let middle = |axis: usize| {
+            let mut begins: Vec<f64> = triangles.iter().map(|&triangle| extreme(triangle, axis, f64::min).max(core.low[axis])).collect();
+            let spread = begins.iter().copied().fold(f64::NEG_INFINITY, f64::max) - begins.iter().copied().fold(f64::INFINITY, f64::min);
+            let (_, &mut plane, _) = begins.select_nth_unstable_by(triangles.len() / 2, f64::total_cmp);
+            (spread, plane)
         };
-        let spreads: [f64; 3] = std::array::from_fn(spread);
-        let axis = (0..3).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or_default();
-        let mut begins: Vec<f64> = triangles.iter().map(|&triangle| extreme(triangle, axis, f64::min)).collect();
-        let (_, &mut plane, _) = begins.select_nth_unstable_by(triangles.len() / 2, f64::total_cmp);
-        if plane <= core.low[axis] || plane >= core.high[axis] {
-            return Err(part);
-        }
+        let middles: [(f64, f64); 3] = std::array::from_fn(middle);
+        let may_part = |axis: &usize| core.low[*axis] < middles[*axis].1 && middles[*axis].1 < core.high[*axis];
+        let Some(axis) = (0..3).filter(may_part).max_by(|&a, &b| middles[a].0.total_cmp(&middles[b].0)) else { return Err(part) };
+        let plane = middles[axis].1;
         let (mut below, mut above) = (*core, *core);
         (below.high[axis], above.low[axis]) = (plane, plane);
-        let lower = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::min) <= plane).collect();
-        let upper = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::max) >= plane).collect();
+        let lower: Vec<u32> = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::min) <= plane).collect();
+        let upper: Vec<u32> = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::max) >= plane).collect();
+        if lower.len() + upper.len() > MOST_SHARED * triangles.len() / 2 {
+            return Err(part);
+        }
         let half = |core, triangles| Part { core, triangles, halvings: halvings + 1 };
         Ok([half(below, lower), half(above, upper)])
     }

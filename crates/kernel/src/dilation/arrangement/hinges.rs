@@ -6,8 +6,8 @@
 //! * c_k >= T max(0, n_m . n_k) for all other sides m.
 //!
 //! Then D_t(S) is the union of what is left of the D_t(S_i). For let x be in it, q a point of S that is nearest to x, as the radii have it, and S_j the first of the figures with that radius that q is in: x is in D_t(S_j), and q its closest point. Were x beyond a plane that this is cut by, that of side k,
-//! then q would be on this side: x - q is in the cone of the normals at q, so elsewhere it is, along n_k, a part of |x - q| <= T that is no more than the largest n_m . n_k, and q is no higher along n_k than the side.
-//! But what is on the side is in an earlier figure, and S_j is the first.
+//! then q would be on this side: x - q is in the cone of the normals at q, so elsewhere it is, along n_k, a part of |x - q| <= T that is no more than the largest n_m . n_k (at a corner, n_k is not between the normals of both its sides), and q is no higher along n_k than the side.
+//! But what is on the side is in an earlier figure, and S_j is the first. Where q is in no polygon, `joints` tells the same of segments. Sides are common up to a share of the slack that all bounds leave for rounding.
 //!
 //! So of all polygons around a side one is round there, and where they go on in a plane, what is round is within the next. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
@@ -23,8 +23,8 @@ use rayon::prelude::*;
 const SHIFT: f64 = 0.04;
 /// How far out a cut is at most, in units of the outer radius: beyond that it saves little.
 const FARTHEST: f64 = 0.7;
-/// Sides that are looked at to cover another.
-const MOST_SIDES: usize = 64;
+/// Sides near one that are looked at to cover it: with others it might be cut, too.
+const MOST_SIDES: usize = 256;
 
 /// A side of a polygon.
 struct Side {
@@ -70,19 +70,19 @@ pub(super) fn cuts(
         if least > FARTHEST * outer {
             return Ok(None);
         }
-        let (mut covered, mut left) = (Vec::new(), MOST_SIDES);
+        let (mut covered, mut looked) = (Vec::new(), 0);
         tree.query(&boxes[index], 0, |leaf| {
             for (&item, theirs) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
                 let other = &sides[item as usize];
-                if boxes[index].meets(theirs)
-                    && is_earlier(other.figure, side.figure)
-                    && figures[other.figure as usize].deficit.to_bits() == figure.deficit.to_bits()
-                {
+                if !boxes[index].meets(theirs) {
+                    continue;
+                }
+                looked += 1;
+                if is_earlier(other.figure, side.figure) && figures[other.figure as usize].deficit.to_bits() == figure.deficit.to_bits() {
                     covered.extend(common(&side.ends, &other.ends, flatness));
-                    left = left.saturating_sub(1);
                 }
             }
-            left > 0
+            looked < MOST_SIDES
         });
         let shift = SHIFT * (outer - inner) * (0.5 + 0.5 * share(side));
         Ok(is_whole(&mut covered).then_some(least + shift))
@@ -107,7 +107,7 @@ impl Polygon {
     }
 }
 
-/// The plane across the end of a polygon at a side.
+/// The unit vector in the plane of a polygon out of a side.
 pub(super) fn outward(polygon: &Polygon, place: usize) -> Point {
     let (from, to) = (&polygon.corners[place], &polygon.corners[(place + 1) % polygon.corners.len()]);
     let out = cross(&subtract(to, from), &polygon.up);

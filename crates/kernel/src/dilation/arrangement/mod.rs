@@ -40,8 +40,8 @@ const MOST_DOUBTS: f64 = 0.2;
 const FEW_DOUBTS: f64 = 16.0;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
-/// How far polygons may be from their triangles, as a share of the slack that all bounds leave: this happens again and again.
-const FLATNESS: f64 = 1.0 / 64.0;
+/// How far corners may be off the plane of a union, and off a side that goes straight on, as a share of the slack that all bounds leave: in all rounds together polygons are off by a little more than half of it.
+const FLATNESS: f64 = 1.0 / 128.0;
 /// Levels at most.
 const LEVELS: u32 = 5;
 /// What is tried where rounding leaves a boundary open.
@@ -328,7 +328,8 @@ impl Engine<'_> {
         let is_cut = [0, 1].map(|end| beyond[end].is_some());
         let seed = (self.trial << 8 | state.form(is_cut) as u64) << 32 | index as u64;
         if figure.polygon().is_some() {
-            return Polytope::around(figure, beyond, shell, seed);
+            // Planes may meet in a point by chance, not again and again.
+            return (0..TRIALS).find_map(|trial| Polytope::around(figure, beyond, shell, seed ^ trial << 56));
         }
         let form = self.form(state, is_cut)?;
         let most = self.setting.shell(figure, State::default()).outer;

@@ -16,6 +16,8 @@ use crate::attractor::cell::{Point, between};
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 
+/// Hubs that a site suggests at most: half of all, others are met later.
+const OWN_HUBS: usize = 32;
 /// Bodies of a set at most.
 const MOST_BODIES: usize = 4;
 /// Sites that are looked at before doubts are counted.
@@ -136,11 +138,8 @@ impl<'a> Search<'a> {
     fn new(bodies: &'a Bodies<'a>, first: u32, later: Vec<u32>, changed: &'a [bool]) -> Self {
         let mut search = Self { bodies, first, hubs: vec![0; later.len()], count: 0, later, changed, found: Doubts::default() };
         let corners = bodies.figures[first as usize].corners();
-        for p in 0..corners.len() {
-            for q in 0..=p {
-                search.add_hub(&between(&corners[p], &corners[q], 0.5));
-            }
-        }
+        let middles = (0..corners.len()).flat_map(|p| (0..=p).map(move |q| between(&corners[p], &corners[q], 0.5)));
+        middles.take(OWN_HUBS).for_each(|middle| search.add_hub(&middle));
         search
     }
 
