@@ -8,6 +8,11 @@ pub(crate) fn number(state: u64) -> u64 {
     mix(state.wrapping_add(STEP))
 }
 
+/// A number in [0, 1) from the 53 highest bits of another.
+pub(crate) fn share(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// The finaliser: a bijection of 64 bits that spreads every bit.
 pub(crate) fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -25,6 +30,11 @@ impl Random {
         let number = number(self.0);
         self.0 = self.0.wrapping_add(STEP);
         number
+    }
+
+    /// A number in [0, 1).
+    pub(crate) fn share(&mut self) -> f64 {
+        share(self.next())
     }
 }
 

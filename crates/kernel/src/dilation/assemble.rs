@@ -3,12 +3,12 @@
 use super::DilationError;
 use super::block::SIDE;
 use super::octree::{Node, Pass};
+use super::pool::Pool;
 use super::simplify::{Core, OF_LATTICE, Simplifier};
 use super::stitch;
 use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
 use rayon::prelude::*;
-use std::sync::Mutex;
 
 /// Share of the pitch that keeps a node's core from its neighbours' surfaces: far above rounding, which moves these.
 const MARGIN: f64 = 0.01;
@@ -17,8 +17,7 @@ const MARGIN: f64 = 0.01;
 pub(super) struct Assembly<'a, 'b> {
     pub(super) pass: &'b Pass<'a>,
     pub(super) blocks: &'b Blocks,
-    /// Working memories that no thread uses now.
-    pub(super) idle: Mutex<Vec<Simplifier<'a>>>,
+    pub(super) simplifiers: Pool<Simplifier<'a>>,
 }
 
 impl Assembly<'_, '_> {
@@ -47,12 +46,9 @@ impl Assembly<'_, '_> {
             return Ok(None);
         }
         let core = self.pass.core(node);
-        let idle = self.idle.lock().map(|mut idle| idle.pop()).unwrap_or_default();
-        let mut simplifier = idle.unwrap_or_else(|| Simplifier::new(self.pass.rule, self.pass.setting));
-        simplifier.run(self.pass.setting, &OF_LATTICE, &core, &kept, &mut surface, self.pass.budget)?;
-        if let Ok(mut idle) = self.idle.lock() {
-            idle.push(simplifier);
-        }
+        let Pass { rule, setting, budget, .. } = *self.pass;
+        let simplified = |simplifier: &mut Simplifier<'_>| simplifier.run(setting, &OF_LATTICE, &core, &kept, &mut surface, budget);
+        self.simplifiers.with(|| Simplifier::new(rule, setting), simplified)?;
         // No other node has vertices in the core.
         let vertices = &surface.vertices;
         surface.shared.retain(|&(_, number)| !core.contains(&vertices[number as usize]));

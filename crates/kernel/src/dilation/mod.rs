@@ -33,6 +33,7 @@ mod outside;
 mod parting;
 mod patches;
 mod plan;
+mod pool;
 mod sample;
 mod seam;
 mod simplify;

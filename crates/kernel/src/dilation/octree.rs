@@ -5,6 +5,7 @@ use super::DilationError;
 use super::block::{SIDE, Workshop, signed_side};
 use super::lattice::{Cube, Grading, around};
 use super::plan::Setting;
+use super::pool::Pool;
 use super::surface::{BlockSurface, Blocks, NameHasher};
 use super::tree::{Candidate, Candidates, with_deficit};
 use crate::attractor::Attractor;
@@ -14,7 +15,6 @@ use crate::budget::Budget;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashSet};
 use std::hash::BuildHasherDefault;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Where the lattice has changed.
@@ -114,7 +114,7 @@ pub(super) struct Pass<'a> {
     pub(super) done: AtomicU64,
     pub(super) space: f64,
     /// Working memories that no thread uses now.
-    pub(super) workshops: Mutex<Vec<Workshop<'a>>>,
+    pub(super) workshops: Pool<Workshop<'a>>,
 }
 
 /// A cube of space: `blocks` blocks along its side, a power of two.
@@ -161,7 +161,7 @@ impl<'a> Pass<'a> {
             failed: AtomicBool::new(false),
             done: AtomicU64::new(0),
             space,
-            workshops: Mutex::default(),
+            workshops: Pool::default(),
         }
     }
 
@@ -343,13 +343,8 @@ impl<'a> Pass<'a> {
     }
 
     pub(super) fn block(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<BlockSurface>, DilationError> {
-        let idle = self.workshops.lock().map(|mut idle| idle.pop()).unwrap_or_default();
-        let mut workshop = idle.unwrap_or_else(|| Workshop::new(self.rule, self.setting));
-        let surface = self.surface(&mut workshop, node, candidates, open);
-        if let Ok(mut idle) = self.workshops.lock() {
-            idle.push(workshop);
-        }
-        surface
+        let workshop = || Workshop::new(self.rule, self.setting);
+        self.workshops.with(workshop, |workshop| self.surface(workshop, node, candidates, open))
     }
 
     fn surface(

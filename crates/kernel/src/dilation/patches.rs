@@ -3,6 +3,7 @@
 //! A part has all triangles whose boxes meet its own. It changes triangles only that are inside with all corners: no other part has these.
 
 use super::plan::Setting;
+use super::pool::Pool;
 use super::simplify::{Core, OF_POLYTOPES, Simplifier};
 use super::surface::BlockSurface;
 use super::tree::Candidates;
@@ -10,7 +11,6 @@ use crate::attractor::Attractor;
 use crate::attractor::cell::{Ball, Point, distance_squared};
 use crate::attractor::sites::SiteRule;
 use crate::budget::{Budget, Stopped};
-use std::sync::Mutex;
 
 /// Triangles of a part that is not halved, about.
 const MOST_TRIANGLES: usize = 8_192;
@@ -34,7 +34,7 @@ pub(super) fn simplify(
     budget: &Budget,
 ) -> Result<(), Stopped> {
     let all = Part { core, triangles: (0..surface.triangles.len() as u32).collect(), halvings: 0 };
-    let patches = Patches { setting, rule, surface, idle: Mutex::new(Vec::new()), budget };
+    let patches = Patches { setting, rule, surface, simplifiers: Pool::default(), budget };
     let Patch { inside, across, .. } = patches.of(all, candidates)?;
     let across = across.into_iter().map(|triangle| surface.triangles[triangle as usize]);
     surface.triangles = inside.into_iter().chain(across).collect();
@@ -64,8 +64,7 @@ struct Patches<'a> {
     setting: &'a Setting,
     rule: &'a SiteRule<'a>,
     surface: &'a BlockSurface,
-    /// Working memories that no thread uses now.
-    idle: Mutex<Vec<Simplifier<'a>>>,
+    simplifiers: Pool<Simplifier<'a>>,
     budget: &'a Budget,
 }
 
@@ -158,12 +157,9 @@ impl Patches<'_> {
             ..BlockSurface::default()
         };
         settled.iter().for_each(|vertex| own.settled[number(vertex)] = true);
-        let idle = self.idle.lock().map(|mut idle| idle.pop()).unwrap_or_default();
-        let mut simplifier = idle.unwrap_or_else(|| Simplifier::new(self.rule, self.setting));
-        simplifier.run(self.setting, &OF_POLYTOPES, core, candidates, &mut own, self.budget)?;
-        if let Ok(mut idle) = self.idle.lock() {
-            idle.push(simplifier);
-        }
+        let Self { setting, rule, budget, .. } = *self;
+        let run = |simplifier: &mut Simplifier<'_>| simplifier.run(setting, &OF_POLYTOPES, core, candidates, &mut own, budget);
+        self.simplifiers.with(|| Simplifier::new(rule, setting), run)?;
         own.shared.iter().for_each(|&(name, number)| names[number as usize] = name as u32);
         let inside = (0..own.triangles.len() as u32).filter(|&triangle| own.is_within(triangle, core));
         Ok(Patch {

@@ -8,6 +8,7 @@ use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
 use super::octree::{Changed, Node, Pass, Task};
 use super::outside::MOST;
 use super::patches;
+use super::pool::Pool;
 use super::seam;
 use super::simplify::Core;
 use super::smooth::MOST_NOISE;
@@ -520,7 +521,7 @@ impl<'a> Plan<'a> {
             surface.drop_lattice();
         }
         let solids: Vec<u32> = (0..self.rule.attractor().solids().len() as u32).collect();
-        let assembly = Assembly { pass: &pass, blocks: &blocks, idle: Mutex::new(Vec::new()) };
+        let assembly = Assembly { pass: &pass, blocks: &blocks, simplifiers: Pool::default() };
         let root = assembly.node(Node { first_block: [0; 3], blocks: space.blocks }, &space.candidates, &solids)?.unwrap_or_default();
         Ok(BlockSurface { leaves, site_error: root.site_error.max(site_error), ..root })
     }

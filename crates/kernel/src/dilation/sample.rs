@@ -216,7 +216,7 @@ impl Chance {
     fn next(&mut self) -> f64 {
         let number = split_mix::number(self.0);
         self.0 = self.0.wrapping_add(split_mix::STEP);
-        (number >> 11) as f64 / (1_u64 << 53) as f64
+        split_mix::share(number)
     }
 }
 

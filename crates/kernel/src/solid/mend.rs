@@ -215,10 +215,11 @@ impl Mender {
     fn merge(&mut self, mesh: &mut HalfEdges, inside: &[bool], settled: &[bool]) -> bool {
         let mut merged = false;
         for vertex in 0..mesh.points.len() as u32 {
-            if !inside[vertex as usize] || settled[vertex as usize] || !mesh.star(vertex, MOST_AROUND, &mut self.star) {
-                continue;
-            }
-            if !self.star.ring.iter().all(|&other| inside[other as usize]) {
+            if !inside[vertex as usize]
+                || settled[vertex as usize]
+                || !mesh.star(vertex, MOST_AROUND, &mut self.star)
+                || self.star.ring.iter().any(|&other| !inside[other as usize])
+            {
                 continue;
             }
             for m in 0..self.star.ring.len() {

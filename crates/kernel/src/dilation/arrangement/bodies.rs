@@ -93,7 +93,7 @@ impl Bodies<'_> {
         far.reduce(|a, b| if b.0 > a.0 { b } else { a }).map(|(square, figure)| (square.sqrt(), figure))
     }
 
-    /// The highest plane above -slack, or more, that dilations of a set are cut by.
+    /// The highest plane that dilations of a set are cut by, if it is higher than something.
     fn cut_off(&self, set: &[u32], x: &Point, than: f64) -> Option<(f64, Point)> {
         highest(x, set.iter().flat_map(|&body| self.polytopes.of(body).cuts.iter()), than)
     }
@@ -163,13 +163,13 @@ impl Bodies<'_> {
         let (centre, size, slack) = (between(&low, &high, 0.5), subtract(&high, &low), self.setting.slack);
         // All of the box is no farther from its centre.
         let half = 0.5 * dot(&size, &size).sqrt() + 2.0 * slack;
-        let mut deepest = f64::NEG_INFINITY;
+        let mut highest = f64::NEG_INFINITY;
         for &body in set {
             let above = self.above(kind, body, &centre);
             if above > half {
                 return true;
             }
-            deepest = deepest.max(above);
+            highest = highest.max(above);
         }
         let (mut left, mut is_centre_hidden) = (Vec::new(), false);
         for &body in around {
@@ -186,7 +186,7 @@ impl Bodies<'_> {
             }
             is_centre_hidden |= above < -slack;
         }
-        if halvings == 0 || *boxes == 0 || left.is_empty() || (deepest <= 0.0 && !is_centre_hidden) {
+        if halvings == 0 || *boxes == 0 || left.is_empty() || (highest <= 0.0 && !is_centre_hidden) {
             return false;
         }
         let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or_default();

@@ -63,6 +63,10 @@ impl Figure {
         }
     }
 
+    pub(super) fn polygon(&self) -> Option<&Polygon> {
+        if let Outline::Polygon(polygon) = &self.outline { Some(polygon) } else { None }
+    }
+
     /// The point of the figure that is closest to x.
     #[inline]
     pub(super) fn closest(&self, x: &Point) -> Point {
@@ -114,6 +118,12 @@ impl Polygon {
     /// The same with all places less `origin`.
     pub(super) fn from(&self, origin: &Point) -> Self {
         Self { corners: self.corners.iter().map(|corner| subtract(corner, origin)).collect(), up: self.up }
+    }
+
+    /// The ends of its sides, in their order.
+    pub(super) fn sides(&self) -> impl Iterator<Item = [Point; 2]> {
+        let ends = self.corners.iter().skip(1).chain(self.corners.first());
+        self.corners.iter().zip(ends).map(|(from, to)| [*from, *to])
     }
 
     #[inline]
@@ -213,7 +223,8 @@ struct Side {
     figure: u32,
 }
 
-fn order(a: &Point, b: &Point) -> Ordering {
+/// The order of places: along the first axis, then the others.
+pub(super) fn order(a: &Point, b: &Point) -> Ordering {
     (0..3).map(|axis| a[axis].total_cmp(&b[axis])).fold(Ordering::Equal, Ordering::then)
 }
 
@@ -232,11 +243,9 @@ pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, budget: &Budget) -
         budget.cancel.check()?;
         let mut sides = Vec::new();
         for (figure, polygon) in (0..).zip(&figures).filter_map(|(index, figure)| figure.polygon().map(|polygon| (index, polygon))) {
-            let corners = &polygon.corners;
-            for (k, from) in corners.iter().enumerate() {
-                let to = &corners[(k + 1) % corners.len()];
-                let ends = if order(from, to).is_lt() { [*from, *to] } else { [*to, *from] };
-                sides.push(Side { length: distance_squared(from, to).sqrt() as f32, ends, figure });
+            for [from, to] in polygon.sides() {
+                let ends = if order(&from, &to).is_lt() { [from, to] } else { [to, from] };
+                sides.push(Side { length: distance_squared(&from, &to).sqrt() as f32, ends, figure });
             }
         }
         let same = |a: &Side, b: &Side| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
@@ -271,20 +280,10 @@ pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, budget: &Budget) -
     Ok(figures)
 }
 
-impl Figure {
-    pub(super) fn polygon(&self) -> Option<&Polygon> {
-        if let Outline::Polygon(polygon) = &self.outline { Some(polygon) } else { None }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::split_mix::Random;
-
-    fn number(random: &mut Random) -> f64 {
-        (random.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
 
     fn joined_of(triangles: &[[Point; 3]]) -> Vec<Figure> {
         let figures = triangles.iter().map(|corners| Weighted { site: Site::Triangle(*corners), deficit: 0.0 }.into()).collect();
@@ -319,7 +318,7 @@ mod tests {
             let figures = joined_of(&triangles);
             assert!(side < 3 || 3 * figures.len() < 2 * triangles.len(), "{round}: {} of {}", figures.len(), triangles.len());
             for _ in 0..200 {
-                let x: Point = std::array::from_fn(|_| (side as f64 + 2.0) * number(&mut random) - 1.0);
+                let x: Point = std::array::from_fn(|_| (side as f64 + 2.0) * random.share() - 1.0);
                 let of_triangles = triangles.iter().map(|[a, b, c]| distance_squared(&x, &closest_on_triangle(&x, a, b, c)));
                 let least = of_triangles.fold(f64::INFINITY, f64::min).sqrt();
                 let joined = figures.iter().map(|figure| figure.distance_squared(&x)).fold(f64::INFINITY, f64::min).sqrt();

@@ -12,15 +12,13 @@
 //! So of all polygons around a side one is round there, and where they go on in a plane, what is round is within the next. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
 use super::figure::{Figure, Polygon};
+use super::joints;
 use super::polytopes::Shell;
 use crate::attractor::cell::{Point, closest_on_segment, cross, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::solid::box_tree::{Box32, BoxTree};
-use crate::split_mix::{STEP, number};
 use rayon::prelude::*;
 
-/// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
-const SHIFT: f64 = 0.04;
 /// How far out a cut is at most, in units of the outer radius: beyond that it saves little.
 const FARTHEST: f64 = 0.7;
 /// Sides near one that are looked at to cover it: with others it might be cut, too.
@@ -45,8 +43,7 @@ pub(super) fn cuts(
 ) -> Result<Vec<Box<[Option<f64>]>>, Stopped> {
     let mut sides = Vec::new();
     for (figure, polygon) in (0..).zip(figures).filter_map(|(index, figure)| figure.polygon().map(|polygon| (index, polygon))) {
-        let count = polygon.corners.len();
-        sides.extend((0..count).map(|k| Side { figure, place: k as u32, ends: [polygon.corners[k], polygon.corners[(k + 1) % count]] }));
+        sides.extend((0..).zip(polygon.sides()).map(|(place, ends)| Side { figure, place, ends }));
     }
     // Long sides cover short ones: polygons with long ones come first.
     let mut longest = vec![0.0_f64; figures.len()];
@@ -65,9 +62,9 @@ pub(super) fn cuts(
         budget.cancel.check()?;
         let figure = &figures[side.figure as usize];
         let Some(polygon) = figure.polygon() else { return Ok(None) };
-        let Shell { inner, outer } = shell(figure);
-        let least = outer * polygon.widest(side.place as usize);
-        if least > FARTHEST * outer {
+        let shell = shell(figure);
+        let least = shell.outer * polygon.widest(side.place as usize);
+        if least > FARTHEST * shell.outer {
             return Ok(None);
         }
         let (mut covered, mut looked) = (Vec::new(), 0);
@@ -84,8 +81,8 @@ pub(super) fn cuts(
             }
             looked < MOST_SIDES
         });
-        let shift = SHIFT * (outer - inner) * (0.5 + 0.5 * share(side));
-        Ok(is_whole(&mut covered).then_some(least + shift))
+        let seed = u64::from(side.figure) << 8 | u64::from(side.place);
+        Ok(is_whole(&mut covered).then(|| least + joints::shift(shell, seed)))
     };
     let cut: Vec<Option<f64>> = sides.par_iter().enumerate().map(|(index, side)| cut((index, side))).collect::<Result<_, Stopped>>()?;
     let mut cut = cut.into_iter();
@@ -95,24 +92,17 @@ pub(super) fn cuts(
 impl Polygon {
     /// max(0, n_m . n_k) over all other sides m.
     fn widest(&self, place: usize) -> f64 {
-        let count = self.corners.len();
-        let along = |k: usize| {
-            let along = subtract(&self.corners[(k + 1) % count], &self.corners[k]);
-            let length = dot(&along, &along).sqrt();
-            along.map(|part| part / length)
-        };
-        let own = along(place);
+        let along: Vec<Point> = self.sides().map(|[from, to]| joints::unit(&subtract(&to, &from))).collect();
         // Normals are turned as the sides are.
-        (0..count).filter(|&k| k != place).map(|k| dot(&along(k), &own)).fold(0.0, f64::max)
+        let others = along.iter().enumerate().filter(|&(side, _)| side != place);
+        others.map(|(_, other)| dot(other, &along[place])).fold(0.0, f64::max)
     }
 }
 
 /// The unit vector in the plane of a polygon out of a side.
 pub(super) fn outward(polygon: &Polygon, place: usize) -> Point {
     let (from, to) = (&polygon.corners[place], &polygon.corners[(place + 1) % polygon.corners.len()]);
-    let out = cross(&subtract(to, from), &polygon.up);
-    let length = dot(&out, &out).sqrt();
-    out.map(|part| part / length)
+    joints::unit(&cross(&subtract(to, from), &polygon.up))
 }
 
 /// What a segment has in common with another within `flatness`, as shares of its length: the ends of both that are on the other.
@@ -142,12 +132,6 @@ fn is_whole(covered: &mut [[f64; 2]]) -> bool {
 /// See [`is_whole`]: far below what bounds leave for rounding.
 const ROUNDING: f64 = 1e-15;
 
-/// A number in [0, 1) that looks random.
-fn share(side: &Side) -> f64 {
-    let seed = (u64::from(side.figure) << 8 | u64::from(side.place)).wrapping_mul(STEP);
-    (number(!seed) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::joints::planes;
@@ -161,7 +145,7 @@ mod tests {
     #[test]
     fn what_is_cut_off_is_in_others() {
         let mut random = Random(29);
-        let mut unit = move || (random.next() >> 11) as f64 / (1_u64 << 53) as f64;
+        let mut unit = move || random.share();
         let (mut cut, mut wide, mut beyond) = (0, 0, 0);
         for round in 0..150 {
             // A folded strip of triangles, some of them obtuse, a fan around its end, and sides that are halves of another.

@@ -65,10 +65,10 @@ impl Polytope {
 }
 
 impl Hull {
-    /// Both faces, and a facet across the triangle at every side.
-    fn prism(Polygon { corners, up }: &Polygon, offset: impl Fn(usize) -> f64) -> Option<Self> {
-        let (count, up) = (corners.len(), *up);
-        let sides: Vec<Point> = (0..count).map(|k| subtract(&corners[(k + 1) % count], &corners[k])).collect();
+    /// Both faces, and a facet across the polygon at every side.
+    fn prism(polygon: &Polygon, offset: impl Fn(usize) -> f64) -> Option<Self> {
+        let (count, up) = (polygon.corners.len(), polygon.up);
+        let sides: Vec<Point> = polygon.sides().map(|[from, to]| subtract(&to, &from)).collect();
         let length = |vector: &Point| dot(vector, vector).sqrt();
         let sine = |one: &Point, other: &Point| length(&cross(one, other)) / (length(one) * length(other));
         // Sides without a length, too.
@@ -83,7 +83,7 @@ impl Hull {
         };
         add(up, 0.0);
         add(up.map(|part| -part), 0.0);
-        for (side, corner) in sides.iter().zip(corners.iter()) {
+        for (side, corner) in sides.iter().zip(&polygon.corners) {
             let out = cross(side, &up).map(|part| part / length(side));
             add(out, dot(&out, corner));
         }

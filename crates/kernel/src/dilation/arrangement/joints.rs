@@ -11,12 +11,12 @@
 //!
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
-use super::figure::{Figure, Outline};
+use super::figure::{Figure, Outline, order};
 use super::form::Form;
 use super::hinges;
 use super::polytopes::{Plane, Shell, ordered};
 use crate::attractor::cell::{Point, between, dot, subtract};
-use crate::split_mix::{STEP, number};
+use crate::split_mix;
 
 /// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
 const SHIFT: f64 = 0.04;
@@ -45,11 +45,7 @@ pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> She
             ends.extend([first, second].into_iter().enumerate().map(|(end, at)| End { at, site, end: Some(end) }));
         }
     }
-    let order = |a: &End, b: &End| {
-        let axes = (0..3).map(|axis| a.at[axis].total_cmp(&b.at[axis]));
-        axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then).then(a.site.cmp(&b.site))
-    };
-    ends.sort_unstable_by(order);
+    ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
     let mut cuts = vec![[None; 2]; sites.len()];
     let mut outwards = Vec::new();
     for joint in ends.chunk_by(|a, b| a.at == b.at).filter(|joint| joint.len() > 1) {
@@ -71,7 +67,7 @@ pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> She
         let keeper = joint.iter().filter(|end| deficit(end) == least).min_by_key(|end| (end.end.is_some(), end.site)).map(|end| end.site);
         for end in joint {
             let Some(own) = end.end else { continue };
-            let shift = SHIFT * band * (0.5 + 0.5 * share(end.site, own));
+            let shift = shift(shell, u64::from(end.site) << 1 | own as u64);
             if common < most {
                 cuts[end.site as usize][own] = Some(length * shell.outer + shift);
             } else if Some(end.site) != keeper {
@@ -100,7 +96,7 @@ fn outward(sites: &[Figure], end: &End) -> Point {
     unit(&subtract(&ends[own], &ends[1 - own]))
 }
 
-fn unit(vector: &Point) -> Point {
+pub(super) fn unit(vector: &Point) -> Point {
     let length = dot(vector, vector).sqrt();
     vector.map(|part| part / length)
 }
@@ -121,9 +117,9 @@ fn shortest(vectors: &[Point]) -> f64 {
     dot(&x, &x).sqrt()
 }
 
-/// A number in [0, 1) that looks random.
-fn share(site: u32, end: usize) -> f64 {
-    (number(!(u64::from(site) << 1 | end as u64).wrapping_mul(STEP)) >> 11) as f64 / (1_u64 << 53) as f64
+/// How much farther out a cut is than it must be, which looks random and is told by a seed.
+pub(super) fn shift(shell: Shell, seed: u64) -> f64 {
+    SHIFT * (shell.outer - shell.inner) * (0.5 + 0.5 * split_mix::share(split_mix::number(!seed.wrapping_mul(split_mix::STEP))))
 }
 
 #[cfg(test)]

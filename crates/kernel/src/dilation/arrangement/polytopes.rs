@@ -3,7 +3,7 @@
 use super::figure::{Figure, Outline};
 use super::form::{Corner, Form, MOST_FACETS, Structure, meeting};
 use crate::attractor::cell::{Point, cross, dot, subtract};
-use crate::split_mix::number;
+use crate::split_mix;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
@@ -148,7 +148,7 @@ pub(super) fn hang_together(corners: &[Corner], places: &[Point], planes: &[Plan
 
 /// A number in [0, 1) that looks random: the seed's, with an index below 1024.
 pub(super) fn share(seed: u64, index: u64) -> f64 {
-    (number(seed.wrapping_mul(1024).wrapping_add(index)) >> 11) as f64 / (1_u64 << 53) as f64
+    split_mix::share(split_mix::number(seed.wrapping_mul(1024).wrapping_add(index)))
 }
 
 /// The share of the room between the balls that is left to shift facets.

@@ -12,7 +12,7 @@ use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
 
 fn number(random: &mut Random) -> f64 {
-    (random.next() >> 11) as f64 / (1_u64 << 53) as f64
+    random.share()
 }
 
 fn place(random: &mut Random, size: f64) -> DVec3 {
