@@ -1,9 +1,9 @@
 //! The polytope of a convex polygon.
 
 use super::figure::{Figure, Polygon};
-use super::form::{Corner, MOST_FACETS, Structure, meeting};
 use super::joints;
-use super::polytopes::{OWN_SHIFT, Plane, Polytope, SHIFT, Shell, hang_together, height, normal, share};
+use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, height, meeting, normal, share};
+use super::structure::Structure;
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -136,17 +136,16 @@ impl Hull {
         let used: Vec<usize> = (0..self.planes.len()).filter(is_used).collect();
         let renamed = |facet: u16| used.binary_search(&usize::from(facet)).map_or(u16::MAX, |place| place as u16);
         let planes: Vec<Plane> = used.iter().map(|&facet| self.planes[facet]).collect();
-        let corners: Vec<Corner> = self.corners.iter().map(|(_, facets)| Corner { facets: facets.map(renamed), end: 0 }).collect();
+        let corners: Vec<[u16; 3]> = self.corners.iter().map(|(_, facets)| facets.map(renamed)).collect();
         let places: Vec<Point> = self.corners.iter().map(|&(at, _)| at).collect();
+        let structure = Structure::simple(&planes, &corners, &places)?;
         // Nor so near to one that it may be beyond.
-        if !hang_together(&corners, &places, &planes, noise) {
+        if !structure.is_convex(&planes, &places, noise) {
             return None;
         }
-        let normals: Vec<Point> = planes.iter().map(normal).collect();
-        let structure = Structure::new(&normals, corners, &places);
         let moved = |at: &Point| std::array::from_fn(|axis| at[axis] + origin[axis]);
         let shifted = |plane: &Plane| [plane[0], plane[1], plane[2], plane[3] + dot(&normal(plane), origin)];
         let (planes, corners) = (planes.iter().map(shifted).collect(), places.iter().map(moved).collect());
-        structure.is_whole().then(|| Polytope::with(Arc::new(structure), planes, cuts, corners))
+        Some(Polytope::with(Arc::new(structure), planes, cuts, corners))
     }
 }

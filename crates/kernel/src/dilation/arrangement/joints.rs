@@ -22,8 +22,8 @@ use crate::split_mix;
 const SHIFT: f64 = 0.04;
 /// Steps towards the shortest vector of a hull.
 const STEPS: usize = 32;
-/// The share of the room for shifts that cuts leave to facets.
-const LEAST_ROOM: f64 = 0.5;
+/// The share of the room for shifts that cuts leave to strips.
+const LEAST_ROOM: f64 = 0.25;
 
 /// An end of a site.
 struct End {
@@ -60,8 +60,8 @@ pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> She
             f64::INFINITY
         };
         let band = shell.outer - shell.inner;
-        let room = shell.outer / form.reach - shell.inner;
-        let most = (shell.outer.powi(2) - (form.girth * (shell.inner + LEAST_ROOM * room)).powi(2)).max(0.0).sqrt();
+        let least = shell.inner * form.covering.girth;
+        let most = (shell.outer.powi(2) - (least + LEAST_ROOM * (shell.outer - least)).powi(2)).max(0.0).sqrt();
         // All radii in question are below the outer one.
         let common = length * shell.outer + SHIFT * band;
         let keeper = joint.iter().filter(|end| deficit(end) == least).min_by_key(|end| (end.end.is_some(), end.site)).map(|end| end.site);

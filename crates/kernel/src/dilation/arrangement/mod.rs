@@ -5,6 +5,7 @@
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does.
 
 mod bodies;
+mod covering;
 mod facets;
 mod figure;
 mod form;
@@ -14,6 +15,7 @@ mod joints;
 mod nerve;
 mod pieces;
 mod polytopes;
+mod structure;
 #[cfg(test)]
 mod tests;
 mod triangulate;
@@ -24,13 +26,14 @@ use super::tree::{Candidates, Weighted};
 use crate::attractor::cell::{Cell, ControlPoint, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
+use rayon::prelude::*;
 use bodies::{Bodies, Common};
 use figure::Figure;
 use form::Form;
 use nerve::{Doubt, Sets};
 use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
 /// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
@@ -114,8 +117,6 @@ impl<'a> Arrangement<'a> {
 
     /// About how many triangles will be made, from a sample of the polytopes; infinitely many where there is no polytope.
     ///
-    /// As all vertices have three edges, there are twice as many triangles as vertices, and pieces three times as many: an edge has one on both its facets.
-    ///
     /// # Errors
     /// [`Stopped`].
     fn expected_triangles(&self, budget: &Budget) -> Result<f64, Stopped> {
@@ -126,8 +127,8 @@ impl<'a> Arrangement<'a> {
         let count = self.sites.list.len();
         let step = count.div_ceil(SAMPLE).max(1);
         let sample: Vec<u32> = (0..count as u32).step_by(step).collect();
-        let pieces = pieces::count(&engine.polytopes, &self.near, &sample);
-        Ok(pieces as f64 / 1.5 * count as f64 / sample.len() as f64)
+        let triangles = pieces::count(&engine.polytopes, &self.near, &sample);
+        Ok(triangles as f64 * count as f64 / sample.len() as f64)
     }
 
     /// The boundary of the union of polytopes; `None` where none could be found.
@@ -153,12 +154,12 @@ impl<'a> Arrangement<'a> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
         let Self { setting, beyond, near, forms, .. } = self;
-        Engine { setting, sites, beyond, near, forms, cut_forms: Vec::new(), polytopes: Polytopes::default(), states, trial }
+        Engine { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), states, trial }
     }
 }
 
 /// Triangles of a polytope that nothing is near to: with more sites than memory has room for that many, polytopes are not even begun.
-const LEAST_TRIANGLES: f64 = 48.0;
+const LEAST_TRIANGLES: f64 = 24.0;
 
 /// All sites of an attractor.
 #[derive(Default)]
@@ -217,9 +218,8 @@ struct State {
 }
 
 impl State {
-    /// The index of its form, cut at some ends.
-    fn form(self, cut: [bool; 2]) -> usize {
-        4 * (2 * self.level as usize + usize::from(self.side != Side::Both)) + usize::from(cut[0]) + 2 * usize::from(cut[1])
+    fn number(self) -> u64 {
+        u64::from(2 * self.level) + u64::from(self.side != Side::Both)
     }
 }
 
@@ -243,13 +243,13 @@ impl Setting {
 
 /// The forms of an arrangement by their states, and where there is none: to look for one takes as long as hundreds of polytopes, so it is done once.
 #[derive(Default)]
-struct Forms([[OnceLock<Option<Arc<Form>>>; 2]; LEVELS as usize]);
+struct Forms([[OnceLock<Option<Form>>; 2]; LEVELS as usize]);
 
 impl Forms {
     /// The form for a state below [`LEVELS`].
-    fn of(&self, setting: &Setting, sites: &[Figure], state: State) -> Option<&Arc<Form>> {
+    fn of(&self, setting: &Setting, sites: &[Figure], state: State) -> Option<&Form> {
         let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)];
-        place.get_or_init(|| setting.form(sites, state).map(Arc::new)).as_ref()
+        place.get_or_init(|| setting.form(sites, state)).as_ref()
     }
 }
 
@@ -268,8 +268,6 @@ struct Engine<'a> {
     beyond: &'a [Box<[Option<f64>]>],
     near: &'a Lists,
     forms: &'a Forms,
-    /// The forms that are in use, cut and whole.
-    cut_forms: Vec<Option<Arc<Form>>>,
     polytopes: Polytopes,
     states: Vec<State>,
     trial: u64,
@@ -300,40 +298,32 @@ impl Engine<'_> {
 
     /// Makes the first polytopes; whether there are such.
     fn begin(&mut self, budget: &Budget) -> Result<bool, Stopped> {
-        for index in 0..self.sites.len() {
+        let first = |index: usize| {
             budget.cancel.check()?;
-            let Some(polytope) = self.polytope(index, State::default()) else { return Ok(false) };
-            self.polytopes.all.push(polytope);
-        }
-        Ok(true)
-    }
-
-    /// The form for a state, cut at some ends; none where none is fine enough.
-    fn form(&mut self, state: State, cut: [bool; 2]) -> Option<Arc<Form>> {
-        let own = state.form(cut);
-        if own >= self.cut_forms.len() {
-            self.cut_forms.resize_with(own + 1, || None);
-        }
-        if self.cut_forms[own].is_none() {
-            let whole = self.forms.of(self.setting, self.sites, state)?;
-            self.cut_forms[own] = Some(if cut == [false; 2] { Arc::clone(whole) } else { Arc::new(whole.cut(cut)) });
-        }
-        self.cut_forms[own].clone()
+            Ok(self.polytope(index, State::default()))
+        };
+        let all: Option<Vec<Polytope>> = (0..self.sites.len()).into_par_iter().map(first).collect::<Result<_, Stopped>>()?;
+        let is_made = all.is_some();
+        self.polytopes.all = all.unwrap_or_default();
+        Ok(is_made)
     }
 
     /// A site's polytope in a state; none where no form is fine enough.
-    fn polytope(&mut self, index: usize, state: State) -> Option<Polytope> {
+    fn polytope(&self, index: usize, state: State) -> Option<Polytope> {
         let (figure, beyond) = (&self.sites[index], &self.beyond[index]);
         let shell = self.setting.shell(figure, state);
-        let is_cut = [0, 1].map(|end| beyond[end].is_some());
-        let seed = (self.trial << 8 | state.form(is_cut) as u64) << 32 | index as u64;
+        let seed = (self.trial << 8 | state.number()) << 32 | index as u64;
         if figure.polygon().is_some() {
             // Planes may meet in a point by chance, not again and again.
             return (0..TRIALS).find_map(|trial| Polytope::around(figure, beyond, shell, seed ^ trial << 56));
         }
-        let form = self.form(state, is_cut)?;
         let most = self.setting.shell(figure, State::default()).outer;
-        Polytope::new(figure, &form, shell, Cut { beyond: [0, 1].map(|end| beyond[end].unwrap_or_default()), most }, seed)
+        let cut = Cut { beyond: [beyond[0], beyond[1]], most };
+        // Where it is cut far beyond one end alone, the other may need a finer cap.
+        (state.level..LEVELS).find_map(|level| {
+            let form = self.forms.of(self.setting, self.sites, State { level, ..state })?;
+            Polytope::new(figure, form, shell, cut, seed)
+        })
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

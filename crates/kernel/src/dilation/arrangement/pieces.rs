@@ -192,7 +192,7 @@ fn met(polytopes: &Polytopes, near: &Lists, index: u32) -> Vec<u32> {
     near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))).collect()
 }
 
-/// How many pieces some polytopes have, each edge of the union on both its facets.
+/// How many triangles of the union some polytopes have, about: a facet with k edges has k - 2, and each edge is on two.
 pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let total = polytopes.all.len();
     let (mut lists, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
@@ -208,7 +208,10 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let arrangement = Arrangement { polytopes, met: &met, hidden: &masks };
     let mut scratch = Scratch::default();
     of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
-    scratch.out.pieces.len()
+    let mut facets: Vec<u32> = scratch.out.pieces.iter().map(|piece| piece.facet).filter(|&facet| of.contains(&owner(facet).0)).collect();
+    facets.sort_unstable();
+    facets.dedup();
+    scratch.out.pieces.len() - 2 * facets.len()
 }
 
 /// Whether no facet of either polytope parts it from the other.
@@ -222,11 +225,10 @@ fn hidden(polytopes: &Polytopes, index: u32, met: &[u32]) -> Mask {
     let (structure, corners) = (polytopes.structure(index), &polytopes.of(index).corners);
     let mut hidden = Mask::default();
     for &other in met {
-        let mut seen = Mask::default();
-        for (corner, point) in structure.corners.iter().zip(corners) {
-            if !polytopes.of(other).contains(point) {
-                corner.facets.iter().for_each(|&facet| seen.add(usize::from(facet)));
-            }
+        let (mut seen, other) = (Mask::default(), polytopes.of(other));
+        let is_out: Vec<bool> = corners.iter().map(|corner| !other.contains(corner)).collect();
+        for edge in structure.edges.iter().filter(|edge| edge.corners.iter().any(|&corner| is_out[usize::from(corner)])) {
+            edge.facets.iter().for_each(|&facet| seen.add(usize::from(facet)));
         }
         (0..structure.facets).filter(|&facet| !seen.has(facet)).for_each(|facet| hidden.add(facet));
     }

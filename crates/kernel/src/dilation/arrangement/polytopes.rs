@@ -1,11 +1,17 @@
 //! The polytopes of figures: what stands for their dilations by a ball.
 
 use super::figure::{Figure, Outline};
-use super::form::{Corner, Form, MOST_FACETS, Structure, meeting};
+use super::form::{Form, Spot};
+use super::joints::unit;
+use super::structure::Structure;
 use crate::attractor::cell::{Point, cross, dot, subtract};
 use crate::split_mix;
 use std::cmp::Ordering;
+use std::f64::consts::TAU;
 use std::sync::Arc;
+
+/// Facets at most.
+pub(super) const MOST_FACETS: usize = 1024;
 
 /// A set of a polytope's facets: those that a point is beyond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,7 +71,7 @@ pub(super) fn normal(plane: &Plane) -> Point {
     [plane[0], plane[1], plane[2]]
 }
 
-/// Bits of a facet's number within its polytope, and of an edge's or a vertex's: a simple polytope with f facets has 3 f - 6 edges.
+/// Bits of a facet's number within its polytope, and of an edge's or a corner's: a polytope with f facets has 3 f - 6 edges at most.
 const FACET_BITS: u32 = MOST_FACETS.trailing_zeros();
 const EDGE_BITS: u32 = FACET_BITS + 2;
 /// Polytopes at most, so that 32 bits number all edges.
@@ -125,7 +131,7 @@ impl Shell {
 /// How far beyond its ends a polytope is cut, and how far its corners there may be from them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cut {
-    pub(super) beyond: [f64; 2],
+    pub(super) beyond: [Option<f64>; 2],
     pub(super) most: f64,
 }
 
@@ -138,14 +144,6 @@ pub(super) fn ordered(figure: &Figure) -> [Point; 2] {
     }
 }
 
-/// Whether the facets of a polytope hang together as its corners say: each of these is deeper than `least` below all planes but its own.
-pub(super) fn hang_together(corners: &[Corner], places: &[Point], planes: &[Plane], least: f64) -> bool {
-    corners.iter().zip(places).all(|(corner, place)| {
-        let mut others = planes.iter().enumerate().filter(|&(facet, _)| !corner.facets.contains(&(facet as u16)));
-        others.all(|(_, plane)| height(plane, place) < -least)
-    })
-}
-
 /// A number in [0, 1) that looks random: the seed's, with an index below 1024.
 pub(super) fn share(seed: u64, index: u64) -> f64 {
     split_mix::share(split_mix::number(seed.wrapping_mul(1024).wrapping_add(index)))
@@ -155,49 +153,74 @@ pub(super) fn share(seed: u64, index: u64) -> f64 {
 pub(super) const SHIFT: f64 = 0.08;
 /// The share of it by which facets of one polytope differ; all of them have the rest.
 pub(super) const OWN_SHIFT: f64 = 0.1;
-/// Facets are shifted against each other by this share of the shortest edge at most: the form stays what it is.
+/// Corners are shifted against each other by this share of what is the shortest edge of the polar polytope at most: the form stays what it is.
 const LEAST_EDGE: f64 = 0.1;
-/// Shifts that are tried, each a quarter of the one before: where edges are short beside the angle of their facets, the first may be too large.
+/// Shifts that are tried, each a quarter of the one before: where two facets nearly lie in a plane, the first may be too large.
 const SHIFTS: i32 = 4;
 
 impl Polytope {
-    /// The polytope of a point or a segment, with a form that lies in its shell; none where facets are too small to be shifted.
+    /// The polytope of a point or a segment, with a form that lies in its shell; none where that leaves no room to shift corners.
     ///
-    /// Facets are shifted outwards by numbers that look random, so that no four planes meet in a point but by chance: each polytope as a whole, so that facets
-    /// of neighbours which would coincide lie one above the other, and its facets against each other a little. Those where it is cut are as far beyond its ends as is said, and no
-    /// corner is farther than `most`.
-    pub(super) fn new(figure: &Figure, shape: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
+    /// Corners are shifted outwards by numbers that look random, so that no four planes of different polytopes meet in a point but by chance: each polytope as a whole, so that facets
+    /// of neighbours which would coincide lie one above the other, and its corners against each other a little. Facets where it is cut are as far beyond its ends as is said.
+    pub(super) fn new(figure: &Figure, form: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
         let ends = ordered(figure);
         let frame = frame(&subtract(&ends[1], &ends[0]));
-        let flat = |facet: usize| (0..2).find(|&end| shape.flats[end].map(usize::from) == Some(facet));
-        let mut room = (shell.outer / shape.reach - shell.inner).max(0.0);
-        for end in (0..2).filter(|&end| shape.flats[end].is_some()) {
-            room = room.min((cut.most.powi(2) - cut.beyond[end].powi(2)).max(0.0).sqrt() / shape.girth - shell.inner);
-        }
-        if room < 0.0 {
+        let is_cut = cut.beyond.map(|beyond| beyond.is_some());
+        let (covering, is_ball) = (&form.covering, ends[0] == ends[1]);
+        let shape = if is_ball { form.ball() } else { form.rod(is_cut) };
+        // Where there are no caps, it is around the inner ball if its strips are.
+        let low = shell.inner * if is_cut == [true; 2] { covering.girth } else { covering.reach };
+        let of_ring = |beyond: &f64| (cut.most.powi(2) - beyond.powi(2)).max(0.0).sqrt();
+        let room = cut.beyond.iter().flatten().map(of_ring).fold(shell.outer, f64::min) - low;
+        if room <= 0.0 {
             return None;
         }
-        let share = |index: u64| share(seed, index);
-        let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(0);
-        let own = (OWN_SHIFT * room).min(LEAST_EDGE * shape.shortest * shell.inner);
+        let share = |index: usize| share(seed, index as u64);
+        let all = low + (1.0 - OWN_SHIFT) * room * share(0);
+        // Corners of the ring are shifted out of it, too, and by more than their strips.
+        let own = (0.8 / covering.girth * OWN_SHIFT * room).min(LEAST_EDGE * covering.shortest * shell.inner);
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
+        let belt = if is_ball { 0 } else { covering.belt };
+        let across = |strip: usize| -> Point {
+            let (sine, cosine) = (TAU * (strip as f64 + 0.5) / belt as f64).sin_cos();
+            [cosine, sine, 0.0]
+        };
         let shifted = |own: f64| {
-            let offset = |facet: usize| flat(facet).map_or_else(|| all + own * share(1 + facet as u64), |end| cut.beyond[end]);
-            let plane = |(facet, (normal, &end)): (usize, (&Point, &usize))| {
-                let normal = turned(normal);
-                [normal[0], normal[1], normal[2], offset(facet) + dot(&normal, &ends[end])]
+            let of_strip = |strip: usize| all / covering.girth + own * share(1 + strip);
+            // From the end that they are at.
+            let corner = |(corner, spot): (usize, &Spot)| {
+                let shift = own * share(1 + belt + corner);
+                if corner >= 2 * belt {
+                    return Some(turned(&covering.directions[spot.direction].map(|x| (all + shift) * x)));
+                }
+                let (before, after, out) = ((spot.direction + belt - 1) % belt, spot.direction, [-1.0, 1.0][spot.end]);
+                let offsets = [of_strip(before), of_strip(after), cut.beyond[spot.end].unwrap_or(shift)];
+                Some(turned(&meeting([&across(before), &across(after), &[0.0, 0.0, out]], offsets)?))
             };
-            let planes: Box<[Plane]> = shape.normals.iter().zip(&shape.ends).enumerate().map(plane).collect();
-            let corner = |corner: &Corner| {
-                let facets = corner.facets.map(usize::from);
-                let at = turned(&meeting(facets.map(|facet| &shape.normals[facet]), facets.map(offset))?);
-                Some(std::array::from_fn(|axis| ends[corner.end][axis] + at[axis]))
+            let from_ends: Vec<Point> = shape.corners.iter().enumerate().map(corner).collect::<Option<_>>()?;
+            let plane = |facet: usize| {
+                let end = shape.ends[facet];
+                let (normal, offset) = if facet < belt {
+                    (turned(&across(facet)), of_strip(facet))
+                } else if let Some(flat) = (0..2).find(|&end| shape.flats[end] == Some(facet)) {
+                    (turned(&[0.0, 0.0, [-1.0, 1.0][flat]]), cut.beyond[flat]?)
+                } else {
+                    let [a, b, c] = [0, 1, 2].map(|place| &from_ends[usize::from(shape.facets[facet][place])]);
+                    let normal = unit(&cross(&subtract(b, a), &subtract(c, a)));
+                    (normal, dot(&normal, a))
+                };
+                // Within the dilation by the inner radius nothing is cut off but by flats.
+                let is_around = shape.flats.contains(&Some(facet)) || offset + dot(&normal, &subtract(&ends[end], &ends[1 - end])).min(0.0) >= shell.inner;
+                is_around.then(|| [normal[0], normal[1], normal[2], offset + dot(&normal, &ends[end])])
             };
-            let corners: Box<[Point]> = shape.structure.corners.iter().map(corner).collect::<Option<_>>()?;
-            hang_together(&shape.structure.corners, &corners, &planes, 0.0).then_some((planes, corners))
+            let planes: Box<[Plane]> = (0..shape.facets.len()).map(plane).collect::<Option<_>>()?;
+            let at = |(spot, from): (&Spot, &Point)| std::array::from_fn(|axis| ends[spot.end][axis] + from[axis]);
+            let corners: Box<[Point]> = shape.corners.iter().zip(&from_ends).map(at).collect();
+            shape.structure.is_convex(&planes, &corners, 0.0).then_some((planes, corners))
         };
         let (planes, corners) = (0..SHIFTS).find_map(|number| shifted(own * 0.25_f64.powi(number)))?;
-        let cuts = shape.flats.iter().flatten().map(|&facet| planes[usize::from(facet)]).collect();
+        let cuts = shape.flats.iter().flatten().map(|&facet| planes[facet]).collect();
         Some(Self::with(Arc::clone(&shape.structure), planes, cuts, corners))
     }
 
@@ -259,6 +282,18 @@ impl Polytopes {
         &self.of(index).planes[facet]
     }
 }
+
+/// The point on three planes n . x = c, if there is one to speak of.
+pub(super) fn meeting(normals: [&Point; 3], offsets: [f64; 3]) -> Option<Point> {
+    let [a, b, c] = normals;
+    let dual = [cross(b, c), cross(c, a), cross(a, b)];
+    let determinant = dot(a, &dual[0]);
+    (determinant.abs() > LEAST_DETERMINANT)
+        .then(|| std::array::from_fn(|axis| (0..3).map(|k| offsets[k] * dual[k][axis]).sum::<f64>() / determinant))
+}
+
+/// See [`meeting`].
+const LEAST_DETERMINANT: f64 = 1e-9;
 
 /// An orthonormal frame whose last vector is along a direction. No plane that a model is likely to have holds another of them.
 pub(super) fn frame(direction: &Point) -> [Point; 3] {

@@ -1,0 +1,71 @@
+//! How the facets of a polytope hang together.
+
+use super::polytopes::{Mask, Plane, height, normal};
+use crate::attractor::cell::{Point, cross, dot, subtract};
+
+/// The edges of a polytope, and how many facets and corners it has.
+#[derive(Debug)]
+pub(super) struct Structure {
+    pub(super) facets: usize,
+    pub(super) corners: usize,
+    pub(super) edges: Vec<Edge>,
+}
+
+/// An edge.
+#[derive(Debug)]
+pub(super) struct Edge {
+    /// From the first corner to the second,
+    pub(super) corners: [u16; 2],
+    /// counter-clockwise on the first facet seen from outside, clockwise on the second.
+    pub(super) facets: [u16; 2],
+}
+
+impl Structure {
+    /// That of a polytope whose facets have these corners, counter-clockwise seen from outside; none where they do not close, or not to a sphere.
+    pub(super) fn closed(facets: &[Vec<u16>], corners: usize) -> Option<Self> {
+        let mut sides = Vec::new();
+        for (facet, around) in (0..).zip(facets) {
+            let next = around.iter().skip(1).chain(around.first());
+            sides.extend(around.iter().zip(next).map(|(&from, &to)| ([from.min(to), from.max(to)], from > to, facet)));
+        }
+        sides.sort_unstable();
+        let edge = |pair: &[([u16; 2], bool, u16)]| match *pair {
+            [(corners, false, left), (_, true, right)] => Some(Edge { corners, facets: [left, right] }),
+            _ => None,
+        };
+        let edges = sides.chunk_by(|a, b| a.0 == b.0).map(edge).collect::<Option<Vec<_>>>()?;
+        (corners + facets.len() == edges.len() + 2).then_some(Self { facets: facets.len(), corners, edges })
+    }
+
+    /// That of a simple polytope, of whose corners each is on three planes: edges join those that have two in common. None where something is missing.
+    pub(super) fn simple(planes: &[Plane], corners: &[[u16; 3]], places: &[Point]) -> Option<Self> {
+        let mut edges = Vec::new();
+        for (p, one) in corners.iter().enumerate() {
+            for (q, other) in corners.iter().enumerate().skip(p + 1) {
+                let mut common = one.iter().copied().filter(|facet| other.contains(facet));
+                let (Some(first), Some(second)) = (common.next(), common.next()) else { continue };
+                let along = subtract(&places[q], &places[p]);
+                let left = cross(&normal(&planes[usize::from(first)]), &along);
+                // The facet lies to the left of its edges.
+                let is_left = dot(&left, &normal(&planes[usize::from(second)])) < 0.0;
+                edges.push(Edge { corners: [p as u16, q as u16], facets: if is_left { [first, second] } else { [second, first] } });
+            }
+        }
+        let structure = Self { facets: planes.len(), corners: corners.len(), edges };
+        let is_whole = 2 * structure.edges.len() == 3 * corners.len() && corners.len() + planes.len() == structure.edges.len() + 2;
+        is_whole.then_some(structure)
+    }
+
+    /// Whether all corners are deeper than `least` below all planes but those of their own facets: then the polytope is what is below all planes.
+    pub(super) fn is_convex(&self, planes: &[Plane], places: &[Point], least: f64) -> bool {
+        let mut own = vec![Mask::default(); self.corners];
+        for edge in &self.edges {
+            for corner in edge.corners {
+                edge.facets.iter().for_each(|&facet| own[usize::from(corner)].add(usize::from(facet)));
+            }
+        }
+        own.iter().zip(places).all(|(own, place)| {
+            planes.iter().enumerate().all(|(facet, plane)| height(plane, place) < -least || own.has(facet))
+        })
+    }
+}
