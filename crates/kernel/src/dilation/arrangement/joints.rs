@@ -60,8 +60,8 @@ pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> She
             f64::INFINITY
         };
         let band = shell.outer - shell.inner;
-        let least = shell.inner * form.covering.girth;
-        let most = (shell.outer.powi(2) - (least + LEAST_ROOM * (shell.outer - least)).powi(2)).max(0.0).sqrt();
+        let ring = shell.inner * form.covering.girth;
+        let most = (shell.outer.powi(2) - (ring + LEAST_ROOM * (shell.outer - ring)).powi(2)).max(0.0).sqrt();
         // All radii in question are below the outer one.
         let common = length * shell.outer + SHIFT * band;
         let keeper = joint.iter().filter(|end| deficit(end) == least).min_by_key(|end| (end.end.is_some(), end.site)).map(|end| end.site);
