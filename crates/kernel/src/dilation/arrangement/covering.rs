@@ -1,7 +1,10 @@
 //! Directions by which a sphere is covered: none is farther from all of them than an angle.
+//!
+//! They lie in rows across an axis. Between two rows there is a strip of triangles, none of whose circles may be larger than that angle: so row after row is as far from the last one as that allows, and what is searched for is
+//! how many directions each has. The best coverings with many directions have FEWEST / (1 - cos angle) of them; rows that change their number take a tenth more.
 
-use super::polytopes::meeting;
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
+use crate::dilation::arrangement::joints::unit;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Directions, and the triangles between them: the hull of the unit vectors, around the ball with radius 1 / reach. It is symmetric about the plane across its axis, z. Those across the axis form its belt, and come first; no triangle
@@ -21,171 +24,234 @@ pub(super) struct Covering {
     pub(super) girth: f64,
 }
 
-/// Directions, times 1 - 1 / reach, of the best coverings with many (Fejes Toth, 1953): their caps cover a sphere 1.21 times.
+/// Directions, times 1 - cos angle, of the best coverings with many (Fejes Toth, 1953): their caps cover a sphere 1.21 times.
 const FEWEST: f64 = 2.42;
-/// Rows above the belt, beyond a sixth of its directions, directions in them as shares of the belt's density, and how far each is turned from the one below it, in its directions, that are tried.
-const ROWS: usize = 6;
-const DENSITIES: [f64; 10] = [0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15];
-const TURNS: [f64; 2] = [0.5, 0.38];
-/// Rounding of unit vectors, far below any edge.
+/// Belts that are tried have up to so many directions more than they must.
+const WIDER: usize = 3;
+/// Beginnings of a covering that are gone on with, of all that have as many rows.
+const BEGINNINGS: usize = 8;
+/// How many directions more or less than in proportion to its length the next row has.
+const SPREAD: usize = 2;
+/// Steps, and halvings of one, by which the farthest next row is looked for.
+const STEPS: usize = 24;
+const HALVINGS: usize = 14;
+/// How a row is turned against the one before, as a share of the turn by which both look the same again: no two triangles lie in a plane.
+const TURNS: [f64; 4] = [0.11, 0.36, 0.61, 0.86];
+/// How far a fourth direction is from the plane of three at least.
+const LEAST_HEIGHT: f64 = 1e-5;
+/// Rounding of unit vectors.
 const ROUNDING: f64 = 1e-9;
-/// A hole is seen where the farthest direction is by this more than it may be, in its cosine: far above rounding.
-const SEEN: f64 = 1e-7;
-/// What [`ROUNDING`] makes of the cosine of an angle between directions, at most, with room to spare.
-const AROUND: f64 = 1e-6;
 
 impl Covering {
-    /// The one with the fewest directions, of those that are tried and have no more than `limit`, whose hull is around the ball with radius 1 / `most`.
+    /// One with few directions, no more than `limit`, whose hull is around the ball with radius 1 / `most`.
     pub(super) fn within(most: f64, limit: usize) -> Option<Self> {
         let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
-        let fewest = (FEWEST / (1.0 - 1.0 / most)) as usize;
-        let mut patterns: Vec<(usize, Pattern)> = Pattern::all(least).map(|pattern| (pattern.count(), pattern)).collect();
-        patterns.retain(|(count, _)| (fewest..=limit).contains(count));
         // Facets along a segment are crossed by more others.
-        patterns.sort_by_key(|&(count, pattern)| count + 2 * pattern.belt);
-        patterns.iter().find_map(|(_, pattern)| Self::new(pattern, most))
+        let best = (least..=least + WIDER).filter_map(|belt| Rows::around(belt, most, limit)).min_by_key(|rows| rows.count + 2 * rows.list[0].count)?;
+        Self::of(&best, most)
     }
 
-    /// The covering with a pattern, if all facets of its hull are triangles, none of them along the axis, and no nearer than 1 / `most`: of its polar polytope, all corners have three facets, and lie within `most`.
-    fn new(pattern: &Pattern, most: f64) -> Option<Self> {
-        let (directions, ends) = pattern.directions();
-        if pattern.leaves_a_hole(&directions, most) {
-            return None;
-        }
-        let count = directions.len();
-        // Facets that meet in a corner within `most` are no farther from each other than this.
-        let widest = 2.0 / (most * most) - 1.0 - ROUNDING;
-        let (mut corners, mut triangles) = (Vec::new(), Vec::new());
-        for a in 0..count {
-            let near: Vec<usize> = (a + 1..count).filter(|&b| dot(&directions[a], &directions[b]) > widest).collect();
-            // Whatever reaches a corner of the facet within `most`, rounding included, is among these.
-            let around: Vec<&Point> = directions.iter().filter(|other| dot(&directions[a], other) > widest - AROUND).collect();
-            for (place, &b) in near.iter().enumerate() {
-                for &c in &near[place + 1..] {
-                    let corner = meeting([&directions[a], &directions[b], &directions[c]], [1.0; 3]);
-                    let Some(corner) = corner else { continue };
-                    if around.iter().any(|other| dot(other, &corner) > 1.0 + ROUNDING) {
-                        continue;
-                    }
-                    if dot(&corner, &corner) > most * most {
-                        if directions.iter().any(|other| dot(other, &corner) > 1.0 + ROUNDING) {
-                            continue;
-                        }
-                        return None;
-                    }
-                    let on = around.iter().filter(|other| dot(other, &corner) > 1.0 - ROUNDING).count();
-                    if on != 3 || corner[2].abs() < ROUNDING.sqrt() {
-                        return None;
-                    }
-                    let turned = cross(&subtract(&directions[b], &directions[a]), &subtract(&directions[c], &directions[a]));
-                    let triangle = if dot(&turned, &corner) > 0.0 { [a, b, c] } else { [a, c, b] };
-                    triangles.push(triangle.map(|corner| corner as u16));
-                    corners.push(corner);
-                }
+    fn of(rows: &Rows, most: f64) -> Option<Self> {
+        let belt = rows.list[0].count;
+        let mut directions: Vec<Point> = (0..belt).map(|place| rows.list[0].direction(place)).collect();
+        let mut ends = vec![0; belt];
+        // Where the directions of every row start: the one above first, then its mirror image.
+        let mut starts = vec![[0; 2]];
+        for row in &rows.list[1..] {
+            starts.push([directions.len(), directions.len() + row.count]);
+            for end in [1, 0] {
+                directions.extend((0..row.count).map(|place| row.direction(place)).map(|[x, y, z]| [x, y, if end == 1 { z } else { -z }]));
+                ends.extend(vec![end; row.count]);
             }
         }
-        // All of the sphere.
-        if triangles.len() + 4 != 2 * count {
+        let mut triangles: Vec<[u16; 3]> = Vec::new();
+        let mut add = |corners: [[usize; 2]; 3]| {
+            let [upper, lower] = [0, 1].map(|side| corners.map(|[row, place]| (starts[row][side] + place) as u16));
+            triangles.extend([upper, [lower[0], lower[2], lower[1]]]);
+        };
+        for (number, pair) in rows.list.windows(2).enumerate() {
+            strip(&pair[0], &pair[1], most, |corners| add(corners.map(|(row, place)| [number + row, place])));
+        }
+        if rows.list.last().is_some_and(|row| row.count == 3) {
+            add([0, 1, 2].map(|place| [rows.list.len() - 1, place]));
+        }
+        let normals: Vec<(Point, f64)> = triangles.iter().map(|corners| plane(corners.map(|corner| &directions[usize::from(corner)]))).collect();
+        let is_hull = normals.iter().zip(&triangles).all(|((normal, offset), corners)| {
+            (0..).zip(&directions).all(|(number, direction)| corners.contains(&number) || dot(normal, direction) < offset - ROUNDING)
+        });
+        let nearest = normals.iter().map(|&(_, offset)| offset).fold(f64::INFINITY, f64::min);
+        if !is_hull || triangles.len() + 4 != 2 * directions.len() || nearest * most < 1.0 - ROUNDING {
             return None;
         }
+        let polar: Vec<Point> = normals.iter().map(|(normal, offset)| normal.map(|x| x / offset)).collect();
         let are_joined = |p: usize, q: usize| triangles[p].iter().filter(|corner| triangles[q].contains(corner)).count() == 2;
         let pairs = (0..triangles.len()).flat_map(|p| (p + 1..triangles.len()).map(move |q| (p, q)));
-        let lengths = pairs.filter(|&(p, q)| are_joined(p, q)).map(|(p, q)| distance_squared(&corners[p], &corners[q]));
+        let lengths = pairs.filter(|&(p, q)| are_joined(p, q)).map(|(p, q)| distance_squared(&polar[p], &polar[q]));
         let shortest = lengths.fold(f64::INFINITY, f64::min).sqrt();
-        let reach = corners.iter().map(|corner| dot(corner, corner).sqrt()).fold(0.0, f64::max) * (1.0 + ROUNDING);
-        let girth = (PI / pattern.belt as f64).cos().recip() * (1.0 + ROUNDING);
-        Some(Self { directions, ends, belt: pattern.belt, triangles, reach, shortest, girth })
+        let [reach, girth] = [nearest, (PI / belt as f64).cos()].map(|distance| (1.0 + ROUNDING) / distance);
+        Some(Self { directions, ends, belt, triangles, reach, shortest, girth })
     }
 }
 
-/// A belt of directions, and rows of them above and below it.
-#[derive(Clone, Copy)]
-struct Pattern {
-    /// Directions of the belt.
-    belt: usize,
-    rows: usize,
-    /// Directions along the rows over those along the belt, for the same length.
-    density: f64,
-    /// Whether the last row is one direction, along the axis.
-    is_closed: bool,
+/// Directions across the axis by one angle.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    /// How far above the belt, in radians.
+    latitude: f64,
+    count: usize,
+    /// Where its first direction is, in radians.
     turn: f64,
 }
 
-impl Pattern {
-    /// Those that are tried, with as many directions in the belt or up to twice as many.
-    fn all(least: usize) -> impl Iterator<Item = Self> {
-        (least..2 * least).flat_map(|belt| {
-            let fewest = (belt / 6).max(1);
-            (fewest..fewest + ROWS + belt / 4).flat_map(move |rows| {
-                DENSITIES.into_iter().flat_map(move |density| {
-                    [true, false].into_iter().flat_map(move |is_closed| TURNS.map(|turn| Self { belt, rows, density, is_closed, turn }))
-                })
-            })
-        })
-    }
-
-    /// The sine and cosine of a row's latitude, and its directions.
-    fn row(&self, row: usize) -> (f64, f64, usize) {
-        let spacing = FRAC_PI_2 / (self.rows as f64 + if self.is_closed { 0.0 } else { 0.5 });
-        let (up, out) = (spacing * row as f64).sin_cos();
-        let count = if row == self.rows && self.is_closed { 1 } else { ((self.belt as f64 * out * self.density).round() as usize).max(3) };
-        (up, out, count)
-    }
-
-    fn count(&self) -> usize {
-        self.belt + 2 * (1..=self.rows).map(|row| self.row(row).2).sum::<usize>()
-    }
-
-    /// Directions, the belt's first, and the ends they are at.
-    fn directions(&self) -> (Vec<Point>, Vec<usize>) {
-        let (mut directions, mut ends) = (Vec::new(), Vec::new());
-        for place in 0..self.belt {
-            let (sine, cosine) = (TAU * place as f64 / self.belt as f64).sin_cos();
-            directions.push([cosine, sine, 0.0]);
-            ends.push(0);
-        }
-        for row in 1..=self.rows {
-            let (up, out, count) = self.row(row);
-            for place in 0..count {
-                let (sine, cosine) = (TAU * (place as f64 + self.turn * row as f64) / count as f64).sin_cos();
-                for end in [1, 0] {
-                    directions.push([cosine * out, sine * out, if end == 1 { up } else { -up }]);
-                    ends.push(end);
-                }
-            }
-        }
-        (directions, ends)
-    }
-
-    /// Whether somewhere none surely comes within the angle whose cosine is 1 / most. Looked for between two neighbours of a row and one of the next or of the last one, as most patterns that do not serve show.
-    fn leaves_a_hole(&self, directions: &[Point], most: f64) -> bool {
-        let mut start = self.belt;
-        let mut below: Vec<Point> = directions[..self.belt].to_vec();
-        for row in 1..=self.rows {
-            let count = self.row(row).2;
-            let above: Vec<Point> = directions[start..start + 2 * count].iter().step_by(2).copied().collect();
-            start += 2 * count;
-            if [(&below, &above), (&above, &below)].into_iter().any(|(pairs, thirds)| is_open(pairs, thirds, directions, most)) {
-                return true;
-            }
-            below = above;
-        }
-        !self.is_closed && below[0][2] < 1.0 / most - SEEN
+impl Row {
+    fn direction(&self, place: usize) -> Point {
+        let (up, out) = self.latitude.sin_cos();
+        let (sine, cosine) = (self.turn + TAU * place as f64 / self.count as f64).sin_cos();
+        if self.count == 1 { [0.0, 0.0, 1.0] } else { [cosine * out, sine * out, up] }
     }
 }
 
-/// Whether the direction between two neighbours of a ring and the nearest of another one is far from all.
-fn is_open(pairs: &[Point], thirds: &[Point], directions: &[Point], most: f64) -> bool {
-    if pairs.len() < 2 {
-        return false;
-    }
-    (0..pairs.len()).any(|place| {
-        let (a, b) = (&pairs[place], &pairs[(place + 1) % pairs.len()]);
-        let middle: Point = std::array::from_fn(|axis| a[axis] + b[axis]);
-        let Some(third) = thirds.iter().max_by(|p, q| dot(p, &middle).total_cmp(&dot(q, &middle))) else { return false };
-        let Some(vertex) = meeting([a, b, third], [1.0; 3]) else { return false };
-        let length = dot(&vertex, &vertex).sqrt();
-        length > most && directions.iter().all(|direction| dot(direction, &vertex) < (1.0 / most - SEEN) * length)
-    })
+/// Rows from the belt upwards.
+#[derive(Clone, Debug)]
+struct Rows {
+    list: Vec<Row>,
+    /// Directions, those of the mirror image included.
+    count: usize,
 }
 
+impl Rows {
+    /// Those with the fewest directions that were found for a belt, from the belt to the pole.
+    fn around(belt: usize, most: f64, limit: usize) -> Option<Self> {
+        let mut open = vec![Self { list: vec![Row { latitude: 0.0, count: belt, turn: 0.0 }], count: belt }];
+        let mut best: Option<Self> = None;
+        // Directions that a row may be thought to need above it.
+        let rest = |rows: &Self| FEWEST / (1.0 - 1.0 / most) * (1.0 - rows.last().latitude.sin());
+        while !open.is_empty() {
+            let fewest = best.as_ref().map_or(limit + 1, |best| best.count);
+            let next = open.iter().flat_map(|rows| rows.longer(most)).filter(|rows| rows.count < fewest);
+            let (closed, mut longer): (Vec<Self>, Vec<Self>) = next.partition(|rows| rows.is_closed(most));
+            best = best.into_iter().chain(closed).min_by_key(|rows| rows.count);
+            longer.sort_by(|a, b| (a.count as f64 + rest(a)).total_cmp(&(b.count as f64 + rest(b))));
+            longer.truncate(BEGINNINGS);
+            open = longer;
+        }
+        best
+    }
+
+    fn last(&self) -> &Row {
+        &self.list[self.list.len() - 1]
+    }
+
+    /// Whether nothing is left above the last row.
+    fn is_closed(&self, most: f64) -> bool {
+        let Row { latitude, count, .. } = *self.last();
+        count == 1 || (count == 3 && latitude.sin() * most >= 1.0)
+    }
+
+    /// The same with one row more, as far up as may be, for several numbers of its directions.
+    fn longer(&self, most: f64) -> Vec<Self> {
+        let from = *self.last();
+        let with = |row: Row| {
+            let mut longer = self.clone();
+            longer.list.push(row);
+            longer.count += 2 * row.count;
+            longer
+        };
+        let pole = Row { latitude: FRAC_PI_2, count: 1, turn: 0.0 };
+        if strip(&from, &pole, most, |_| {}) {
+            return vec![with(pole)];
+        }
+        let angle = (1.0 / most).acos();
+        let share = (from.latitude + 1.5 * angle).min(FRAC_PI_2).cos() / from.latitude.cos();
+        let usual = (from.count as f64 * share).round() as usize;
+        let counts = usual.saturating_sub(SPREAD).max(3)..=(usual + 2 * SPREAD).min(from.count + 1);
+        let rows = counts.flat_map(|count| {
+            let again = TAU * greatest_divisor(from.count, count) as f64 / (from.count * count) as f64;
+            TURNS.map(|turn| Row { latitude: 0.0, count, turn: from.turn + turn * again })
+        });
+        let farthest = |row: Row| {
+            let at = |step: f64| Row { latitude: from.latitude + (FRAC_PI_2 - from.latitude).min(2.0 * angle) * step, ..row };
+            let may = |step: f64| strip(&from, &at(step), most, |_| {});
+            let first = (1..STEPS).rev().map(|step| step as f64 / STEPS as f64).find(|&step| may(step))?;
+            let (mut low, mut high) = (first, first + 1.0 / STEPS as f64);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if may(middle) { low = middle } else { high = middle }
+            }
+            Some(with(at(low)))
+        };
+        rows.filter_map(farthest).collect()
+    }
+}
+
+fn greatest_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { greatest_divisor(b, a % b) }
+}
+
+/// The unit normal of the plane through three points, and its distance from the origin.
+fn plane([a, b, c]: [&Point; 3]) -> (Point, f64) {
+    let normal = unit(&cross(&subtract(b, a), &subtract(c, a)));
+    (normal, dot(&normal, a))
+}
+
+/// The triangles between two rows, of no four of which the circles of three have the fourth inside, counter-clockwise seen from outside: of every corner, which row it is in, and its place. False, and not all of them, where one is too large, or two of them lie nearly in a plane.
+fn strip(lower: &Row, upper: &Row, most: f64, mut visit: impl FnMut([(usize, usize); 3])) -> bool {
+    let (first, start) = (lower.direction(0), Point::default());
+    let nearest = |a: &usize, b: &usize| {
+        let [a, b] = [a, b].map(|&place| distance_squared(&upper.direction(place), &first));
+        a.total_cmp(&b)
+    };
+    let begin = (0..upper.count).min_by(nearest).unwrap_or_default();
+    let (mut low, mut high) = (0, 0);
+    let mut ends = [first, if upper.count > 0 { upper.direction(begin) } else { start }];
+    let rises = if upper.count == 1 { 0 } else { upper.count };
+    while low < lower.count || high < rises {
+        let [from, to] = [(low % lower.count), (begin + high) % upper.count];
+        let [after, above] = [(from + 1) % lower.count, (to + 1) % upper.count];
+        let [next, over] = [lower.direction(after), upper.direction(above)];
+        let (normal, offset) = plane([&ends[0], &next, &ends[1]]);
+        let height = dot(&normal, &over) - offset;
+        let is_low = high == rises || (low < lower.count && height < 0.0);
+        if low < lower.count && high < rises && height.abs() < LEAST_HEIGHT {
+            return false;
+        }
+        let corners = if is_low { [(0, from), (0, after), (1, to)] } else { [(0, from), (1, above), (1, to)] };
+        let offset = if is_low { offset } else { plane([&ends[0], &over, &ends[1]]).1 };
+        if offset * most < 1.0 {
+            return false;
+        }
+        visit(corners);
+        if is_low {
+            (ends[0], low) = (next, low + 1);
+        } else {
+            (ends[1], high) = (over, high + 1);
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coverings_leave_no_hole_and_have_few_directions() {
+        for most in [1.9, 1.5, 1.2, 1.1, 1.05, 1.02, 1.01] {
+            let Some(covering) = Covering::within(most, 1000) else { panic!("{most}") };
+            let count = covering.directions.len();
+            let fewest = FEWEST / (1.0 - 1.0 / most);
+            println!("{most}: {count} of {fewest:.1}, belt {} shortest {}", covering.belt, covering.shortest);
+            assert!(covering.reach <= most * (1.0 + 1e-6) && covering.girth <= most, "{most}");
+            assert!((count as f64) < 1.25 * fewest + 2.0, "{most}: {count} directions");
+            assert!(covering.shortest > 1e-4, "{most}: {}", covering.shortest);
+            // Whatever looks in between is near to one.
+            let mut random = crate::split_mix::Random(5);
+            for _ in 0..4000 {
+                let any = unit(&std::array::from_fn(|_| random.share() + random.share() + random.share() - 1.5));
+                let nearest = covering.directions.iter().map(|direction| dot(direction, &any)).fold(-1.0, f64::max);
+                assert!(nearest * most > 1.0 - 1e-6, "{most}: {any:?}");
+            }
+        }
+        assert!(Covering::within(1.01, 100).is_none());
+    }
+}

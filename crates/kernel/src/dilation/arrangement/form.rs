@@ -107,3 +107,28 @@ impl Shape {
         Some(Self { corners, facets, ends, structure, flats })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_run_along_the_axis_and_all_else_stays_at_its_end() {
+        for most in [1.9, 1.22, 1.05] {
+            let Some(form) = Form::within(most) else { panic!("{most}") };
+            let (belt, count) = (form.covering.belt, form.covering.directions.len());
+            assert_eq!(form.ball().facets.len() + 4, 2 * count);
+            for (number, shape) in form.rods.iter().enumerate() {
+                let caps = 2 - number.count_ones() as usize;
+                assert_eq!(shape.facets.len(), belt + caps * (count - 2) + (2 - caps));
+                assert_eq!(shape.flats.iter().flatten().count(), 2 - caps);
+                for edge in &shape.structure.edges {
+                    let ends = edge.corners.map(|corner| shape.corners[usize::from(corner)].end);
+                    let are_strips = edge.facets.iter().all(|&facet| usize::from(facet) < belt);
+                    assert_eq!(ends[0] != ends[1], are_strips);
+                }
+            }
+        }
+        assert!(Form::within(1.001).is_none());
+    }
+}

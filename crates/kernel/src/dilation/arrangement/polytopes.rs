@@ -146,7 +146,19 @@ pub(super) fn ordered(figure: &Figure) -> [Point; 2] {
 
 /// A number in [0, 1) that looks random: the seed's, with an index below 1024.
 pub(super) fn share(seed: u64, index: u64) -> f64 {
-    split_mix::share(split_mix::number(seed.wrapping_mul(1024).wrapping_add(index)))
+    split_mix::share(bits(seed, index))
+}
+
+fn bits(seed: u64, index: u64) -> u64 {
+    split_mix::number(seed.wrapping_mul(1024).wrapping_add(index))
+}
+
+/// A way that looks random, of length 1 at most, across a direction.
+fn way_across(direction: &Point, bits: u64) -> Point {
+    let turned = [split_mix::mix(bits), split_mix::mix(!bits), split_mix::mix(bits.rotate_left(32))];
+    let any = turned.map(|bits| split_mix::share(bits) - 0.5);
+    let along = dot(&any, direction);
+    std::array::from_fn(|axis| any[axis] - along * direction[axis])
 }
 
 /// The share of the room between the balls that is left to shift facets.
@@ -161,8 +173,8 @@ const SHIFTS: i32 = 4;
 impl Polytope {
     /// The polytope of a point or a segment, with a form that lies in its shell; none where that leaves no room to shift corners.
     ///
-    /// Corners are shifted outwards by numbers that look random, so that no four planes of different polytopes meet in a point but by chance: each polytope as a whole, so that facets
-    /// of neighbours which would coincide lie one above the other, and its corners against each other a little. Facets where it is cut are as far beyond its ends as is said.
+    /// Corners are shifted by numbers that look random, so that no four planes, and no edges, of different polytopes meet in a point but by chance: each polytope as a whole outwards, so that facets
+    /// of neighbours which would coincide lie one above the other, and its corners against each other a little, out of all planes that forms have in common. Facets where it is cut are as far beyond its ends as is said.
     pub(super) fn new(figure: &Figure, form: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
         let ends = ordered(figure);
         let frame = frame(&subtract(&ends[1], &ends[0]));
@@ -177,8 +189,8 @@ impl Polytope {
             return None;
         }
         let share = |index: usize| share(seed, index as u64);
-        let all = low + (1.0 - OWN_SHIFT) * room * share(0);
-        // Corners of the ring are shifted out of it, too, and by more than their strips.
+        let all = low + OWN_SHIFT * room + (1.0 - 2.0 * OWN_SHIFT) * room * share(0);
+        // Corners of the ring are shifted by more than their strips, and the others across their directions, too.
         let own = (0.8 / covering.girth * OWN_SHIFT * room).min(LEAST_EDGE * covering.shortest * shell.inner);
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
         let belt = if is_ball { 0 } else { covering.belt };
@@ -190,9 +202,12 @@ impl Polytope {
             let of_strip = |strip: usize| all / covering.girth + own * share(1 + strip);
             // From the end that they are at.
             let corner = |(corner, spot): (usize, &Spot)| {
-                let shift = own * share(1 + belt + corner);
+                let bits = bits(seed, (1 + belt + corner) as u64);
+                let shift = own * split_mix::share(bits);
                 if corner >= 2 * belt {
-                    return Some(turned(&covering.directions[spot.direction].map(|x| (all + shift) * x)));
+                    let direction = &covering.directions[spot.direction];
+                    let across = way_across(direction, bits);
+                    return Some(turned(&std::array::from_fn(|axis| (all + shift) * direction[axis] + own * across[axis])));
                 }
                 let (before, after, out) = ((spot.direction + belt - 1) % belt, spot.direction, [-1.0, 1.0][spot.end]);
                 let offsets = [of_strip(before), of_strip(after), cut.beyond[spot.end].unwrap_or(shift)];
