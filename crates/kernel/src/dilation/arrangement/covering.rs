@@ -29,7 +29,7 @@ const FEWEST: f64 = 2.42;
 /// Belts that are tried have up to so many directions more than they must.
 const WIDER: usize = 3;
 /// Beginnings of a covering that are gone on with, of all that have as many rows.
-const BEGINNINGS: usize = 8;
+const BEGINNINGS: usize = 3;
 /// How many directions more or less than in proportion to its length the next row has.
 const SPREAD: usize = 2;
 /// Steps, and halvings of one, by which the farthest next row is looked for.
@@ -47,7 +47,9 @@ impl Covering {
     pub(super) fn within(most: f64, limit: usize) -> Option<Self> {
         let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
         // Facets along a segment are crossed by more others.
-        let best = (least..=least + WIDER).filter_map(|belt| Rows::around(belt, most, limit)).min_by_key(|rows| rows.count + 2 * rows.list[0].count)?;
+        let best = (least..=least + WIDER)
+            .filter_map(|belt| Rows::around(belt, most, limit))
+            .min_by_key(|rows| rows.count + 2 * rows.list[0].count)?;
         Self::of(&best, most)
     }
 
@@ -75,7 +77,8 @@ impl Covering {
         if rows.list.last().is_some_and(|row| row.count == 3) {
             add([0, 1, 2].map(|place| [rows.list.len() - 1, place]));
         }
-        let normals: Vec<(Point, f64)> = triangles.iter().map(|corners| plane(corners.map(|corner| &directions[usize::from(corner)]))).collect();
+        let normals: Vec<(Point, f64)> =
+            triangles.iter().map(|corners| plane(corners.map(|corner| &directions[usize::from(corner)]))).collect();
         let is_hull = normals.iter().zip(&triangles).all(|((normal, offset), corners)| {
             (0..).zip(&directions).all(|(number, direction)| corners.contains(&number) || dot(normal, direction) < offset - ROUNDING)
         });

@@ -10,14 +10,23 @@ use std::sync::Arc;
 /// Directions at most: of a segment's polytope, the facets are twice as many less four, and those of the belt.
 const MOST_DIRECTIONS: usize = 7 * MOST_FACETS / 16;
 
-/// A covering, and what polytopes have with it.
+/// A covering, and the polytopes that it makes.
 #[derive(Debug)]
 pub(super) struct Form {
     pub(super) covering: Covering,
-    ball: Shape,
-    /// Of a segment along the axis, by the ends where it is cut: neither, the first, the second, both.
-    rods: [Shape; 4],
+    /// Of a point one, of a segment along the axis four, by the ends where it is cut: neither, the first, the second, both.
+    shapes: Vec<Shape>,
 }
+
+/// What a form is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Ball,
+    Rod,
+}
+
+/// The share of the band that a rod's form leaves. Where tubes meet, corners lie all over it, and the more of it is left, the more of them are saved later; a ball by itself is best as it is.
+const LEFT_BY_RODS: f64 = 0.13;
 
 /// The corners and facets of a polytope. Of a segment's, the ring of the belt at its first end comes first, then that at its second end, and strips along it, as many as the belt has directions, are the first facets.
 #[derive(Debug)]
@@ -41,22 +50,20 @@ pub(super) struct Spot {
 
 impl Form {
     /// The one with the fewest corners whose hull, scaled by at most `most`, is around the unit ball.
-    pub(super) fn within(most: f64) -> Option<Self> {
-        let covering = Covering::within(most, MOST_DIRECTIONS)?;
-        let ball = Shape::ball(&covering)?;
-        let rod = |cut: usize| Shape::rod(&covering, [cut & 1 != 0, cut & 2 != 0]);
-        let rods = [rod(0)?, rod(1)?, rod(2)?, rod(3)?];
-        Some(Self { covering, ball, rods })
+    pub(super) fn within(most: f64, kind: Kind) -> Option<Self> {
+        if kind == Kind::Ball {
+            let covering = Covering::within(most, MOST_DIRECTIONS)?;
+            let shapes = vec![Shape::ball(&covering)?];
+            return Some(Self { covering, shapes });
+        }
+        let covering = Covering::within(1.0 + (1.0 - LEFT_BY_RODS) * (most - 1.0), MOST_DIRECTIONS)?;
+        let shapes = (0..4).map(|cut| Shape::rod(&covering, [cut & 1 != 0, cut & 2 != 0])).collect::<Option<_>>()?;
+        Some(Self { covering, shapes })
     }
 
-    /// The polytope of a point.
-    pub(super) fn ball(&self) -> &Shape {
-        &self.ball
-    }
-
-    /// The polytope of a segment, cut at some ends.
-    pub(super) fn rod(&self, cut: [bool; 2]) -> &Shape {
-        &self.rods[usize::from(cut[0]) + 2 * usize::from(cut[1])]
+    /// The polytope of a segment that is cut at some ends, or of a point.
+    pub(super) fn shape(&self, cut: [bool; 2]) -> &Shape {
+        &self.shapes[usize::from(cut[0]) + 2 * usize::from(cut[1])]
     }
 }
 
@@ -115,10 +122,10 @@ mod tests {
     #[test]
     fn strips_run_along_the_axis_and_all_else_stays_at_its_end() {
         for most in [1.9, 1.22, 1.05] {
-            let Some(form) = Form::within(most) else { panic!("{most}") };
-            let (belt, count) = (form.covering.belt, form.covering.directions.len());
-            assert_eq!(form.ball().facets.len() + 4, 2 * count);
-            for (number, shape) in form.rods.iter().enumerate() {
+            let [ball, rod] = [Kind::Ball, Kind::Rod].map(|kind| Form::within(most, kind).expect("coarse enough"));
+            assert_eq!(ball.shape([false; 2]).facets.len() + 4, 2 * ball.covering.directions.len());
+            let (belt, count) = (rod.covering.belt, rod.covering.directions.len());
+            for (number, shape) in rod.shapes.iter().enumerate() {
                 let caps = 2 - number.count_ones() as usize;
                 assert_eq!(shape.facets.len(), belt + caps * (count - 2) + (2 - caps));
                 assert_eq!(shape.flats.iter().flatten().count(), 2 - caps);
@@ -129,6 +136,6 @@ mod tests {
                 }
             }
         }
-        assert!(Form::within(1.001).is_none());
+        assert!([Kind::Ball, Kind::Rod].into_iter().all(|kind| Form::within(1.001, kind).is_none()));
     }
 }

@@ -12,7 +12,6 @@
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
 use super::figure::{Figure, Outline, order};
-use super::form::Form;
 use super::hinges;
 use super::polytopes::{Plane, Shell, ordered};
 use crate::attractor::cell::{Point, between, dot, subtract};
@@ -33,8 +32,8 @@ struct End {
     end: Option<usize>,
 }
 
-/// How far beyond its ends, in their order, every site may be cut; none where it is not. `form` is that of the polytopes that will be cut.
-pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
+/// How far beyond its ends, in their order, every site may be cut; none where it is not. The strips of their polytopes may be as near to them as the inner radius where these have corners `girth` times as far.
+pub(super) fn cuts(sites: &[Figure], girth: f64, shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
     for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
         // Zeros have two signs.
@@ -60,7 +59,7 @@ pub(super) fn cuts(sites: &[Figure], form: &Form, shell: impl Fn(&Figure) -> She
             f64::INFINITY
         };
         let band = shell.outer - shell.inner;
-        let ring = shell.inner * form.covering.girth;
+        let ring = shell.inner * girth;
         let most = (shell.outer.powi(2) - (ring + LEAST_ROOM * (shell.outer - ring)).powi(2)).max(0.0).sqrt();
         // All radii in question are below the outer one.
         let common = length * shell.outer + SHIFT * band;
@@ -124,6 +123,7 @@ pub(super) fn shift(shell: Shell, seed: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::form::{Form, Kind};
     use super::*;
     use crate::attractor::cell::{Site, distance_squared};
     use crate::dilation::tree::Weighted;
@@ -134,7 +134,7 @@ mod tests {
     fn what_is_cut_off_is_in_others() {
         let mut random = Random(11);
         let (shell, mut one_keeps, mut none_does) = (Shell { inner: 0.9, outer: 1.1 }, 0, 0);
-        let form = Form::within(shell.reach()).expect("coarse enough");
+        let girth = Form::within(shell.reach(), Kind::Rod).expect("coarse enough").covering.girth;
         for round in 0..400 {
             let mut unit = || (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
             let mut vector = || -> Point { std::array::from_fn(|_| unit()) };
@@ -154,7 +154,7 @@ mod tests {
                     Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }.into()
                 })
                 .collect();
-            let cuts = cuts(&sites, &form, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) });
+            let cuts = cuts(&sites, girth, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) });
             let centre = [5.0, -7.0, 2.0];
             let joint = |k: usize| ordered(&sites[k]).iter().position(|end| *end == centre).expect("all end there");
             let cut = (0..count).filter(|&k| cuts[k][joint(k)].is_some()).count();

@@ -26,13 +26,13 @@ use super::tree::{Candidates, Weighted};
 use crate::attractor::cell::{Cell, ControlPoint, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
-use rayon::prelude::*;
 use bodies::{Bodies, Common};
 use figure::Figure;
-use form::Form;
+use form::{Form, Kind};
 use nerve::{Doubt, Sets};
 use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
@@ -93,9 +93,14 @@ impl<'a> Arrangement<'a> {
         sites.list = figure::joined(sites.list, FLATNESS * setting.slack, budget)?;
         let shell = |figure: &Figure| setting.shell(figure, State::default());
         let forms = Forms::default();
-        let Some(form) = forms.of(setting, &sites.list, State::default()) else { return Ok(None) };
         let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
-        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, form, shell)).filter(|(beyond, _)| beyond.is_empty()) {
+        let girth = if sites.list.iter().any(|figure| figure.polygon().is_none() && polytopes::kind(figure) == Kind::Rod) {
+            let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
+            form.covering.girth
+        } else {
+            1.0
+        };
+        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, girth, shell)).filter(|(beyond, _)| beyond.is_empty()) {
             *beyond = Box::new(cut);
         }
         let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
@@ -234,22 +239,22 @@ impl Setting {
     }
 
     /// The form of polytopes for a state, which keep to one side, whichever, or to both; none where none is fine enough.
-    fn form(&self, sites: &[Figure], state: State) -> Option<Form> {
+    fn form(&self, sites: &[Figure], kind: Kind, state: State) -> Option<Form> {
         let sides: &[Side] = if state.side == Side::Both { &[Side::Both] } else { &[Side::Within, Side::Around] };
         let shells = sites.iter().flat_map(|site| sides.iter().map(|&side| self.shell(site, State { side, ..state })));
-        Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min))
+        Form::within(shells.map(Shell::reach).fold(f64::INFINITY, f64::min), kind)
     }
 }
 
 /// The forms of an arrangement by their states, and where there is none: to look for one takes as long as hundreds of polytopes, so it is done once.
 #[derive(Default)]
-struct Forms([[OnceLock<Option<Form>>; 2]; LEVELS as usize]);
+struct Forms([[[OnceLock<Option<Form>>; 2]; 2]; LEVELS as usize]);
 
 impl Forms {
     /// The form for a state below [`LEVELS`].
-    fn of(&self, setting: &Setting, sites: &[Figure], state: State) -> Option<&Form> {
-        let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)];
-        place.get_or_init(|| setting.form(sites, state)).as_ref()
+    fn of(&self, setting: &Setting, sites: &[Figure], kind: Kind, state: State) -> Option<&Form> {
+        let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)][usize::from(kind == Kind::Rod)];
+        place.get_or_init(|| setting.form(sites, kind, state)).as_ref()
     }
 }
 
@@ -321,7 +326,7 @@ impl Engine<'_> {
         let cut = Cut { beyond: [beyond[0], beyond[1]], most };
         // Where it is cut far beyond one end alone, the other may need a finer cap.
         (state.level..LEVELS).find_map(|level| {
-            let form = self.forms.of(self.setting, self.sites, State { level, ..state })?;
+            let form = self.forms.of(self.setting, self.sites, polytopes::kind(figure), State { level, ..state })?;
             Polytope::new(figure, form, shell, cut, seed)
         })
     }

@@ -1,7 +1,7 @@
 //! The polytopes of figures: what stands for their dilations by a ball.
 
 use super::figure::{Figure, Outline};
-use super::form::{Form, Spot};
+use super::form::{Form, Kind, Spot};
 use super::joints::unit;
 use super::structure::Structure;
 use crate::attractor::cell::{Point, cross, dot, subtract};
@@ -135,6 +135,12 @@ pub(super) struct Cut {
     pub(super) most: f64,
 }
 
+/// What form stands for a point or a segment.
+pub(super) fn kind(figure: &Figure) -> Kind {
+    let [first, second] = ordered(figure);
+    if first == second { Kind::Ball } else { Kind::Rod }
+}
+
 /// The ends of a point, both the same, or of a segment, in an order that does not depend on how it is stated.
 pub(super) fn ordered(figure: &Figure) -> [Point; 2] {
     match figure.outline {
@@ -165,6 +171,8 @@ fn way_across(direction: &Point, bits: u64) -> Point {
 pub(super) const SHIFT: f64 = 0.08;
 /// The share of it by which facets of one polytope differ; all of them have the rest.
 pub(super) const OWN_SHIFT: f64 = 0.1;
+/// The share of the rest by which polytopes differ as a whole: all of them are as far out as that allows, and so are chords between their corners.
+const ALL_SHIFT: f64 = 0.25;
 /// Corners are shifted against each other by this share of what is the shortest edge of the polar polytope at most: the form stays what it is.
 const LEAST_EDGE: f64 = 0.1;
 /// Shifts that are tried, each a quarter of the one before: where two facets nearly lie in a plane, the first may be too large.
@@ -179,8 +187,7 @@ impl Polytope {
         let ends = ordered(figure);
         let frame = frame(&subtract(&ends[1], &ends[0]));
         let is_cut = cut.beyond.map(|beyond| beyond.is_some());
-        let (covering, is_ball) = (&form.covering, ends[0] == ends[1]);
-        let shape = if is_ball { form.ball() } else { form.rod(is_cut) };
+        let (covering, shape) = (&form.covering, form.shape(is_cut));
         // Where there are no caps, it is around the inner ball if its strips are.
         let low = shell.inner * if is_cut == [true; 2] { covering.girth } else { covering.reach };
         let of_ring = |beyond: &f64| (cut.most.powi(2) - beyond.powi(2)).max(0.0).sqrt();
@@ -189,11 +196,11 @@ impl Polytope {
             return None;
         }
         let share = |index: usize| share(seed, index as u64);
-        let all = low + OWN_SHIFT * room + (1.0 - 2.0 * OWN_SHIFT) * room * share(0);
+        let all = low + (OWN_SHIFT + (1.0 - 2.0 * OWN_SHIFT) * (1.0 - ALL_SHIFT * share(0))) * room;
         // Corners of the ring are shifted by more than their strips, and the others across their directions, too.
         let own = (0.8 / covering.girth * OWN_SHIFT * room).min(LEAST_EDGE * covering.shortest * shell.inner);
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
-        let belt = if is_ball { 0 } else { covering.belt };
+        let belt = if ends[0] == ends[1] { 0 } else { covering.belt };
         let across = |strip: usize| -> Point {
             let (sine, cosine) = (TAU * (strip as f64 + 0.5) / belt as f64).sin_cos();
             [cosine, sine, 0.0]
@@ -226,7 +233,8 @@ impl Polytope {
                     (normal, dot(&normal, a))
                 };
                 // Within the dilation by the inner radius nothing is cut off but by flats.
-                let is_around = shape.flats.contains(&Some(facet)) || offset + dot(&normal, &subtract(&ends[end], &ends[1 - end])).min(0.0) >= shell.inner;
+                let is_around = shape.flats.contains(&Some(facet))
+                    || offset + dot(&normal, &subtract(&ends[end], &ends[1 - end])).min(0.0) >= shell.inner;
                 is_around.then(|| [normal[0], normal[1], normal[2], offset + dot(&normal, &ends[end])])
             };
             let planes: Box<[Plane]> = (0..shape.facets.len()).map(plane).collect::<Option<_>>()?;

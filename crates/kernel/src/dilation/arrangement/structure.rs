@@ -64,8 +64,8 @@ impl Structure {
                 edge.facets.iter().for_each(|&facet| own[usize::from(corner)].add(usize::from(facet)));
             }
         }
-        own.iter().zip(places).all(|(own, place)| {
-            planes.iter().enumerate().all(|(facet, plane)| height(plane, place) < -least || own.has(facet))
-        })
+        own.iter()
+            .zip(places)
+            .all(|(own, place)| planes.iter().enumerate().all(|(facet, plane)| height(plane, place) < -least || own.has(facet)))
     }
 }
