@@ -43,13 +43,12 @@ const LEAST_HEIGHT: f64 = 1e-5;
 const ROUNDING: f64 = 1e-9;
 
 impl Covering {
-    /// One with few directions, no more than `limit`, whose hull is around the ball with radius 1 / `most`.
-    pub(super) fn within(most: f64, limit: usize) -> Option<Self> {
+    /// One with few directions, no more than `limit`, whose hull is around the ball with radius 1 / `most`; those of the belt count `belt_weight` times more.
+    pub(super) fn within(most: f64, limit: usize, belt_weight: usize) -> Option<Self> {
         let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
-        // Facets along a segment are crossed by more others.
         let best = (least..=least + WIDER)
             .filter_map(|belt| Rows::around(belt, most, limit))
-            .min_by_key(|rows| rows.count + 2 * rows.list[0].count)?;
+            .min_by_key(|rows| rows.count + belt_weight * rows.list[0].count)?;
         Self::of(&best, most)
     }
 
@@ -240,7 +239,7 @@ mod tests {
     #[test]
     fn coverings_leave_no_hole_and_have_few_directions() {
         for most in [1.9, 1.5, 1.2, 1.1, 1.05, 1.02, 1.01] {
-            let Some(covering) = Covering::within(most, 1000) else { panic!("{most}") };
+            let Some(covering) = Covering::within(most, 1000, 0) else { panic!("{most}") };
             let count = covering.directions.len();
             let fewest = FEWEST / (1.0 - 1.0 / most);
             println!("{most}: {count} of {fewest:.1}, belt {} shortest {}", covering.belt, covering.shortest);
@@ -255,6 +254,6 @@ mod tests {
                 assert!(nearest * most > 1.0 - 1e-6, "{most}: {any:?}");
             }
         }
-        assert!(Covering::within(1.01, 100).is_none());
+        assert!(Covering::within(1.01, 100, 0).is_none());
     }
 }

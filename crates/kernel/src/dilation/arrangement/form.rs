@@ -10,6 +10,9 @@ use std::sync::Arc;
 /// Directions at most: of a segment's polytope, the facets are twice as many less four, and those of the belt.
 const MOST_DIRECTIONS: usize = 7 * MOST_FACETS / 16;
 
+/// How many directions a strip of a rod is worth: it is as long as the segment, and crossed by more others.
+const STRIP_WEIGHT: usize = 4;
+
 /// A covering, and the polytopes that it makes.
 #[derive(Debug)]
 pub(super) struct Form {
@@ -52,11 +55,11 @@ impl Form {
     /// The one with the fewest corners whose hull, scaled by at most `most`, is around the unit ball.
     pub(super) fn within(most: f64, kind: Kind) -> Option<Self> {
         if kind == Kind::Ball {
-            let covering = Covering::within(most, MOST_DIRECTIONS)?;
+            let covering = Covering::within(most, MOST_DIRECTIONS, 0)?;
             let shapes = vec![Shape::ball(&covering)?];
             return Some(Self { covering, shapes });
         }
-        let covering = Covering::within(1.0 + (1.0 - LEFT_BY_RODS) * (most - 1.0), MOST_DIRECTIONS)?;
+        let covering = Covering::within(1.0 + (1.0 - LEFT_BY_RODS) * (most - 1.0), MOST_DIRECTIONS, STRIP_WEIGHT)?;
         let shapes = (0..4).map(|cut| Shape::rod(&covering, [cut & 1 != 0, cut & 2 != 0])).collect::<Option<_>>()?;
         Some(Self { covering, shapes })
     }
