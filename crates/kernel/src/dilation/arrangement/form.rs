@@ -11,7 +11,7 @@ use std::sync::Arc;
 const MOST_DIRECTIONS: usize = 7 * MOST_FACETS / 16;
 
 /// How many directions a strip of a rod is worth: it is as long as the segment, and crossed by more others.
-const STRIP_WEIGHT: usize = 4;
+const STRIP_WEIGHT: usize = 2;
 
 /// A covering, and the polytopes that it makes.
 #[derive(Debug)]
