@@ -52,7 +52,7 @@ pub(super) struct Spot {
 }
 
 impl Form {
-    /// The one with the fewest corners whose hull, scaled by at most `most`, is around the unit ball.
+    /// One with few corners whose hull, scaled by at most `most`, is around the unit ball; none where that takes too many.
     pub(super) fn within(most: f64, kind: Kind) -> Option<Self> {
         if kind == Kind::Ball {
             let covering = Covering::within(most, MOST_DIRECTIONS, 0)?;

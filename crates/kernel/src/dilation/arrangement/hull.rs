@@ -24,7 +24,7 @@ struct Hull {
 impl Polytope {
     /// The polytope of a polygon in its shell; none for needles, or where facets are too many or too small.
     ///
-    /// Its facets touch the polygon's dilation by the inner radius, shifted outwards as those of [`Polytope::new`]: two along the polygon, farther out, strips along its sides, as many as keep within the outer one, and at the
+    /// Its facets touch the polygon's dilation by the inner radius, shifted outwards, all of them as a whole and a little against each other: two along the polygon, farther out, strips along its sides, as many as keep within the outer one, and at the
     /// corners one towards the farthest vertex, until none is beyond. So it lies between both dilations, where it is not cut as far beyond its sides as is said.
     pub(super) fn around(figure: &Figure, beyond: &[Option<f64>], shell: Shell, seed: u64) -> Option<Self> {
         let polygon = figure.polygon()?;

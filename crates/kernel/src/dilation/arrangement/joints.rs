@@ -32,8 +32,8 @@ struct End {
     end: Option<usize>,
 }
 
-/// How far beyond its ends, in their order, every site may be cut; none where it is not. The strips of their polytopes may be as near to them as the inner radius where these have corners `girth` times as far.
-pub(super) fn cuts(sites: &[Figure], girth: f64, shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
+/// How far beyond its ends, in their order, every site may be cut; none where it is not. Polytopes that are cut at both ends are around the inner ball where their corners are `girth` times as far, others where they are `reach` times as far.
+pub(super) fn cuts(sites: &[Figure], [reach, girth]: [f64; 2], shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
     for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
         // Zeros have two signs.
@@ -45,9 +45,14 @@ pub(super) fn cuts(sites: &[Figure], girth: f64, shell: impl Fn(&Figure) -> Shel
         }
     }
     ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
+    let joints = || ends.chunk_by(|a, b| a.at == b.at).filter(|joint| joint.len() > 1);
+    let mut is_joined = vec![[false; 2]; sites.len()];
+    for end in joints().flatten() {
+        end.end.into_iter().for_each(|own| is_joined[end.site as usize][own] = true);
+    }
     let mut cuts = vec![[None; 2]; sites.len()];
     let mut outwards = Vec::new();
-    for joint in ends.chunk_by(|a, b| a.at == b.at).filter(|joint| joint.len() > 1) {
+    for joint in joints() {
         let deficit = |end: &End| sites[end.site as usize].deficit;
         let least = joint.iter().map(deficit).fold(f64::INFINITY, f64::min);
         let shell = shell(&sites[joint[0].site as usize]);
@@ -59,8 +64,8 @@ pub(super) fn cuts(sites: &[Figure], girth: f64, shell: impl Fn(&Figure) -> Shel
             f64::INFINITY
         };
         let band = shell.outer - shell.inner;
-        let ring = shell.inner * girth;
-        let most = (shell.outer.powi(2) - (ring + LEAST_ROOM * (shell.outer - ring)).powi(2)).max(0.0).sqrt();
+        let has_free_ends = joint.iter().any(|end| end.end.is_some_and(|own| !is_joined[end.site as usize][1 - own]));
+        let most = farthest(shell, if has_free_ends { reach } else { girth });
         // All radii in question are below the outer one.
         let common = length * shell.outer + SHIFT * band;
         let keeper = joint.iter().filter(|end| deficit(end) == least).min_by_key(|end| (end.end.is_some(), end.site)).map(|end| end.site);
@@ -74,7 +79,18 @@ pub(super) fn cuts(sites: &[Figure], girth: f64, shell: impl Fn(&Figure) -> Shel
             }
         }
     }
+    // Where the other end keeps, a cut far out leaves its cap no room. It may be left out: then the site keeps at both.
+    for (site, cut) in sites.iter().zip(&mut cuts).filter(|(_, cut)| cut.contains(&None)) {
+        let most = farthest(shell(site), reach);
+        cut.iter_mut().for_each(|cut| *cut = cut.filter(|beyond| *beyond < most));
+    }
     cuts
+}
+
+/// How far out a polytope may be cut so that its corners, which are so many times farther out than the inner radius at least, have room.
+fn farthest(shell: Shell, times: f64) -> f64 {
+    let least = shell.inner * times;
+    (shell.outer.powi(2) - (least + LEAST_ROOM * (shell.outer - least)).powi(2)).max(0.0).sqrt()
 }
 
 /// The planes that a figure's dilations are cut by: beyond the ends of a segment, or the sides of a polygon.
@@ -134,7 +150,7 @@ mod tests {
     fn what_is_cut_off_is_in_others() {
         let mut random = Random(11);
         let (shell, mut one_keeps, mut none_does) = (Shell { inner: 0.9, outer: 1.1 }, 0, 0);
-        let girth = Form::within(shell.reach(), Kind::Rod).expect("coarse enough").covering.girth;
+        let covering = Form::within(shell.reach(), Kind::Rod).expect("coarse enough").covering;
         for round in 0..400 {
             let mut unit = || (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
             let mut vector = || -> Point { std::array::from_fn(|_| unit()) };
@@ -154,7 +170,10 @@ mod tests {
                     Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }.into()
                 })
                 .collect();
-            let cuts = cuts(&sites, girth, |site| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) });
+            let cuts = cuts(&sites, [covering.reach, covering.girth], |site| Shell {
+                inner: site.in_space(shell.inner),
+                outer: site.in_space(shell.outer),
+            });
             let centre = [5.0, -7.0, 2.0];
             let joint = |k: usize| ordered(&sites[k]).iter().position(|end| *end == centre).expect("all end there");
             let cut = (0..count).filter(|&k| cuts[k][joint(k)].is_some()).count();

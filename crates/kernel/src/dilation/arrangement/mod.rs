@@ -94,13 +94,13 @@ impl<'a> Arrangement<'a> {
         let shell = |figure: &Figure| setting.shell(figure, State::default());
         let forms = Forms::default();
         let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
-        let girth = if sites.list.iter().any(|figure| figure.polygon().is_none() && polytopes::kind(figure) == Kind::Rod) {
+        let scales = if sites.list.iter().any(|figure| figure.polygon().is_none() && polytopes::kind(figure) == Kind::Rod) {
             let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
-            form.covering.girth
+            [form.covering.reach, form.covering.girth]
         } else {
-            1.0
+            [1.0; 2]
         };
-        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, girth, shell)).filter(|(beyond, _)| beyond.is_empty()) {
+        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, scales, shell)).filter(|(beyond, _)| beyond.is_empty()) {
             *beyond = Box::new(cut);
         }
         let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
@@ -163,7 +163,7 @@ impl<'a> Arrangement<'a> {
     }
 }
 
-/// Triangles of a polytope that nothing is near to: with more sites than memory has room for that many, polytopes are not even begun.
+/// Triangles of a polytope that little is near to, about: with more sites than memory has room for that many, polytopes are not even begun.
 const LEAST_TRIANGLES: f64 = 24.0;
 
 /// All sites of an attractor.
@@ -223,6 +223,7 @@ struct State {
 }
 
 impl State {
+    /// Below 256.
     fn number(self) -> u64 {
         u64::from(2 * self.level) + u64::from(self.side != Side::Both)
     }
@@ -313,22 +314,19 @@ impl Engine<'_> {
         Ok(is_made)
     }
 
-    /// A site's polytope in a state; none where no form is fine enough.
+    /// A site's polytope in a state; none where no form is fine enough, or no shift fits.
     fn polytope(&self, index: usize, state: State) -> Option<Polytope> {
         let (figure, beyond) = (&self.sites[index], &self.beyond[index]);
         let shell = self.setting.shell(figure, state);
         let seed = (self.trial << 8 | state.number()) << 32 | index as u64;
         if figure.polygon().is_some() {
             // Planes may meet in a point by chance, not again and again.
-            return (0..TRIALS).find_map(|trial| Polytope::around(figure, beyond, shell, seed ^ trial << 56));
+            return (0..TRIALS).find_map(|trial| Polytope::around(figure, beyond, shell, seed ^ trial << 48));
         }
         let most = self.setting.shell(figure, State::default()).outer;
         let cut = Cut { beyond: [beyond[0], beyond[1]], most };
-        // Where it is cut far beyond one end alone, the other may need a finer cap.
-        (state.level..LEVELS).find_map(|level| {
-            let form = self.forms.of(self.setting, self.sites, polytopes::kind(figure), State { level, ..state })?;
-            Polytope::new(figure, form, shell, cut, seed)
-        })
+        let form = self.forms.of(self.setting, self.sites, polytopes::kind(figure), state)?;
+        Polytope::new(figure, form, shell, cut, seed)
     }
 
     /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.

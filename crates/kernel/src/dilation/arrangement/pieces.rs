@@ -192,7 +192,7 @@ fn met(polytopes: &Polytopes, near: &Lists, index: u32) -> Vec<u32> {
     near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))).collect()
 }
 
-/// How many triangles of the union some polytopes have, about: a facet with k edges has k - 2, and each edge is on two.
+/// How many triangles of the union some polytopes, in ascending order, have, about: a facet with k edges has k - 2, and each edge is on two.
 pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let total = polytopes.all.len();
     let (mut lists, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
@@ -208,10 +208,11 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let arrangement = Arrangement { polytopes, met: &met, hidden: &masks };
     let mut scratch = Scratch::default();
     of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
-    let mut facets: Vec<u32> = scratch.out.pieces.iter().map(|piece| piece.facet).filter(|&facet| of.contains(&owner(facet).0)).collect();
+    let mut facets: Vec<u32> =
+        scratch.out.pieces.iter().map(|piece| piece.facet).filter(|&facet| of.binary_search(&owner(facet).0).is_ok()).collect();
     facets.sort_unstable();
     facets.dedup();
-    scratch.out.pieces.len() - 2 * facets.len()
+    scratch.out.pieces.len().saturating_sub(2 * facets.len())
 }
 
 /// Whether no facet of either polytope parts it from the other.

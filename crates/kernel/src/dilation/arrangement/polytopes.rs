@@ -122,7 +122,7 @@ pub(super) struct Shell {
 }
 
 impl Shell {
-    /// What a form may reach so that facets can be shifted.
+    /// What a form may reach so that facets, or corners, can be shifted.
     pub(super) fn reach(self) -> f64 {
         1.0 + (self.outer / self.inner - 1.0) * (1.0 - SHIFT)
     }
@@ -150,7 +150,7 @@ pub(super) fn ordered(figure: &Figure) -> [Point; 2] {
     }
 }
 
-/// A number in [0, 1) that looks random: the seed's, with an index below 1024.
+/// A number in [0, 1) that looks random: the seed's, below 2^54, with an index below 1024.
 pub(super) fn share(seed: u64, index: u64) -> f64 {
     split_mix::share(bits(seed, index))
 }
@@ -167,9 +167,9 @@ fn way_across(direction: &Point, bits: u64) -> Point {
     std::array::from_fn(|axis| any[axis] - along * direction[axis])
 }
 
-/// The share of the room between the balls that is left to shift facets.
+/// The share of the room between the balls that is left to shift facets, or corners.
 pub(super) const SHIFT: f64 = 0.08;
-/// The share of it by which facets of one polytope differ; all of them have the rest.
+/// The share of it by which facets, or corners, of one polytope differ, at most.
 pub(super) const OWN_SHIFT: f64 = 0.1;
 /// The share of the rest by which polytopes differ as a whole: all of them are as far out as that allows, and so are chords between their corners.
 const ALL_SHIFT: f64 = 0.25;
@@ -221,6 +221,11 @@ impl Polytope {
                 Some(turned(&meeting([&across(before), &across(after), &[0.0, 0.0, out]], offsets)?))
             };
             let from_ends: Vec<Point> = shape.corners.iter().enumerate().map(corner).collect::<Option<_>>()?;
+            // No corner is farther out than it may be, and so nothing is.
+            let farthest = cut.beyond.map(|beyond| if beyond.is_some() { cut.most } else { shell.outer });
+            if shape.corners.iter().zip(&from_ends).any(|(spot, from)| dot(from, from) > farthest[spot.end].powi(2)) {
+                return None;
+            }
             let plane = |facet: usize| {
                 let end = shape.ends[facet];
                 let (normal, offset) = if facet < belt {
@@ -332,4 +337,52 @@ pub(super) fn frame(direction: &Point) -> [Point; 3] {
 }
 
 /// See [`frame`], in radians.
-const TURN: f64 = 0.377;
+const TURN: f64 = 0.3819;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attractor::cell::{Site, distance_squared};
+    use crate::dilation::tree::Weighted;
+    use crate::split_mix::Random;
+
+    /// Points and segments of all lengths, cut at no end, at one, or at both: polytopes lie between the dilations by both ends of the band, but for what is cut off.
+    #[test]
+    fn polytopes_lie_within_their_band() {
+        let mut random = Random(13);
+        for shell in [Shell { inner: 0.9, outer: 1.1 }, Shell { inner: 0.99, outer: 1.01 }, Shell { inner: 0.6, outer: 1.5 }] {
+            let forms = [Kind::Ball, Kind::Rod].map(|kind| Form::within(shell.reach(), kind).expect("coarse enough"));
+            for round in 0..60 {
+                let mut vector = || -> Point { std::array::from_fn(|_| 2.0 * random.share() - 1.0) };
+                let (from, way) = (vector().map(|x| 50.0 * x), vector());
+                let length = [0.0, 1e-9, 1e-3, 0.3, 1.0, 20.0][round % 6];
+                let to = std::array::from_fn(|axis| from[axis] + length * way[axis]);
+                let figure: Figure = Weighted { site: Site::Segment([from, to]), deficit: 0.0 }.into();
+                let form = &forms[usize::from(kind(&figure) == Kind::Rod)];
+                let is_cut = if length == 0.0 { [false; 2] } else { [round / 6 % 2 == 1, round / 12 % 2 == 1] };
+                let beyond = is_cut.map(|is_cut| is_cut.then_some(0.02 * (shell.outer - shell.inner)));
+                let polytope = Polytope::new(&figure, form, shell, Cut { beyond, most: shell.outer }, round as u64).expect("there is room");
+                assert_eq!(polytope.cuts.len(), is_cut.iter().filter(|&&is_cut| is_cut).count());
+                for corner in &polytope.corners {
+                    assert!(distance_squared(corner, &figure.closest(corner)).sqrt() <= shell.outer * (1.0 + 1e-12), "{round}");
+                }
+                for _ in 0..100 {
+                    let along = length * random.share();
+                    let on: Point = std::array::from_fn(|axis| from[axis] + along * way[axis]);
+                    let direction = unit(&std::array::from_fn(|_| 2.0 * random.share() - 1.0));
+                    let x: Point = std::array::from_fn(|axis| on[axis] + shell.inner * direction[axis]);
+                    assert!(polytope.contains(&x) || polytope.cuts.iter().any(|cut| height(cut, &x) > 0.0), "{round}: {x:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn seeds_of_all_trials_differ() {
+        let seeds = (0..3).flat_map(|trial: u64| (0..3).map(move |engine: u64| (engine << 8 | 7) << 32 | 5 ^ trial << 48));
+        let mut shares: Vec<u64> = seeds.map(|seed| share(seed, 3).to_bits()).collect();
+        shares.sort_unstable();
+        shares.dedup();
+        assert_eq!(shares.len(), 9);
+    }
+}

@@ -56,7 +56,7 @@ impl Structure {
         is_whole.then_some(structure)
     }
 
-    /// Whether all corners are deeper than `least` below all planes but those of their own facets: then the polytope is what is below all planes.
+    /// Whether all corners, which are on the planes of their own facets, are deeper than `least` below all others: then the polytope is what is below all planes.
     pub(super) fn is_convex(&self, planes: &[Plane], places: &[Point], least: f64) -> bool {
         let mut own = vec![Mask::default(); self.corners];
         for edge in &self.edges {

@@ -204,6 +204,19 @@ fn critical_radii_are_told() {
     }
 }
 
+/// Two segments that go on nearly straight, and then end: where both may be cut at the joint, the other ends need caps.
+#[test]
+fn bends_are_arranged_at_all_tolerances() {
+    for tolerance in [0.1, 0.02, 0.01, 0.0075] {
+        for degrees in 1..=25 {
+            let turn = f64::from(degrees).to_radians();
+            let corners = [DVec3::ZERO, DVec3::new(5.0, 0.3, 0.1), DVec3::new(5.0 + 4.0 * turn.cos(), 0.3 + 4.0 * turn.sin(), 0.1)];
+            let dilation = arranged(&wires(&[[corners[0], corners[1]], [corners[1], corners[2]]]), 1.0, tolerance);
+            assert!(dilation.topology_exact && topology(&dilation) == (1, 0, 2), "{tolerance} {degrees}");
+        }
+    }
+}
+
 #[test]
 fn the_result_does_not_depend_on_threads_and_can_be_stopped() {
     let mut random = Random(3);
