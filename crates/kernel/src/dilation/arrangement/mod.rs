@@ -38,8 +38,9 @@ use std::sync::OnceLock;
 /// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
 /// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
 const MOST_NEAR: [usize; 2] = [5_000, 250];
-/// Doubts that polytopes may leave, as a share of the sites, and in any case: more of them are no matter of a few places, and finer polytopes everywhere cost more than a lattice.
-const MOST_DOUBTS: f64 = 0.3;
+/// Doubts that polytopes may leave, of pairs and of larger sets, as shares of the sites, and in any case. Pairs nearly touch, and finer polytopes tell that they do, or do not. With more doubts of larger sets these are no matter of a few places, and finer polytopes
+/// everywhere cost more than a lattice.
+const MOST_DOUBTS: [f64; 2] = [4.0, 0.3];
 const FEW_DOUBTS: f64 = 16.0;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
@@ -285,7 +286,7 @@ impl Engine<'_> {
             return Ok(Run::Open);
         }
         let (mut changed, mut sets) = (vec![true; self.sites.len()], Sets::default());
-        let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
+        let most = MOST_DOUBTS.map(|share| (share * self.sites.len() as f64).max(FEW_DOUBTS) as usize);
         while changed.contains(&true) {
             if !sets.look(&self.bodies(), &changed, most, budget)? {
                 return Ok(Run::Doubtful);

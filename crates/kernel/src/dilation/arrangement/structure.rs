@@ -69,3 +69,32 @@ impl Structure {
             .all(|(own, place)| planes.iter().enumerate().all(|(facet, plane)| height(plane, place) < -least || own.has(facet)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_closed_facets_around_a_ball_have_a_structure() {
+        let cube: Vec<Vec<u16>> =
+            vec![vec![0, 3, 2, 1], vec![4, 5, 6, 7], vec![0, 1, 5, 4], vec![1, 2, 6, 5], vec![2, 3, 7, 6], vec![3, 0, 4, 7]];
+        let structure = Structure::closed(&cube, 8).expect("a cube is closed");
+        assert_eq!((structure.facets, structure.corners, structure.edges.len()), (6, 8, 12));
+        for edge in &structure.edges {
+            let [left, right] = edge.facets.map(|facet| &cube[usize::from(facet)]);
+            let has = |around: &[u16], [from, to]: [u16; 2]| (0..4).any(|k| around[k] == from && around[(k + 1) % 4] == to);
+            assert!(has(left, edge.corners) && has(right, [edge.corners[1], edge.corners[0]]), "{edge:?}");
+        }
+        // A facet is missing, is there twice, or is turned over; two cubes; the sides of a ring of four.
+        assert!(Structure::closed(&cube[1..], 8).is_none());
+        assert!(Structure::closed(&[&cube[..], &cube[..1]].concat(), 8).is_none());
+        let mut turned = cube.clone();
+        turned[0].reverse();
+        assert!(Structure::closed(&turned, 8).is_none());
+        let other = cube.iter().map(|around| around.iter().map(|corner| corner + 8).collect());
+        assert!(Structure::closed(&cube.iter().cloned().chain(other).collect::<Vec<_>>(), 16).is_none());
+        let ring = |k: u16| (0..4).map(move |side| [4 * k, 4 * ((k + 1) % 4)].map(|first| [first + side, first + (side + 1) % 4]));
+        let sides: Vec<Vec<u16>> = (0..4).flat_map(ring).map(|[[a, b], [c, d]]| vec![a, b, d, c]).collect();
+        assert!(Structure::closed(&sides, 16).is_none());
+    }
+}

@@ -217,6 +217,39 @@ fn bends_are_arranged_at_all_tolerances() {
     }
 }
 
+/// How many triangles there will be at first is told from a sample, among sites by themselves and all over each other.
+#[test]
+fn triangles_are_told_beforehand() {
+    let mut random = Random(19);
+    for size in [60.0, 14.0] {
+        let segments: Vec<[DVec3; 2]> = (0..200)
+            .map(|_| {
+                let at = place(&mut random, size);
+                [at, at + place(&mut random, 3.0)]
+            })
+            .collect();
+        let (shape, budget) = (wires(&segments), Budget::default());
+        let plan = plan(&shape, 1.0, 0.1);
+        let setting = plan.setting(plan.pitch(), &budget);
+        let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
+        let made = arrangement.run(&budget).unwrap().unwrap().surface.triangles.len() as f64;
+        // Finer polytopes, where some nearly touch, are not foreseen.
+        assert!((0.5..1.4).contains(&(arrangement.triangles / made)), "{size}: {} for {made}", arrangement.triangles);
+    }
+}
+
+/// Balls of which each all but touches six others, or barely meets them, need no lattice; where they touch, pairs are left in doubt.
+#[test]
+fn balls_that_nearly_touch_are_arranged() {
+    let at = |place: usize| DVec3::new((place % 4) as f64, (place / 4 % 4) as f64, (place / 16) as f64) * 2.0;
+    let shape = points(&(0..64).map(at).collect::<Vec<_>>());
+    for (radius, expected) in [(0.999, (64, 0, 128)), (1.002, (1, 0, 2 * (64 - 144)))] {
+        let dilation = arranged(&shape, radius, 0.1);
+        assert!(dilation.topology_exact && topology(&dilation) == expected, "{radius}: {:?}", topology(&dilation));
+    }
+    assert_eq!(arranged(&shape, 1.0, 0.1).uncertain, 144);
+}
+
 #[test]
 fn the_result_does_not_depend_on_threads_and_can_be_stopped() {
     let mut random = Random(3);
