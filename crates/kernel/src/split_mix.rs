@@ -20,11 +20,9 @@ pub(crate) fn mix(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A generator for tests.
-#[cfg(test)]
+/// A generator.
 pub(crate) struct Random(pub(crate) u64);
 
-#[cfg(test)]
 impl Random {
     pub(crate) fn next(&mut self) -> u64 {
         let number = number(self.0);

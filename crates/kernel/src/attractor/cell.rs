@@ -101,6 +101,13 @@ pub(crate) fn cross(a: &Point, b: &Point) -> Point {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// The vector at length 1; 0 stays 0.
+#[inline]
+pub(crate) fn unit(vector: &Point) -> Point {
+    let length = dot(vector, vector).sqrt().max(f64::MIN_POSITIVE);
+    vector.map(|part| part / length)
+}
+
 #[inline]
 pub(crate) fn distance_squared(a: &Point, b: &Point) -> f64 {
     let difference = subtract(a, b);

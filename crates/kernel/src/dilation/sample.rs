@@ -13,7 +13,7 @@ use super::plan::Setting;
 use super::simplify::{OF_LATTICE, Simplifier};
 use super::surface::Blocks;
 use super::tree::Candidates;
-use crate::split_mix;
+use crate::split_mix::Random;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
 
@@ -74,7 +74,7 @@ impl Pass<'_> {
     pub(super) fn expected(&self, blocks: i64, candidates: &Candidates, simplify: bool) -> Result<Expected, DilationError> {
         let solids: Vec<u32> = (0..self.attractor.solids().len() as u32).collect();
         let mut level = vec![(Node { first_block: [0; 3], blocks }, Inherited::new((candidates.clone(), solids)))];
-        let (mut stands_for, mut chance) = (1.0, Chance(1));
+        let (mut stands_for, mut chance) = (1.0, Random(1));
         loop {
             let reduced: Vec<Result<Option<(Node, Inherited)>, DilationError>> = level
                 .into_par_iter()
@@ -104,12 +104,12 @@ impl Pass<'_> {
         &self,
         mut blocks: Vec<(Node, Inherited)>,
         stands_for: f64,
-        chance: &mut Chance,
+        chance: &mut Random,
         simplify: bool,
     ) -> Result<Expected, DilationError> {
         // In no order, so that the first are like all.
         for last in (1..blocks.len()).rev() {
-            blocks.swap(last, (chance.next() * (last + 1) as f64) as usize);
+            blocks.swap(last, (chance.share() * (last + 1) as f64) as usize);
         }
         let mut cleaning = self.setting.clone();
         cleaning.clean_only = true;
@@ -198,26 +198,15 @@ fn held(nodes: &[(Node, Inherited)]) -> usize {
 }
 
 /// Of nodes in their order in space the `most` that are followed: one of each of so many runs of equal length. `stands_for` becomes what each stands for.
-fn followed<T: Clone>(nodes: Vec<T>, most: usize, stands_for: &mut f64, chance: &mut Chance) -> Vec<T> {
+fn followed<T: Clone>(nodes: Vec<T>, most: usize, stands_for: &mut f64, chance: &mut Random) -> Vec<T> {
     if nodes.len() <= most {
         return nodes;
     }
     let run = nodes.len() as f64 / most as f64;
     *stands_for *= run;
     // Where runs do not end between two nodes, two of them may choose the same one.
-    let chosen = (0..most).map(|number| ((number as f64 + chance.next()) * run) as usize);
+    let chosen = (0..most).map(|number| ((number as f64 + chance.share()) * run) as usize);
     chosen.map(|index| nodes[index.min(nodes.len() - 1)].clone()).collect()
-}
-
-/// Numbers in [0, 1) that are the same every time.
-struct Chance(u64);
-
-impl Chance {
-    fn next(&mut self) -> f64 {
-        let number = split_mix::number(self.0);
-        self.0 = self.0.wrapping_add(split_mix::STEP);
-        split_mix::share(number)
-    }
 }
 
 #[cfg(test)]
@@ -229,7 +218,7 @@ mod tests {
         // Values that differ by three orders of magnitude and come in waves; the mean of many samples of them is their sum.
         let values: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k % 37).powi(2) + f64::from(k) * 0.5).collect();
         let sum: f64 = values.iter().sum();
-        let mut chance = Chance(7);
+        let mut chance = Random(7);
         let samples = 2000;
         let mut total = 0.0;
         for _ in 0..samples {

@@ -13,7 +13,7 @@ use super::parting::{avoids_origin, farthest, parting};
 use super::plan::Setting;
 use super::surface::BlockSurface;
 use super::tree::{SiteId, Weighted};
-use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract, unit};
 use crate::measure::triangle::closest_feature;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -181,11 +181,6 @@ impl Star {
                 .iter()
                 .all(|([p, q], normal)| scratch.settle(sites, &[*centre, corners[*p], corners[*q]], &[*normal], least, &mut work))
     }
-}
-
-fn unit(vector: &Point) -> Point {
-    let length = dot(vector, vector).sqrt().max(f64::MIN_POSITIVE);
-    vector.map(|part| part / length)
 }
 
 /// A bound of R^2 for a simplex of up to three corners: the smallest ball around a triangle has at most a third of the longest side's square.

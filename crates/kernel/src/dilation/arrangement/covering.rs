@@ -3,8 +3,7 @@
 //! They lie in rows across an axis. Between two rows there is a strip of triangles, none of whose circles may be larger than that angle: so row after row is as far from the last one as that allows, and what is searched for is
 //! how many directions each has. The best coverings with many directions have FEWEST / (1 - cos angle) of them; rows that change their number take a tenth more.
 
-use super::joints::unit;
-use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Directions, and the triangles between them: the hull of the unit vectors, around the ball with radius 1 / reach. It is symmetric about the plane across its axis, z. Those across the axis form its belt, and come first; no triangle
@@ -43,13 +42,17 @@ const LEAST_HEIGHT: f64 = 1e-5;
 /// Rounding of unit vectors.
 const ROUNDING: f64 = 1e-9;
 
+/// About as many directions as any covering has whose hull is around the ball with radius 1 / `most`.
+fn fewest(most: f64) -> f64 {
+    FEWEST / (1.0 - 1.0 / most)
+}
+
 impl Covering {
     /// One with few directions, no more than `limit`, whose hull is around the ball with radius 1 / `most`; those of the belt count `belt_weight` times more.
     pub(super) fn within(most: f64, limit: usize, belt_weight: usize) -> Option<Self> {
-        let fewest = FEWEST / (1.0 - 1.0 / most);
         let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
         // Also where no number would do.
-        if !(most > 1.0 && fewest <= limit as f64 && least <= limit) {
+        if !(most > 1.0 && fewest(most) <= limit as f64 && least <= limit) {
             return None;
         }
         let mut found: Vec<Rows> = (least..=least + WIDER).filter_map(|belt| Rows::around(belt, most, limit)).collect();
@@ -139,10 +142,10 @@ impl Rows {
         let mut open = vec![Self { list: vec![Row { latitude: 0.0, count: belt, turn: 0.0 }], count: belt }];
         let mut best: Option<Self> = None;
         // Directions that a row may be thought to need above it.
-        let rest = |rows: &Self| FEWEST / (1.0 - 1.0 / most) * (1.0 - rows.last().latitude.sin());
+        let rest = |rows: &Self| fewest(most) * (1.0 - rows.last().latitude.sin());
         while !open.is_empty() {
-            let fewest = best.as_ref().map_or(limit + 1, |best| best.count);
-            let next = open.iter().flat_map(|rows| rows.longer(most)).filter(|rows| rows.count < fewest);
+            let below = best.as_ref().map_or(limit + 1, |best| best.count);
+            let next = open.iter().flat_map(|rows| rows.longer(most)).filter(|rows| rows.count < below);
             let (closed, mut longer): (Vec<Self>, Vec<Self>) = next.partition(|rows| rows.is_closed(most));
             best = best.into_iter().chain(closed).min_by_key(|rows| rows.count);
             longer.sort_by(|a, b| (a.count as f64 + rest(a)).total_cmp(&(b.count as f64 + rest(b))));
@@ -251,9 +254,8 @@ mod tests {
         for (most, weight) in many.chain(some).chain([(1.01, 2), (1.006, 0)]) {
             let Some(covering) = Covering::within(most, 1000, weight) else { panic!("{most}") };
             let count = covering.directions.len();
-            let fewest = FEWEST / (1.0 - 1.0 / most);
             assert!(covering.reach <= most * (1.0 + 1e-6) && covering.girth <= covering.reach, "{most}");
-            assert!((count as f64) < 1.35 * fewest + 4.0, "{most}: {count} directions");
+            assert!((count as f64) < 1.35 * fewest(most) + 4.0, "{most}: {count} directions");
             assert!(covering.shortest > 1e-4, "{most}: {}", covering.shortest);
             // Whatever looks in between is near to one.
             for _ in 0..400 {

@@ -14,7 +14,7 @@
 use super::figure::{Figure, Polygon};
 use super::joints;
 use super::polytopes::Shell;
-use crate::attractor::cell::{Point, closest_on_segment, cross, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ pub(super) fn cuts(
 impl Polygon {
     /// max(0, n_m . n_k) over all other sides m.
     fn widest(&self, place: usize) -> f64 {
-        let along: Vec<Point> = self.sides().map(|[from, to]| joints::unit(&subtract(&to, &from))).collect();
+        let along: Vec<Point> = self.sides().map(|[from, to]| unit(&subtract(&to, &from))).collect();
         // Normals are turned as the sides are.
         let others = along.iter().enumerate().filter(|&(side, _)| side != place);
         others.map(|(_, other)| dot(other, &along[place])).fold(0.0, f64::max)
@@ -102,7 +102,7 @@ impl Polygon {
 /// The unit vector in the plane of a polygon out of a side.
 pub(super) fn outward(polygon: &Polygon, place: usize) -> Point {
     let (from, to) = (&polygon.corners[place], &polygon.corners[(place + 1) % polygon.corners.len()]);
-    joints::unit(&cross(&subtract(to, from), &polygon.up))
+    unit(&cross(&subtract(to, from), &polygon.up))
 }
 
 /// What a segment has in common with another within `flatness`, as shares of its length: the ends of both that are on the other.

@@ -14,7 +14,7 @@
 use super::figure::{Figure, Outline, order};
 use super::hinges;
 use super::polytopes::{Plane, Shell, ordered};
-use crate::attractor::cell::{Point, between, dot, subtract};
+use crate::attractor::cell::{Point, between, dot, subtract, unit};
 use crate::split_mix;
 
 /// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
@@ -109,11 +109,6 @@ fn outward(sites: &[Figure], end: &End) -> Point {
     let ends = ordered(&sites[end.site as usize]);
     let own = end.end.unwrap_or_default();
     unit(&subtract(&ends[own], &ends[1 - own]))
-}
-
-pub(super) fn unit(vector: &Point) -> Point {
-    let length = dot(vector, vector).sqrt();
-    vector.map(|part| part / length)
 }
 
 /// The length of a vector in the hull of some, nearly the shortest: each step goes to the shortest on the way to the lowest of them (Gilbert, 1966).

@@ -255,7 +255,7 @@ struct Forms([[[OnceLock<Option<Form>>; 2]; 2]; LEVELS as usize]);
 impl Forms {
     /// The form for a state below [`LEVELS`].
     fn of(&self, setting: &Setting, sites: &[Figure], kind: Kind, state: State) -> Option<&Form> {
-        let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)][usize::from(kind == Kind::Rod)];
+        let place = &self.0[state.level as usize][usize::from(state.side != Side::Both)][kind as usize];
         place.get_or_init(|| setting.form(sites, kind, state)).as_ref()
     }
 }

@@ -2,9 +2,8 @@
 
 use super::figure::{Figure, Outline};
 use super::form::{Form, Kind, Spot};
-use super::joints::unit;
 use super::structure::Structure;
-use crate::attractor::cell::{Point, cross, dot, subtract};
+use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::split_mix;
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
@@ -228,18 +227,18 @@ impl Polytope {
             }
             let plane = |facet: usize| {
                 let end = shape.ends[facet];
+                let is_flat = shape.flats[end] == Some(facet);
                 let (normal, offset) = if facet < belt {
                     (turned(&across(facet)), of_strip(facet))
-                } else if let Some(flat) = (0..2).find(|&end| shape.flats[end] == Some(facet)) {
-                    (turned(&[0.0, 0.0, [-1.0, 1.0][flat]]), cut.beyond[flat]?)
+                } else if is_flat {
+                    (turned(&[0.0, 0.0, [-1.0, 1.0][end]]), cut.beyond[end]?)
                 } else {
                     let [a, b, c] = [0, 1, 2].map(|place| &from_ends[usize::from(shape.facets[facet][place])]);
                     let normal = unit(&cross(&subtract(b, a), &subtract(c, a)));
                     (normal, dot(&normal, a))
                 };
                 // Within the dilation by the inner radius nothing is cut off but by flats.
-                let is_around = shape.flats.contains(&Some(facet))
-                    || offset + dot(&normal, &subtract(&ends[end], &ends[1 - end])).min(0.0) >= shell.inner;
+                let is_around = is_flat || offset + dot(&normal, &subtract(&ends[end], &ends[1 - end])).min(0.0) >= shell.inner;
                 is_around.then(|| [normal[0], normal[1], normal[2], offset + dot(&normal, &ends[end])])
             };
             let planes: Box<[Plane]> = (0..shape.facets.len()).map(plane).collect::<Option<_>>()?;
@@ -329,8 +328,7 @@ pub(super) fn frame(direction: &Point) -> [Point; 3] {
     let z = if length > 0.0 { direction.map(|part| part / length) } else { [0.0, 0.0, 1.0] };
     let axis = (0..3).min_by(|&a, &b| z[a].abs().total_cmp(&z[b].abs())).unwrap_or(0);
     let across = cross(&std::array::from_fn(|other| f64::from(u8::from(other == axis))), &z);
-    let length = dot(&across, &across).sqrt();
-    let x = across.map(|part| part / length);
+    let x = unit(&across);
     let y = cross(&z, &x);
     let (sine, cosine) = TURN.sin_cos();
     [std::array::from_fn(|k| cosine * x[k] + sine * y[k]), std::array::from_fn(|k| cosine * y[k] - sine * x[k]), z]

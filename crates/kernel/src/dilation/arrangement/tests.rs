@@ -33,6 +33,16 @@ fn wires(segments: &[[DVec3; 2]]) -> Attractor {
     lowered(&vertices, (0..segments.len() as u32).map(|k| vec![2 * k, 2 * k + 1]).collect())
 }
 
+/// Segments of some length in a cube of some size.
+fn sticks(random: &mut Random, count: usize, size: f64, length: f64) -> Vec<[DVec3; 2]> {
+    (0..count)
+        .map(|_| {
+            let at = place(random, size);
+            [at, at + place(random, length)]
+        })
+        .collect()
+}
+
 fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
     let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
     Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
@@ -222,12 +232,7 @@ fn bends_are_arranged_at_all_tolerances() {
 fn triangles_are_told_beforehand() {
     let mut random = Random(19);
     for size in [60.0, 14.0] {
-        let segments: Vec<[DVec3; 2]> = (0..200)
-            .map(|_| {
-                let at = place(&mut random, size);
-                [at, at + place(&mut random, 3.0)]
-            })
-            .collect();
+        let segments = sticks(&mut random, 200, size, 3.0);
         let (shape, budget) = (wires(&segments), Budget::default());
         let plan = plan(&shape, 1.0, 0.1);
         let setting = plan.setting(plan.pitch(), &budget);
@@ -253,12 +258,7 @@ fn balls_that_nearly_touch_are_arranged() {
 #[test]
 fn the_result_does_not_depend_on_threads_and_can_be_stopped() {
     let mut random = Random(3);
-    let segments: Vec<[DVec3; 2]> = (0..300)
-        .map(|_| {
-            let at = place(&mut random, 100.0);
-            [at, at + place(&mut random, 20.0)]
-        })
-        .collect();
+    let segments = sticks(&mut random, 300, 100.0, 20.0);
     let shape = wires(&segments);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -379,12 +379,7 @@ fn hidden_places_are_hidden() {
     let (mut hidden, mut shown, mut agreed) = (0, 0, 0);
     for round in 0..6 {
         let size = 1.0 + 0.5 * f64::from(round);
-        let segments: Vec<[DVec3; 2]> = (0..24)
-            .map(|_| {
-                let at = place(&mut random, size);
-                [at, at + place(&mut random, 1.0)]
-            })
-            .collect();
+        let segments = sticks(&mut random, 24, size, 1.0);
         let (shape, budget) = (wires(&segments), Budget::default());
         let plan = plan(&shape, 1.0, 0.1);
         let setting = plan.setting(plan.pitch(), &budget);
