@@ -7,6 +7,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
+/// The least sine of a triangle's angle at its first corner by which its plane is known to within [`NOISE`] of lengths.
+const LEAST_SINE: f64 = 1e-4;
+const NOISE: f64 = 1e-10;
+
 /// A closed mesh that tells which points it encloses.
 #[derive(Debug)]
 pub struct Inside<'a> {
@@ -59,6 +63,35 @@ impl<'a> Inside<'a> {
     #[must_use]
     pub fn farthest(&self, points: &[DVec3]) -> f64 {
         points.par_iter().map(|&point| self.distance(point)).reduce(|| 0.0, f64::max)
+    }
+
+    /// How the surface lies across a box along orthonormal axes: the sum of the lengths that unit normals have along these, over all triangles that may meet the box; none where the box is free of the surface. Cost: that
+    /// of the triangles whose boxes meet the one around it.
+    pub(crate) fn across(&self, axes: &[DVec3; 3], low: DVec3, high: DVec3) -> Option<DVec3> {
+        let along = |x: DVec3| DVec3::from_array(axes.map(|axis| axis.dot(x)));
+        let at = |x: DVec3| axes[0] * x.x + axes[1] * x.y + axes[2] * x.z;
+        let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let reach = axes[0].abs() * half.x + axes[1].abs() * half.y + axes[2].abs() * half.z;
+        let around = Box32::of(&[at(centre) - reach, at(centre) + reach].map(|corner| corner.to_array()));
+        let mut across = None;
+        self.tree.query(&around, 0, |leaf| {
+            for (&triangle, _) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)).filter(|(_, bounds)| bounds.meets(&around)) {
+                let corners = self.mesh.triangles[triangle as usize].map(|corner| along(self.mesh.vertices[corner as usize]) - centre);
+                let [a, b, c] = corners;
+                let noise = NOISE * (centre.abs() + a.abs()).max_element();
+                let is_beside = (a.min(b).min(c) - noise).cmpgt(half).any() || (a.max(b).max(c) + noise).cmplt(-half).any();
+                let (ab, ac) = (b - a, c - a);
+                let normal = ab.cross(ac);
+                // Needles have no normal to rely on.
+                let is_needle = normal.length() <= LEAST_SINE * ab.length() * ac.length();
+                let normal = normal.normalize_or_zero();
+                if !is_beside && (is_needle || normal.dot(a).abs() <= normal.abs().dot(half) + noise) {
+                    *across.get_or_insert(DVec3::ZERO) += normal.abs();
+                }
+            }
+            true
+        });
+        across
     }
 
     /// That of the triangles that are counted.

@@ -3,11 +3,13 @@
 //! How far a point is from the farthest of some figures is a convex function, and so is how high it is above the highest plane of some polytopes: whether they are anywhere low enough is told by the method of ellipsoids
 //! (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). Whether some bodies' common points are all within others is told by halving boxes.
 
-use super::figure::Figure;
+use super::figure::{Figure, Polygon};
 use super::pieces::Lists;
 use super::polytopes::{Plane, Polytopes, height, normal};
-use crate::attractor::cell::{Point, between, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
 use crate::dilation::plan::Setting;
+use crate::solid::Inside;
+use glam::DVec3;
 
 /// Ellipsoids at most, to decide one question.
 const MOST_ELLIPSOIDS: usize = 400;
@@ -15,9 +17,12 @@ const MOST_ELLIPSOIDS: usize = 400;
 const STEPS: usize = 12;
 /// Rounding of the squares of ellipsoids, as a share of the largest: some hundred steps lose as many units of double precision.
 const NOISE: f64 = 1e-13;
-/// Boxes at most, and halvings of one, that are looked at for places that are not hidden.
+/// Boxes at most, and halvings of one, that are looked at for places that are not hidden; of halvings more beside solids, whose faces may be much longer than the radius.
 const MOST_BOXES: usize = 4_000;
 const HALVINGS: usize = 12;
+const HALVINGS_IN_SOLIDS: usize = 40;
+/// Boxes no wider than this, in units of the radius, are not halved for the face of a solid across them.
+const NARROW: f64 = 0.25;
 
 /// The figures and what stands for them.
 pub(super) struct Bodies<'a> {
@@ -25,6 +30,8 @@ pub(super) struct Bodies<'a> {
     pub(super) figures: &'a [Figure],
     pub(super) polytopes: &'a Polytopes,
     pub(super) near: &'a Lists,
+    /// What their surfaces enclose belongs to the union, too.
+    pub(super) solids: &'a [Inside<'a>],
 }
 
 /// Whether some bodies have a common point.
@@ -131,68 +138,134 @@ impl Bodies<'_> {
         })
     }
 
-    /// Whether the places that the dilations of a set have in common, unless they have none, and those that its polytopes have, are all in the interior of others, of their dilation and their polytope.
-    pub(super) fn is_hidden(&self, set: &[u32], common: Common) -> bool {
+    /// Whether the places that the dilations of a set have in common, unless they have none, and those that its polytopes have, are all in the interior of others, of their dilation and their polytope, or of solids.
+    pub(super) fn is_hidden(&self, set: &[u32], common_points: Common) -> bool {
         let around: Vec<u32> = self.near.of(set[0]).iter().copied().chain([set[0]]).collect();
         let Setting { reach, slack, .. } = *self.setting;
-        let dilations = self.common_box(set, |body| self.figures[body as usize].bounds_of_dilation(reach + slack));
-        let polytopes = self.common_box(set, |body| self.polytopes.of(body).bounds());
-        let mut left = MOST_BOXES;
-        (common == Common::None || self.are_hidden(set, Kind::Dilation, dilations, &around, HALVINGS, &mut left))
-            && self.are_hidden(set, Kind::Polytope, polytopes, &around, HALVINGS, &mut left)
+        let mut boxes = Boxes { set, axes: self.axes(set[0]), kind: Kind::Dilation, left: MOST_BOXES };
+        let halvings = if self.solids.is_empty() { HALVINGS } else { HALVINGS_IN_SOLIDS };
+        [Kind::Dilation, Kind::Polytope].into_iter().all(|kind| {
+            boxes.kind = kind;
+            let common = boxes.common(|body| match kind {
+                Kind::Dilation => (self.figures[body as usize].corners(), self.figures[body as usize].in_space(reach + slack)),
+                Kind::Polytope => (&self.polytopes.of(body).corners, slack),
+            });
+            (matches!(kind, Kind::Dilation) && common_points == Common::None) || self.are_hidden(&mut boxes, common, &around, halvings)
+        })
     }
 
-    /// How far a place is beyond a body, or less; as far as it is within, or less, where that is negative.
-    fn above(&self, kind: Kind, body: u32, x: &Point) -> f64 {
+    /// Axes along which what a body has in common with others is likely to be narrow: those of a polygon's plane and its first side.
+    fn axes(&self, body: u32) -> [Point; 3] {
+        let of_polygon = |polygon: &Polygon| {
+            let (up, along) = (polygon.up, unit(&subtract(&polygon.corners[1], &polygon.corners[0])));
+            [along, cross(&up, &along), up]
+        };
+        let axes = self.figures[body as usize].polygon().filter(|polygon| !polygon.is_needle()).map(of_polygon);
+        axes.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    }
+
+    /// How far a place is beyond a body, or less, and where it is within, how far it is from being beyond, or less, as a negative number: a convex function, with a subgradient.
+    fn above(&self, kind: Kind, body: u32, x: &Point) -> (f64, Point) {
         let (figure, polytope) = (&self.figures[body as usize], self.polytopes.of(body));
-        let highest = |planes: &[Plane]| planes.iter().map(|plane| height(plane, x)).fold(f64::NEG_INFINITY, f64::max);
-        match kind {
+        let (planes, beyond) = match kind {
             Kind::Dilation => {
-                (distance_squared(x, &figure.closest(x)).sqrt() - figure.in_space(self.setting.reach)).max(highest(&polytope.cuts))
+                let from = subtract(x, &figure.closest(x));
+                let distance = dot(&from, &from).sqrt();
+                let away = if distance > 0.0 { from.map(|part| part / distance) } else { from };
+                (&polytope.cuts, (distance - figure.in_space(self.setting.reach), away))
             }
-            Kind::Polytope => highest(&polytope.planes),
-        }
+            Kind::Polytope => (&polytope.planes, (f64::NEG_INFINITY, [0.0; 3])),
+        };
+        let highest = planes.iter().map(|plane| (height(plane, x), plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+        highest.filter(|&(height, _)| height > beyond.0).map_or(beyond, |(height, plane)| (height, normal(plane)))
     }
 
-    /// Whether the places in a box that bodies of a set have in common are all hidden by one of those around.
-    fn are_hidden(&self, set: &[u32], kind: Kind, [low, high]: [Point; 2], around: &[u32], halvings: usize, boxes: &mut usize) -> bool {
+    /// Whether the places in a box that bodies of a set have in common are all hidden, by one of those around or by a solid.
+    fn are_hidden(&self, boxes: &mut Boxes<'_>, [low, high]: [Point; 2], around: &[u32], halvings: usize) -> bool {
         if (0..3).any(|axis| low[axis] > high[axis]) {
             return true;
         }
-        *boxes = boxes.saturating_sub(1);
-        let (centre, size, slack) = (between(&low, &high, 0.5), subtract(&high, &low), self.setting.slack);
-        // All of the box is no farther from its centre.
+        boxes.left = boxes.left.saturating_sub(1);
+        let (size, slack) = (subtract(&high, &low), self.setting.slack);
+        let centre = boxes.place(&between(&low, &high, 0.5));
+        // All of the box is no farther from its centre, as a whole and along a direction.
         let half = 0.5 * dot(&size, &size).sqrt() + 2.0 * slack;
+        let half_along = |direction: &Point| 0.5 * dot(&boxes.axes.map(|axis| dot(&axis, direction).abs()), &size) + 2.0 * slack;
         let mut highest = f64::NEG_INFINITY;
-        for &body in set {
-            let above = self.above(kind, body, &centre);
-            if above > half {
+        for &body in boxes.set {
+            let (above, away) = self.above(boxes.kind, body, &centre);
+            if above > half_along(&away) {
                 return true;
             }
             highest = highest.max(above);
         }
-        let (mut left, mut is_centre_hidden) = (Vec::new(), false);
+        let (mut across, mut is_centre_hidden) = (DVec3::ZERO, false);
+        for solid in self.solids {
+            let is_centre_inside = solid.winding(DVec3::from_array(centre)) > 0;
+            match solid.across(&boxes.axes.map(DVec3::from_array), DVec3::from_array(low), DVec3::from_array(high)) {
+                None if is_centre_inside => return true,
+                own => across += own.unwrap_or_default(),
+            }
+            is_centre_hidden |= is_centre_inside;
+        }
+        let corner = |number: usize| boxes.place(&std::array::from_fn(|axis| if number >> axis & 1 == 1 { high[axis] } else { low[axis] }));
+        let holds = |body: u32, x: &Point| [Kind::Dilation, Kind::Polytope].iter().all(|&kind| self.above(kind, body, x).0 < -slack);
+        let mut left = Vec::new();
         for &body in around {
-            let in_dilation = self.above(Kind::Dilation, body, &centre);
-            if in_dilation >= half {
+            let [own, of_polytope] = [Kind::Dilation, Kind::Polytope].map(|kind| self.above(kind, body, &centre));
+            if own.0 >= half_along(&own.1) || of_polytope.0 >= half_along(&of_polytope.1) {
                 continue;
             }
-            let above = in_dilation.max(self.above(Kind::Polytope, body, &centre));
-            if above < -half {
+            let above = own.0.max(of_polytope.0);
+            // What is convex and holds the corners holds all.
+            if above < -half || (above < -slack && (0..8).all(|number| holds(body, &corner(number)))) {
                 return true;
             }
-            if above < half {
-                left.push(body);
-            }
+            left.push(body);
             is_centre_hidden |= above < -slack;
         }
-        if halvings == 0 || *boxes == 0 || left.is_empty() || (highest <= 0.0 && !is_centre_hidden) {
+        let has_none = left.is_empty() && self.solids.is_empty();
+        if halvings == 0 || boxes.left == 0 || has_none || (highest <= 0.0 && !is_centre_hidden) {
             return false;
         }
-        let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or_default();
+        // Across solids' faces first, as long as that parts what is on both sides: along them, most of a box is inside, or near one face.
+        let weight = |axis: usize| if size[axis] > NARROW * self.setting.reach { across[axis] } else { 0.0 };
+        let is_beside = (0..3).any(|axis| weight(axis) > 0.0);
+        let length = |axis: usize| if is_beside { weight(axis) * size[axis] } else { size[axis] };
+        let axis = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or_default();
         let (mut below, mut above) = (high, low);
-        (below[axis], above[axis]) = (centre[axis], centre[axis]);
-        [[low, below], [above, high]].into_iter().all(|part| self.are_hidden(set, kind, part, &left, halvings - 1, boxes))
+        let middle = 0.5 * (low[axis] + high[axis]);
+        (below[axis], above[axis]) = (middle, middle);
+        [[low, below], [above, high]].into_iter().all(|part| self.are_hidden(boxes, part, &left, halvings - 1))
+    }
+}
+
+/// Boxes along some axes, which are looked at for common points of a set.
+struct Boxes<'s> {
+    set: &'s [u32],
+    axes: [Point; 3],
+    kind: Kind,
+    /// How many more may be looked at.
+    left: usize,
+}
+
+impl Boxes<'_> {
+    /// The box that bodies have in common, each the hull of points and what is no farther from it than a length.
+    fn common<'p>(&self, of: impl Fn(u32) -> (&'p [Point], f64)) -> [Point; 2] {
+        let mut common = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
+        for (points, by) in self.set.iter().map(|&body| of(body)) {
+            for (axis, direction) in self.axes.iter().enumerate() {
+                let along = points.iter().map(|point| dot(direction, point));
+                let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+                (common[0][axis], common[1][axis]) = (common[0][axis].max(low - by), common[1][axis].min(high + by));
+            }
+        }
+        common
+    }
+
+    /// The place with some coordinates.
+    fn place(&self, along: &Point) -> Point {
+        std::array::from_fn(|k| (0..3).map(|axis| along[axis] * self.axes[axis][k]).sum())
     }
 }
 

@@ -159,7 +159,7 @@ impl Polygon {
     }
 
     /// Twice its area.
-    fn double(&self) -> f64 {
+    pub(super) fn double(&self) -> f64 {
         let origin = &self.corners[0];
         let fan = self.corners.windows(2).map(|pair| dot(&self.up, &cross(&subtract(&pair[0], origin), &subtract(&pair[1], origin))));
         fan.sum()

@@ -61,7 +61,7 @@ pub(super) fn cuts(
     let cut = |(index, side): (usize, &Side)| -> Result<Option<f64>, Stopped> {
         budget.cancel.check()?;
         let figure = &figures[side.figure as usize];
-        let Some(polygon) = figure.polygon() else { return Ok(None) };
+        let Some(polygon) = figure.polygon().filter(|polygon| !polygon.is_needle()) else { return Ok(None) };
         let shell = shell(figure);
         let least = shell.outer * polygon.widest(side.place as usize);
         if least > FARTHEST * shell.outer {

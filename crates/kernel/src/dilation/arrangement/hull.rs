@@ -2,13 +2,13 @@
 
 use super::figure::{Figure, Polygon};
 use super::joints;
-use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, height, meeting, normal, share};
+use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, frame, height, meeting, normal, share};
 use super::structure::Structure;
-use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The least sine of a polygon's angles: polytopes around needles begin with corners too far away.
+/// The least sine of a polygon's angles, else it is a needle: facets across its sides would meet too far away.
 const LEAST_SINE: f64 = 1e-3;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
 const NOISE: f64 = 1e-9;
@@ -22,10 +22,10 @@ struct Hull {
 }
 
 impl Polytope {
-    /// The polytope of a polygon in its shell; none for needles, or where facets are too many or too small.
+    /// The polytope of a polygon in its shell; none where facets are too many or too small.
     ///
     /// Its facets touch the polygon's dilation by the inner radius, shifted outwards, all of them as a whole and a little against each other: two along the polygon, farther out, strips along its sides, as many as keep within the outer one, and at the
-    /// corners one towards the farthest vertex, until none is beyond. So it lies between both dilations, where it is not cut as far beyond its sides as is said.
+    /// corners one towards the farthest vertex, until none is beyond. Around needles, which are cut nowhere, it begins with a cuboid instead. So it lies between both dilations, where it is not cut as far beyond its sides as is said.
     pub(super) fn around(figure: &Figure, beyond: &[Option<f64>], shell: Shell, seed: u64) -> Option<Self> {
         let polygon = figure.polygon()?;
         let origin = polygon.corners[0];
@@ -37,12 +37,13 @@ impl Polytope {
         let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
         // Sides that hardly turn would meet elsewhere, were they shifted against each other.
         let outside = |facet: usize| facet.checked_sub(FACES).map_or_else(|| offset(facet), |side| beyond[side].unwrap_or(all));
-        let mut hull = Hull::prism(&polygon, outside)?;
+        let is_needle = polygon.is_needle();
+        let mut hull = if is_needle { Hull::cuboid(&polygon, offset)? } else { Hull::prism(&polygon, outside)? };
         let noise = NOISE * shell.outer;
         // A polygon around a circle: half of it between both faces.
         let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
         let up = normal(&hull.planes[0]);
-        for (side, corner) in polygon.corners.iter().enumerate().filter(|&(side, _)| beyond[side].is_none()) {
+        for (side, corner) in polygon.corners.iter().enumerate().filter(|&(side, _)| !is_needle && beyond[side].is_none()) {
             let out = normal(&hull.planes[FACES + side]);
             for k in 1..strips {
                 let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();
@@ -64,28 +65,42 @@ impl Polytope {
     }
 }
 
+impl Polygon {
+    /// Whether two sides that follow each other are nearly along one line, or have no length.
+    pub(super) fn is_needle(&self) -> bool {
+        let sides: Vec<Point> = self.sides().map(|[from, to]| subtract(&to, &from)).collect();
+        let length = |vector: &Point| dot(vector, vector).sqrt();
+        let has_angle = |one: &Point, other: &Point| length(&cross(one, other)) / (length(one) * length(other)) > LEAST_SINE;
+        !(0..sides.len()).all(|k| has_angle(&sides[k], &sides[(k + 1) % sides.len()]))
+    }
+}
+
 impl Hull {
     /// Both faces, and a facet across the polygon at every side.
     fn prism(polygon: &Polygon, offset: impl Fn(usize) -> f64) -> Option<Self> {
-        let (count, up) = (polygon.corners.len(), polygon.up);
-        let sides: Vec<Point> = polygon.sides().map(|[from, to]| subtract(&to, &from)).collect();
-        let length = |vector: &Point| dot(vector, vector).sqrt();
-        let sine = |one: &Point, other: &Point| length(&cross(one, other)) / (length(one) * length(other));
-        // Sides without a length, too.
-        let is_sharp = |k: usize| sine(&sides[k], &sides[(k + 1) % count]) > LEAST_SINE;
-        if !(0..count).all(is_sharp) {
-            return None;
-        }
-        let mut planes: Vec<Plane> = Vec::new();
-        let mut add = |direction: Point, support: f64| {
-            let distance = support + offset(planes.len());
-            planes.push([direction[0], direction[1], direction[2], distance]);
-        };
-        add(up, 0.0);
-        add(up.map(|part| -part), 0.0);
-        for (side, corner) in sides.iter().zip(&polygon.corners) {
-            let out = cross(side, &up).map(|part| part / length(side));
-            add(out, dot(&out, corner));
+        let out = polygon.sides().map(|[from, to]| unit(&cross(&subtract(&to, &from), &polygon.up)));
+        Self::upright(polygon, &polygon.up, &out.collect::<Vec<Point>>(), offset)
+    }
+
+    /// A cuboid around a polygon, along its longest way from corner to corner.
+    fn cuboid(polygon: &Polygon, offset: impl Fn(usize) -> f64) -> Option<Self> {
+        let ways = polygon.corners.iter().enumerate().flat_map(|(k, p)| polygon.corners[..k].iter().map(move |q| subtract(p, q)));
+        let along = ways.max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))?;
+        let [x, y, along] = frame(&along);
+        // What is left of the polygon's normal across it; where it has none, any direction does.
+        let [right, up] = [&x, &y].map(|axis| dot(axis, &polygon.up));
+        let length = right.hypot(up);
+        let up = if length > 0.0 { std::array::from_fn(|axis| (right * x[axis] + up * y[axis]) / length) } else { y };
+        let across = cross(&up, &along);
+        Self::upright(polygon, &up, &[along, across, along.map(|x| -x), across.map(|x| -x)], offset)
+    }
+
+    /// Two faces, across a direction, and facets beside them, across others, all around the polygon, in their order.
+    fn upright(polygon: &Polygon, up: &Point, out: &[Point], offset: impl Fn(usize) -> f64) -> Option<Self> {
+        let (count, mut planes) = (out.len(), Vec::<Plane>::new());
+        for direction in [*up, up.map(|part| -part)].iter().chain(out) {
+            let support = polygon.corners.iter().map(|corner| dot(direction, corner)).fold(f64::NEG_INFINITY, f64::max);
+            planes.push([direction[0], direction[1], direction[2], support + offset(planes.len())]);
         }
         let mut hull = Self { planes, corners: Vec::new() };
         for face in 0..FACES {

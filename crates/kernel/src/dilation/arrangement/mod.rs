@@ -1,7 +1,7 @@
-//! Thickening of points, segments and polygons by the union of a polytope around each: where few are near to each other, the boundary is found facet by facet, without a lattice.
+//! Thickening of points, segments, polygons and solids by the union of a polytope around each: where few are near to each other, the boundary is found facet by facet, without a lattice.
 //!
 //! With s < r < outer the ends of the band, figure S_i (see `figure`) has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
-//! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
+//! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does.
 
 mod bodies;
@@ -15,6 +15,7 @@ mod joints;
 mod nerve;
 mod pieces;
 mod polytopes;
+mod solids;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -26,8 +27,9 @@ use super::tree::{Candidates, Weighted};
 use crate::attractor::cell::{Cell, ControlPoint, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
+use crate::solid::{Inside, TriMesh};
 use bodies::{Bodies, Common};
-use figure::Figure;
+use figure::{Figure, Polygon};
 use form::{Form, Kind};
 use nerve::{Doubt, Sets};
 use pieces::{Body, Lists};
@@ -38,6 +40,9 @@ use std::sync::OnceLock;
 /// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
 /// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
 const MOST_NEAR: [usize; 2] = [5_000, 250];
+/// So many sets, and so many doubts that the first polytopes leave about larger ones, take as long as the lattice at one of its cubes along a polygon: with large faces there may be more of both.
+const SETS_PER_CUBE: f64 = 20.0;
+const DOUBTS_PER_CUBE: f64 = 0.2;
 /// Doubts that polytopes may leave, of pairs and of larger sets, as shares of the sites, and in any case. Pairs nearly touch, and finer polytopes tell that they do, or do not. With more doubts of larger sets these are no matter of a few places, and finer polytopes
 /// everywhere cost more than a lattice.
 const MOST_DOUBTS: [f64; 2] = [4.0, 0.3];
@@ -64,6 +69,10 @@ pub(super) struct Arrangement<'a> {
     beyond: Vec<Box<[Option<f64>]>>,
     near: Lists,
     forms: Forms,
+    /// The surfaces of solids, whose triangles are among the sites.
+    solids: Vec<TriMesh>,
+    /// Cubes of the lattice that the faces of polygons would meet, about.
+    cubes: f64,
     /// About how many triangles will be made.
     pub(super) triangles: f64,
 }
@@ -76,7 +85,7 @@ pub(super) struct Arranged {
 }
 
 impl<'a> Arrangement<'a> {
-    /// The sites of an attractor; `None` where there are solids, whose inside belongs to the dilation, or so many sites, or so near to each other, that a lattice serves better.
+    /// The sites of an attractor; `None` where there are so many, or so near to each other, that a lattice serves better.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -86,7 +95,7 @@ impl<'a> Arrangement<'a> {
         candidates: &Candidates,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
-        if setting.dense || setting.clean_only || !rule.attractor().solids().is_empty() {
+        if setting.dense || setting.clean_only {
             return Ok(None);
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
@@ -108,9 +117,14 @@ impl<'a> Arrangement<'a> {
         let bodies = sites.list.iter().zip(&beyond);
         let bodies: Vec<Body<'_>> =
             bodies.map(|(figure, beyond)| Body { figure, reach: reach(figure), cuts: joints::planes(figure, beyond) }).collect();
-        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
+        // Both sides of all polygons.
+        let areas = sites.list.iter().filter_map(Figure::polygon).map(Polygon::double);
+        let cubes = areas.sum::<f64>() / setting.lattice.pitch.powi(2);
+        let sets = (SETS_PER_CUBE * cubes / sites.list.len() as f64) as usize;
+        let Some(near) = pieces::near(&bodies, [MOST_NEAR[0], MOST_NEAR[1].max(sets)], budget)? else { return Ok(None) };
         drop(bodies);
-        let mut arrangement = Self { setting, sites, beyond, near, forms, triangles: 0.0 };
+        let solids = rule.attractor().surfaces();
+        let mut arrangement = Self { setting, sites, beyond, near, forms, solids, cubes, triangles: 0.0 };
         arrangement.triangles = arrangement.expected_triangles(budget)?;
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
@@ -126,7 +140,7 @@ impl<'a> Arrangement<'a> {
     /// # Errors
     /// [`Stopped`].
     fn expected_triangles(&self, budget: &Budget) -> Result<f64, Stopped> {
-        let mut engine = self.engine(0);
+        let mut engine = self.engine(0, &[]);
         if !engine.begin(budget)? {
             return Ok(f64::INFINITY);
         }
@@ -142,9 +156,15 @@ impl<'a> Arrangement<'a> {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn run(&self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+        let solids: Vec<Inside<'_>> = self.solids.iter().map(Inside::new).collect();
         for trial in 0..TRIALS {
-            match self.engine(trial).run(budget)? {
+            match self.engine(trial, &solids).run(budget)? {
                 Run::Done(mut arranged) => {
+                    // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
+                    let is_sure = solids.is_empty() || arranged.uncertain == 0;
+                    if !is_sure || !solids::leave_out(&solids, &mut arranged.surface) {
+                        break;
+                    }
                     arranged.surface.leaves = self.sites.leaves;
                     arranged.surface.site_error = self.sites.error;
                     return Ok(Some(*arranged));
@@ -156,11 +176,11 @@ impl<'a> Arrangement<'a> {
         Ok(None)
     }
 
-    fn engine(&self, trial: u64) -> Engine<'_> {
+    fn engine<'b>(&'b self, trial: u64, solids: &'b [Inside<'b>]) -> Engine<'b> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
-        let Self { setting, beyond, near, forms, .. } = self;
-        Engine { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), states, trial }
+        let Self { setting, beyond, near, forms, cubes, .. } = self;
+        Engine { setting, sites, beyond, near, forms, solids, cubes: *cubes, polytopes: Polytopes::default(), states, trial }
     }
 }
 
@@ -275,6 +295,8 @@ struct Engine<'a> {
     beyond: &'a [Box<[Option<f64>]>],
     near: &'a Lists,
     forms: &'a Forms,
+    solids: &'a [Inside<'a>],
+    cubes: f64,
     polytopes: Polytopes,
     states: Vec<State>,
     trial: u64,
@@ -287,10 +309,13 @@ impl Engine<'_> {
         }
         let (mut changed, mut sets) = (vec![true; self.sites.len()], Sets::default());
         let most = MOST_DOUBTS.map(|share| (share * self.sites.len() as f64).max(FEW_DOUBTS) as usize);
+        // The first polytopes are as coarse as they may be.
+        let mut allowed = [most[0], most[1].max((DOUBTS_PER_CUBE * self.cubes) as usize)];
         while changed.contains(&true) {
-            if !sets.look(&self.bodies(), &changed, most, budget)? {
+            if !sets.look(&self.bodies(), &changed, allowed, budget)? {
                 return Ok(Run::Doubtful);
             }
+            allowed = most;
             changed = self.refine(sets.doubts());
         }
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
@@ -300,7 +325,7 @@ impl Engine<'_> {
     }
 
     fn bodies(&self) -> Bodies<'_> {
-        Bodies { setting: self.setting, figures: self.sites, polytopes: &self.polytopes, near: self.near }
+        Bodies { setting: self.setting, figures: self.sites, polytopes: &self.polytopes, near: self.near, solids: self.solids }
     }
 
     /// Makes the first polytopes; whether there are such.

@@ -7,7 +7,7 @@
 //!
 //! * (both meet) the E_i have a common interior point, which all bodies have all the time,
 //! * (neither meets) neither the D_i have a common point, nor the P_i: every body is within one of these, or
-//! * (hidden) all common points of the D_i, and all of the P_i, are in the interior of some E_j, and so in that of the union, all the time.
+//! * (hidden) all common points of the D_i, and all of the P_i, are in the interior of some E_j, or of a solid, and so in that of the union, all the time.
 //!
 //! If that is shown of all sets, both unions have as many components, handles and voids. Sets that hold one which does not meet, or which is hidden, are so, too.
 

@@ -258,11 +258,6 @@ impl Polytope {
         Self { structure, planes, cuts, corners, low, high }
     }
 
-    /// Its box.
-    pub(super) fn bounds(&self) -> [Point; 2] {
-        [self.low, self.high]
-    }
-
     /// Whether its box meets that of two points.
     #[inline]
     pub(super) fn may_meet(&self, p: &Point, q: &Point) -> bool {

@@ -20,8 +20,13 @@ fn place(random: &mut Random, size: f64) -> DVec3 {
 }
 
 fn lowered(vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Attractor {
-    let shape = Shape::Mesh(PolygonMesh { vertices: vertices.to_vec(), faces, interior: Interior::Surface });
-    Model { name: None, shape }.lower().unwrap().attractor
+    lowered_as(Interior::Surface, vertices, faces).unwrap()
+}
+
+/// None where a solid is asked for and there is none.
+fn lowered_as(interior: Interior, vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Option<Attractor> {
+    let shape = Shape::Mesh(PolygonMesh { vertices: vertices.to_vec(), faces, interior });
+    Model { name: None, shape }.lower().ok().map(|lowered| lowered.attractor)
 }
 
 fn points(vertices: &[DVec3]) -> Attractor {
@@ -372,6 +377,182 @@ fn panels_keep_their_bounds_and_agree_with_the_lattice() {
     assert!(compared > 18 && left < 4, "{compared} compared, {left} left to the lattice");
 }
 
+/// The six faces of a block between two corners, outwards, with its corners from a number on.
+fn block(first: u32, low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+    let corner = |k: u32| low + (high - low) * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    ((0..8).map(corner).collect(), sides.map(|side| side.map(|k| first + k).to_vec()).to_vec())
+}
+
+/// An upright prism on a regular polygon, whose faces are fans around its first corner: needles, where there are many.
+fn prism(sides: u32, radius: f64, height: f64) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+    let at = |k: u32, z: f64| {
+        let (sine, cosine) = (std::f64::consts::TAU * f64::from(k) / f64::from(sides)).sin_cos();
+        DVec3::new(radius * cosine, radius * sine, z)
+    };
+    let vertices = (0..sides).map(|k| at(k, 0.0)).chain((0..sides).map(|k| at(k, height))).collect();
+    let mut faces = Vec::new();
+    for k in 0..sides {
+        let next = (k + 1) % sides;
+        faces.extend([vec![k, next, sides + next], vec![k, sides + next, sides + k]]);
+        if (1..sides - 1).contains(&k) {
+            faces.extend([vec![0, k + 1, k], vec![sides, sides + k, sides + k + 1]]);
+        }
+    }
+    (vertices, faces)
+}
+
+/// A solid's own distance: none inside.
+fn distance_of_solid(x: DVec3, vertices: &[DVec3], attractor: &Attractor) -> f64 {
+    let surfaces = attractor.surfaces();
+    assert!(!surfaces.is_empty(), "{} vertices bound no solid", vertices.len());
+    surfaces.iter().map(|surface| Inside::new(surface).distance(x)).fold(f64::INFINITY, f64::min)
+}
+
+/// Steps, prisms, blocks with a void, and plates as thick as two radii or nearly: within their bounds, filled, with the topology of the lattice's, and far fewer triangles.
+#[test]
+fn solids_keep_their_bounds_and_agree_with_the_lattice() {
+    let mut random = Random(29);
+    let (mut compared, mut left) = (0, 0);
+    for round in 0..32_usize {
+        let radius = [1.0, 0.7][round / 4 % 2];
+        let tolerance = radius * [0.1, 0.05][round / 8 % 2];
+        let (mut vertices, mut faces) = match round % 4 {
+            // Columns beside each other.
+            0 => {
+                let heights: [[u32; 2]; 2] = std::array::from_fn(|_| std::array::from_fn(|_| (random.next() % 3) as u32));
+                let of = |i: u32, j: u32| if i < 2 && j < 2 { 1 + heights[i as usize][j as usize] } else { 0 };
+                let number = |i: u32, j: u32, k: u32| (k * 3 + j) * 3 + i;
+                let vertices = (0..36).map(|n| 4.0 * DVec3::new(f64::from(n % 3), f64::from(n / 3 % 3), f64::from(n / 9))).collect();
+                let mut faces = Vec::new();
+                for (i, j, k) in (0..4).flat_map(|column| (0..3).map(move |k| (column % 2, column / 2, k))) {
+                    if k >= of(i, j) {
+                        continue;
+                    }
+                    let corner = |code: u32| number(i + (code & 1), j + (code >> 1 & 1), k + (code >> 2));
+                    let open = [
+                        k == 0,
+                        k + 1 == of(i, j),
+                        j == 0 || k >= of(i, j - 1),
+                        k >= of(i, j + 1),
+                        i == 0 || k >= of(i - 1, j),
+                        k >= of(i + 1, j),
+                    ];
+                    let (_, sides) = block(0, DVec3::ZERO, DVec3::ONE);
+                    faces.extend(
+                        sides
+                            .iter()
+                            .zip(open)
+                            .filter(|(_, open)| *open)
+                            .map(|(side, _)| side.iter().map(|&code| corner(code)).collect::<Vec<u32>>()),
+                    );
+                }
+                (vertices, faces)
+            }
+            1 => prism(3 + (random.next() % 60) as u32, 5.0 + 4.0 * number(&mut random), 4.0),
+            2 => {
+                let (mut vertices, mut faces) = block(0, DVec3::ZERO, DVec3::splat(9.0));
+                let half = radius * (0.8 + number(&mut random));
+                let (inner, sides) = block(8, DVec3::splat(4.5 - half), DVec3::splat(4.5 + half));
+                vertices.extend(inner);
+                faces.extend(sides.into_iter().map(|side| side.into_iter().rev().collect::<Vec<u32>>()));
+                (vertices, faces)
+            }
+            _ => {
+                let thickness = 2.0 * radius + [0.0, 1e-9, -1e-3, 0.03 * radius][round / 4 % 4];
+                let (size, count) = ([30.0, 6.0][round / 16], [4, 24][round / 8 % 2]);
+                if round / 4 % 2 == 0 {
+                    block(0, DVec3::ZERO, DVec3::new(size, 0.6 * size, thickness))
+                } else {
+                    prism(count, 0.5 * size, thickness)
+                }
+            }
+        };
+        // Half of them in no plane of their own.
+        if round / 4 % 2 == 1 {
+            let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 1.1);
+            vertices.iter_mut().for_each(|vertex| *vertex = turn * *vertex);
+        }
+        // Faces that are not flat after that are cut as they come.
+        if round % 2 == 1 {
+            faces.reverse();
+        }
+        let Some(shape) = lowered_as(Interior::Solid, &vertices, faces) else {
+            assert_eq!(round % 4, 0, "only columns may touch along an edge");
+            continue;
+        };
+        let Some(dilation) = arranged_unless_left(&shape, radius, tolerance) else {
+            println!("LEFT {round} {radius} {tolerance} {} faces", vertices.len());
+            left += 1;
+            continue;
+        };
+        assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
+        assert!(dilation.topology_exact, "{round}: {} uncertain", dilation.uncertain);
+        let inside = Inside::new(dilation.solid.mesh());
+        let bounds = vertices.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)]);
+        for _ in 0..400 {
+            let x = bounds[0] - 1.3 * radius + place(&mut random, 1.0) * (bounds[1] - bounds[0] + 2.6 * radius);
+            let d = distance_of_solid(x, &vertices, &shape);
+            if d < radius - dilation.inner_mm {
+                assert_eq!(inside.winding(x), 1, "{round}: {x} is {d} from the solid");
+            } else if d > radius + dilation.outer_mm {
+                assert_eq!(inside.winding(x), 0, "{round}: {x} is {d} from the solid");
+            }
+        }
+        if round % 4 == 3 {
+            // A lattice takes long for what is as thick as two radii, and does not tell.
+            assert_eq!(topology(&dilation), (1, 0, 2), "{round}");
+            continue;
+        }
+        let other = on_lattice(&shape, radius, tolerance);
+        if other.topology_exact {
+            compared += 1;
+            assert_eq!(topology(&dilation), topology(&other), "{round}");
+        }
+        let triangles = [&dilation, &other].map(|made| made.solid.mesh().triangles.len());
+        assert!(triangles[0] < triangles[1], "{round}: {triangles:?}");
+    }
+    assert!(compared > 16 && left == 0, "{compared} compared, {left} left to the lattice");
+}
+
+/// Blocks that cross in one mesh, which winds around a part of it twice.
+#[test]
+fn solids_that_cross_are_left_to_the_lattice() {
+    let (mut vertices, mut faces) = block(0, DVec3::ZERO, DVec3::splat(10.0));
+    let (others, sides) = block(8, DVec3::splat(5.0), DVec3::splat(15.0));
+    vertices.extend(others);
+    faces.extend(sides);
+    let shape = lowered_as(Interior::Solid, &vertices, faces).unwrap();
+    assert!(arranged_unless_left(&shape, 0.5, 0.05).is_none());
+}
+
+/// Triangles as narrow as rounding, and narrower: within their bounds.
+#[test]
+fn needles_are_arranged() {
+    let mut random = Random(31);
+    for round in 0..60_u32 {
+        let width = [1e-2, 1e-3, 1e-5, 1e-8, 1e-13, 0.0][round as usize % 6];
+        let mut vertices = Vec::new();
+        for _ in 0..4 {
+            let (from, way, off) =
+                (place(&mut random, 20.0), place(&mut random, 16.0) - DVec3::splat(8.0), place(&mut random, 2.0) - DVec3::ONE);
+            // Sharp at one end, or at both.
+            let share = if round / 6 % 2 == 0 { 1.0 } else { number(&mut random) };
+            vertices.extend([from, from + way, from + share * way + width * off]);
+        }
+        let faces = (0..4).map(|k| vec![3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let Some(shape) = lowered_as(Interior::Surface, &vertices, faces) else { continue };
+        let dilation = arranged(&shape, 1.0, 0.05);
+        assert!(dilation.topology_exact && dilation.crossings == 0, "{round}");
+        // No narrower triangle is farther from its longest side.
+        let sides: Vec<[DVec3; 2]> =
+            vertices.chunks(3).flat_map(|corners| [[corners[0], corners[1]], [corners[1], corners[2]], [corners[2], corners[0]]]).collect();
+        if width < 1e-5 {
+            keeps_its_bounds(&dilation, &sides, 1.0, 20.0, &mut random);
+        }
+    }
+}
+
 /// Segments all over each other: what is said to be hidden is within others, and what is said to meet does.
 #[test]
 fn hidden_places_are_hidden() {
@@ -384,7 +565,7 @@ fn hidden_places_are_hidden() {
         let plan = plan(&shape, 1.0, 0.1);
         let setting = plan.setting(plan.pitch(), &budget);
         let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
-        let mut engine = arrangement.engine(0);
+        let mut engine = arrangement.engine(0, &[]);
         assert!(engine.begin(&budget).unwrap());
         let bodies = engine.bodies();
         let count = segments.len() as u32;
@@ -418,4 +599,47 @@ fn hidden_places_are_hidden() {
         }
     }
     assert!(hidden > 300 && shown > 500 && agreed > 500, "{hidden} hidden, {shown} places, {agreed} agreed");
+}
+
+/// Plates as thick as two radii, or a little less: what both faces' dilations have in common is within the plate, or near its rim.
+#[test]
+fn places_hidden_in_solids_are_hidden() {
+    let mut random = Random(43);
+    let (mut hidden, mut shown) = (0, 0);
+    for round in 0..16_u32 {
+        let thickness = [2.0, 1.99, 1.9, 1.5][round as usize % 4];
+        let (vertices, faces) = prism(3 + round, 2.0 + f64::from(round % 5), thickness);
+        let turn = glam::DQuat::from_scaled_axis(f64::from(round / 4) * DVec3::new(0.3, 0.2, 0.1));
+        let vertices: Vec<DVec3> = vertices.into_iter().map(|vertex| turn * vertex).collect();
+        let (shape, budget) = (lowered_as(Interior::Solid, &vertices, faces).unwrap(), Budget::default());
+        let plan = plan(&shape, 1.0, 0.05);
+        let setting = plan.setting(plan.pitch(), &budget);
+        let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
+        let solids: Vec<Inside<'_>> = arrangement.solids.iter().map(Inside::new).collect();
+        let mut engine = arrangement.engine(0, &solids);
+        assert!(engine.begin(&budget).unwrap());
+        let (bodies, count) = (engine.bodies(), arrangement.sites.list.len() as u32);
+        let is_in = |body: u32, x: &DVec3| {
+            let figure = &arrangement.sites.list[body as usize];
+            let is_kept = engine.polytopes.of(body).cuts.iter().all(|plane| height(plane, &x.to_array()) <= 0.0);
+            [figure.distance_squared(&x.to_array()).sqrt() <= 1.0 && is_kept, engine.polytopes.of(body).contains(&x.to_array())]
+        };
+        for (first, second) in (0..count).flat_map(|first| (0..first).map(move |second| (second, first))) {
+            if !bodies.is_hidden(&[first, second], Common::Unknown) {
+                continue;
+            }
+            hidden += 1;
+            for _ in 0..1_000 {
+                // Around the middle, where faces' dilations meet, as far as beyond the rim.
+                let x = turn * (place(&mut random, 1.0) * DVec3::new(16.0, 16.0, 1.0) + DVec3::new(-8.0, -8.0, 0.5 * (thickness - 1.0)));
+                let is_common = (0..2).any(|kind| is_in(first, &x)[kind] && is_in(second, &x)[kind]);
+                if is_common {
+                    let is_hidden = solids[0].winding(x) > 0 || (0..count).any(|body| is_in(body, &x) == [true; 2]);
+                    assert!(is_hidden, "{round}: {first} {second} {x}");
+                    shown += 1;
+                }
+            }
+        }
+    }
+    assert!(hidden > 100 && shown > 400, "{hidden} hidden, {shown} places");
 }
