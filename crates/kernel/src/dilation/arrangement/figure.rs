@@ -9,10 +9,11 @@ use crate::dilation::tree::{Weighted, in_space};
 use crate::measure::triangle::closest_on_triangle;
 use std::cmp::Ordering;
 
-/// Corners of a polygon at most: polytopes have room for their facets.
-const MOST_CORNERS: usize = 12;
-/// The least sine by which a side of what is joined turns from the one before it, unless it goes straight on: facets across sides that hardly turn meet far away.
-const LEAST_TURN: f64 = 0.02;
+/// Sides of a polygon at most by which a polytope begins, which has room for their facets, and corners at most, many of which may turn by little.
+const MOST_SIDES: usize = 12;
+const MOST_CORNERS: usize = 256;
+/// The least sine by which a side of what is joined turns from the one before it, unless it goes straight on.
+const LEAST_TURN: f64 = 1e-6;
 /// Rounds of joining, each of which may double a polygon.
 const ROUNDS: usize = 24;
 /// Polygons with a common side that are looked at: at any number of them most lie in planes of their own.
@@ -108,7 +109,8 @@ impl Polygon {
     /// The polygon with some corners, in their order.
     fn new(corners: Box<[Point]>) -> Self {
         let from = |corner: &Point| subtract(corner, &corners[0]);
-        let fan = corners.windows(2).map(|pair| cross(&from(&pair[0]), &from(&pair[1])));
+        // By the side itself, which loses nothing where it is short.
+        let fan = corners.windows(2).map(|pair| cross(&from(&pair[0]), &subtract(&pair[1], &pair[0])));
         let across = fan.fold([0.0; 3], |sum: Point, part| std::array::from_fn(|axis| sum[axis] + part[axis]));
         let length = dot(&across, &across).sqrt();
         let up = if length > 0.0 { across.map(|part| part / length) } else { [0.0; 3] };
@@ -176,8 +178,8 @@ impl Polygon {
         (corners.last() == Some(side[0])).then_some(corners)
     }
 
-    /// The union with a polygon across a side, if it is convex and flat to within `flatness`.
-    fn joined(&self, other: &Self, [p, q]: [&Point; 2], flatness: f64) -> Option<Self> {
+    /// The union with a polygon across a side, if it is convex, flat to within `flatness`, and has few sides but for what is `within` so far of these.
+    fn joined(&self, other: &Self, [p, q]: [&Point; 2], flatness: f64, within: f64) -> Option<Self> {
         // The larger one's normal is the more exact.
         let up = if self.double() >= other.double() { self.up } else { other.up };
         if up == [0.0; 3] {
@@ -200,7 +202,9 @@ impl Polygon {
         }
         let union = Self::new(corners.into());
         let is_flat = |corner: &Point| union.height(corner).abs() <= flatness;
-        self.corners.iter().chain(&other.corners).all(is_flat).then_some(union)
+        let is_legal = self.corners.iter().chain(&other.corners).all(is_flat)
+            && (union.corners.len() <= MOST_SIDES || union.main_sides(within, |_| false).len() <= MOST_SIDES);
+        is_legal.then_some(union)
     }
 }
 
@@ -228,11 +232,12 @@ pub(super) fn order(a: &Point, b: &Point) -> Ordering {
     (0..3).map(|axis| a[axis].total_cmp(&b[axis])).fold(Ordering::Equal, Ordering::then)
 }
 
-/// Figures with polygons of one radius joined across their common sides, the longest first, as far as unions are convex and flat to within `flatness`.
+/// Figures with polygons of one radius joined across their common sides, the longest first, as far as unions are convex and flat to within `flatness`. Sides that turn by little, and
+/// leave no more than `within` beyond others, are no hindrance.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, budget: &Budget) -> Result<Vec<Figure>, Stopped> {
+pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, within: f64, budget: &Budget) -> Result<Vec<Figure>, Stopped> {
     for figure in &mut figures {
         if let Outline::Polygon(polygon) = &mut figure.outline {
             // Zeros have two signs.
@@ -264,7 +269,7 @@ pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, budget: &Budget) -
                         continue;
                     }
                     let (Some(first), Some(second)) = (figures[own].polygon(), figures[theirs].polygon()) else { continue };
-                    let Some(union) = first.joined(second, [&one.ends[0], &one.ends[1]], flatness) else { continue };
+                    let Some(union) = first.joined(second, [&one.ends[0], &one.ends[1]], flatness, within) else { continue };
                     figures[own].outline = Outline::Polygon(union);
                     gone[theirs] = true;
                     (is_taken[own], is_taken[theirs]) = (true, true);
@@ -287,7 +292,7 @@ mod tests {
 
     fn joined_of(triangles: &[[Point; 3]]) -> Vec<Figure> {
         let figures = triangles.iter().map(|corners| Weighted { site: Site::Triangle(*corners), deficit: 0.0 }.into()).collect();
-        joined(figures, 1e-12, &Budget::default()).unwrap()
+        joined(figures, 1e-12, 1e-3, &Budget::default()).unwrap()
     }
 
     /// What is joined is the same set: places are as far from it as from the triangles.
@@ -337,7 +342,7 @@ mod tests {
         assert!(joined_of(&triangles).len() <= 12, "{}", joined_of(&triangles).len());
         let two =
             [0.0, 0.5].into_iter().zip(&triangles).map(|(deficit, corners)| Weighted { site: Site::Triangle(*corners), deficit }.into());
-        assert_eq!(joined(two.collect(), 1e-12, &Budget::default()).unwrap().len(), 2);
+        assert_eq!(joined(two.collect(), 1e-12, 1e-3, &Budget::default()).unwrap().len(), 2);
     }
 
     /// Also where rounding moves all corners off the plane, and makes equal sides differ.

@@ -1,15 +1,20 @@
 //! The polytope of a convex polygon.
 
 use super::figure::{Figure, Polygon};
+use super::hinges;
 use super::joints;
 use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, frame, height, meeting, normal, share};
 use super::structure::Structure;
-use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// The least sine of a polygon's angles, else it is a needle: facets across its sides would meet too far away.
 const LEAST_SINE: f64 = 1e-3;
+/// Sides are left out where the lines of others meet as near to the polygon as this, in units of the band: what is left of that is cut off at the corners.
+pub(super) const CORNER_SHARE: f64 = 0.25;
+/// The least cosine of the angle between sides that are kept beside some that are not.
+const LEAST_COSINE: f64 = 0.7;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
 const NOISE: f64 = 1e-9;
 /// The facets along the polygon come first.
@@ -36,15 +41,16 @@ impl Polytope {
         let lift = |facet: usize| if facet < FACES { 0.5 * (shell.outer - shell.inner - room) } else { 0.0 };
         let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
         // Sides that hardly turn would meet elsewhere, were they shifted against each other.
-        let outside = |facet: usize| facet.checked_sub(FACES).map_or_else(|| offset(facet), |side| beyond[side].unwrap_or(all));
+        let sides = polygon.main_sides(CORNER_SHARE * (shell.outer - shell.inner), |side| beyond[side].is_some());
+        let outside = |facet: usize| facet.checked_sub(FACES).map_or_else(|| offset(facet), |place| beyond[sides[place]].unwrap_or(all));
         let is_needle = polygon.is_needle();
-        let mut hull = if is_needle { Hull::cuboid(&polygon, offset)? } else { Hull::prism(&polygon, outside)? };
+        let mut hull = if is_needle { Hull::cuboid(&polygon, offset)? } else { Hull::prism(&polygon, &sides, outside)? };
         let noise = NOISE * shell.outer;
         // A polygon around a circle: half of it between both faces.
         let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
         let up = normal(&hull.planes[0]);
-        for (side, corner) in polygon.corners.iter().enumerate().filter(|&(side, _)| !is_needle && beyond[side].is_none()) {
-            let out = normal(&hull.planes[FACES + side]);
+        for (place, &side) in sides.iter().enumerate().filter(|&(_, &side)| !is_needle && beyond[side].is_none()) {
+            let (out, corner) = (normal(&hull.planes[FACES + place]), &polygon.corners[side]);
             for k in 1..strips {
                 let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();
                 let direction: Point = std::array::from_fn(|axis| cosine * up[axis] + sine * out[axis]);
@@ -66,20 +72,54 @@ impl Polytope {
 }
 
 impl Polygon {
-    /// Whether two sides that follow each other are nearly along one line, or have no length.
+    /// Whether a side nearly goes back along the one before it, or sides have no length.
     pub(super) fn is_needle(&self) -> bool {
         let sides: Vec<Point> = self.sides().map(|[from, to]| subtract(&to, &from)).collect();
         let length = |vector: &Point| dot(vector, vector).sqrt();
-        let has_angle = |one: &Point, other: &Point| length(&cross(one, other)) / (length(one) * length(other)) > LEAST_SINE;
-        !(0..sides.len()).all(|k| has_angle(&sides[k], &sides[(k + 1) % sides.len()]))
+        let goes_on = |one: &Point, other: &Point| {
+            let lengths = length(one) * length(other);
+            length(&cross(one, other)) > LEAST_SINE * lengths || dot(one, other) > 0.0
+        };
+        !(0..sides.len()).all(|k| goes_on(&sides[k], &sides[(k + 1) % sides.len()]))
+    }
+
+    /// Sides, in their order, whose lines bound what is no farther from the polygon than `within`, or nearly: those that are needed, and of many that turn by little some.
+    pub(super) fn main_sides(&self, within: f64, is_needed: impl Fn(usize) -> bool) -> Vec<usize> {
+        let count = self.corners.len();
+        let out: Vec<Point> = (0..count).map(|side| hinges::outward(self, side)).collect();
+        // Where the line of one meets that of a later one.
+        let is_near = |one: usize, later: usize| {
+            let along = cross(&self.up, &out[one]);
+            let (sine, cosine) = (dot(&along, &out[later]), dot(&out[one], &out[later]));
+            let from = self.corners[(one + 1) % count];
+            let share = dot(&subtract(&self.corners[later], &from), &out[later]) / sine;
+            let meeting: Point = std::array::from_fn(|axis| from[axis] + share * along[axis]);
+            cosine > LEAST_COSINE && sine > 0.0 && distance_squared(&meeting, &self.closest(&meeting)) < within * within
+        };
+        let first = (0..count).find(|&side| is_needed(side)).unwrap_or_default();
+        let (mut kept, mut place) = (vec![first], 1);
+        while place < count {
+            let at = |place: usize| (first + place) % count;
+            let last = kept[kept.len() - 1];
+            // As far as sides between may be left out; the first one ends the last.
+            while place < count && !is_needed(at(place)) && is_near(last, at(place + 1)) {
+                place += 1;
+            }
+            if place < count {
+                kept.push(at(place));
+            }
+            place += 1;
+        }
+        kept.sort_unstable();
+        kept
     }
 }
 
 impl Hull {
-    /// Both faces, and a facet across the polygon at every side.
-    fn prism(polygon: &Polygon, offset: impl Fn(usize) -> f64) -> Option<Self> {
-        let out = polygon.sides().map(|[from, to]| unit(&cross(&subtract(&to, &from), &polygon.up)));
-        Self::upright(polygon, &polygon.up, &out.collect::<Vec<Point>>(), offset)
+    /// Both faces, and a facet across the polygon at some of its sides.
+    fn prism(polygon: &Polygon, sides: &[usize], offset: impl Fn(usize) -> f64) -> Option<Self> {
+        let out: Vec<Point> = sides.iter().map(|&side| hinges::outward(polygon, side)).collect();
+        Self::upright(polygon, &polygon.up, &out, offset)
     }
 
     /// A cuboid around a polygon, along its longest way from corner to corner.

@@ -41,8 +41,8 @@ use std::sync::OnceLock;
 /// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
 const MOST_NEAR: [usize; 2] = [5_000, 250];
 /// So many sets, and so many doubts that the first polytopes leave about larger ones, take as long as the lattice at one of its cubes along a polygon: with large faces there may be more of both.
-const SETS_PER_CUBE: f64 = 20.0;
-const DOUBTS_PER_CUBE: f64 = 0.2;
+const SETS_PER_CUBE: f64 = 100.0;
+const DOUBTS_PER_CUBE: f64 = 0.5;
 /// Doubts that polytopes may leave, of pairs and of larger sets, as shares of the sites, and in any case. Pairs nearly touch, and finer polytopes tell that they do, or do not. With more doubts of larger sets these are no matter of a few places, and finer polytopes
 /// everywhere cost more than a lattice.
 const MOST_DOUBTS: [f64; 2] = [4.0, 0.3];
@@ -100,8 +100,9 @@ impl<'a> Arrangement<'a> {
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let Some(mut sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
-        sites.list = figure::joined(sites.list, FLATNESS * setting.slack, budget)?;
         let shell = |figure: &Figure| setting.shell(figure, State::default());
+        let band = sites.list.iter().map(shell).map(|shell| shell.outer - shell.inner).fold(f64::INFINITY, f64::min);
+        sites.list = figure::joined(sites.list, FLATNESS * setting.slack, hull::CORNER_SHARE * band, budget)?;
         let forms = Forms::default();
         let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
         let scales = if sites.list.iter().any(|figure| figure.polygon().is_none() && polytopes::kind(figure) == Kind::Rod) {

@@ -515,6 +515,44 @@ fn solids_keep_their_bounds_and_agree_with_the_lattice() {
     assert!(compared > 16 && left == 0, "{compared} compared, {left} left to the lattice");
 }
 
+/// Discs and sectors with so many corners that sides hardly turn, as fans of needles: few polygons, within their bounds.
+#[test]
+fn fine_rims_are_arranged() {
+    let mut random = Random(37);
+    for (count, radius, tolerance) in [(90_u32, 1.0, 0.1), (400, 1.0, 0.02), (1_500, 0.5, 0.05), (400, 6.0, 0.3)] {
+        for share in [1.0, 0.4] {
+            let rim = (0..=count).map(|k| {
+                let (sine, cosine) = (std::f64::consts::TAU * share * f64::from(k) / f64::from(count)).sin_cos();
+                20.0 * DVec3::new(cosine, 0.6 * sine, 0.8 * sine)
+            });
+            let vertices: Vec<DVec3> = [DVec3::ZERO].into_iter().chain(rim).collect();
+            let faces: Vec<Vec<u32>> = (1..=count).map(|k| vec![0, k, if share == 1.0 && k == count { 1 } else { k + 1 }]).collect();
+            let shape = lowered(&vertices, faces.clone());
+            let dilation = arranged(&shape, radius, tolerance);
+            assert!(dilation.topology_exact && dilation.crossings == 0 && topology(&dilation) == (1, 0, 2), "{count} {share}");
+            let inside = Inside::new(dilation.solid.mesh());
+            let distance = |x: DVec3| {
+                let of = |face: &Vec<u32>| {
+                    let [a, b, c] = [0, 1, 2].map(|k| vertices[face[k] as usize].to_array());
+                    x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
+                };
+                faces.iter().map(of).fold(f64::INFINITY, f64::min)
+            };
+            for _ in 0..400 {
+                let on = vertices[(random.next() % u64::from(count)) as usize + 1] * number(&mut random).powf(0.3);
+                let away = place(&mut random, 2.0) - DVec3::ONE;
+                let x = on + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(&mut random));
+                let d = distance(x);
+                if d < radius - dilation.inner_mm {
+                    assert_eq!(inside.winding(x), 1, "{count} {share}: {x} is {d} from the disc");
+                } else if d > radius + dilation.outer_mm {
+                    assert_eq!(inside.winding(x), 0, "{count} {share}: {x} is {d} from the disc");
+                }
+            }
+        }
+    }
+}
+
 /// Blocks that cross in one mesh, which winds around a part of it twice.
 #[test]
 fn solids_that_cross_are_left_to_the_lattice() {
