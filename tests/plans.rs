@@ -75,7 +75,7 @@ fn seconds_follow_the_work_and_are_left_out_where_they_are_not_known() {
     // The number of triangles goes with the inverse of the tolerance.
     assert!(of(0.01) > 1.5 * of(0.02), "{} and {}", of(0.01), of(0.02));
     // The simplification of a lattice's surface takes longer than the lattice; wires that are simplified have none.
-    for (name, tolerance, radius, costs_more) in [("meshes/icosahedron", 0.07, 0.9, true), ("curves/circle", 0.02, 0.5, false)] {
+    for (name, tolerance, radius, costs_more) in [("nurbs/torus", 0.1, 1.0, true), ("curves/circle", 0.02, 0.5, false)] {
         let mut job = order(name, tolerance, radius);
         let bare = seconds(&job).unwrap();
         job["params"]["simplify"] = json!(true);

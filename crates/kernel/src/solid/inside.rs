@@ -7,8 +7,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
-/// The least sine of a triangle's angle at its first corner by which its plane is known to within [`NOISE`] of lengths.
+/// The least sine of a triangle's angle at its first corner by which its plane tells whether it meets a box: with any direction n, a corner a and a place y of the triangle in the box, |n . a| is no more than n . y reaches in
+/// the box and |n . (a - y)|, which is small where n is the plane's normal up to rounding.
 const LEAST_SINE: f64 = 1e-4;
+/// Rounding of places, as a share of their distance from the box's middle.
 const NOISE: f64 = 1e-10;
 
 /// A closed mesh that tells which points it encloses.

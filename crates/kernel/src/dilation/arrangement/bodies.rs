@@ -21,6 +21,8 @@ const NOISE: f64 = 1e-13;
 const MOST_BOXES: usize = 4_000;
 const HALVINGS: usize = 12;
 const HALVINGS_IN_SOLIDS: usize = 40;
+/// Of directions, as a share: their ends are places of the model less others, as far as the radius or more, or unit vectors.
+const ROUNDING: f64 = 1e-9;
 /// Boxes no wider than this, in units of the radius, are not halved for the face of a solid across them.
 const NARROW: f64 = 0.25;
 
@@ -154,11 +156,15 @@ impl Bodies<'_> {
         })
     }
 
-    /// Axes along which what a body has in common with others is likely to be narrow: those of a polygon's plane and its first side.
-    fn axes(&self, body: u32) -> [Point; 3] {
+    /// Orthonormal axes along which what a body has in common with others is likely to be narrow: those of a polygon's plane and its longest side.
+    pub(super) fn axes(&self, body: u32) -> [Point; 3] {
         let of_polygon = |polygon: &Polygon| {
-            let (up, along) = (polygon.up, unit(&subtract(&polygon.corners[1], &polygon.corners[0])));
-            [along, cross(&up, &along), up]
+            let sides = polygon.sides().map(|[from, to]| subtract(&to, &from));
+            let longest = sides.max_by(|a, b| dot(a, a).total_cmp(&dot(b, b))).unwrap_or_default();
+            // Corners are in the plane up to rounding, of which short sides would make an angle.
+            let rise = dot(&longest, &polygon.up);
+            let along = unit(&std::array::from_fn(|axis| longest[axis] - rise * polygon.up[axis]));
+            [along, cross(&polygon.up, &along), polygon.up]
         };
         let axes = self.figures[body as usize].polygon().filter(|polygon| !polygon.is_needle()).map(of_polygon);
         axes.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -188,9 +194,10 @@ impl Bodies<'_> {
         boxes.left = boxes.left.saturating_sub(1);
         let (size, slack) = (subtract(&high, &low), self.setting.slack);
         let centre = boxes.place(&between(&low, &high, 0.5));
-        // All of the box is no farther from its centre, as a whole and along a direction.
-        let half = 0.5 * dot(&size, &size).sqrt() + 2.0 * slack;
-        let half_along = |direction: &Point| 0.5 * dot(&boxes.axes.map(|axis| dot(&axis, direction).abs()), &size) + 2.0 * slack;
+        // All of the box is no farther from its centre, as a whole and along a direction, which rounding turns by some millionths of millionths.
+        let half = 0.5 * dot(&size, &size).sqrt() * (1.0 + ROUNDING) + 2.0 * slack;
+        let half_along =
+            |direction: &Point| 0.5 * dot(&boxes.axes.map(|axis| dot(&axis, direction).abs()), &size) + ROUNDING * half + 2.0 * slack;
         let mut highest = f64::NEG_INFINITY;
         for &body in boxes.set {
             let (above, away) = self.above(boxes.kind, body, &centre);
@@ -201,12 +208,13 @@ impl Bodies<'_> {
         }
         let (mut across, mut is_centre_hidden) = (DVec3::ZERO, false);
         for solid in self.solids {
-            let is_centre_inside = solid.winding(DVec3::from_array(centre)) > 0;
-            match solid.across(&boxes.axes.map(DVec3::from_array), DVec3::from_array(low), DVec3::from_array(high)) {
-                None if is_centre_inside => return true,
-                own => across += own.unwrap_or_default(),
+            let own = solid.across(&boxes.axes.map(DVec3::from_array), DVec3::from_array(low), DVec3::from_array(high));
+            let is_centre_inside = || solid.winding(DVec3::from_array(centre)) > 0;
+            if own.is_none() && is_centre_inside() {
+                return true;
             }
-            is_centre_hidden |= is_centre_inside;
+            across += own.unwrap_or_default();
+            is_centre_hidden |= highest <= 0.0 && own.is_some() && is_centre_inside();
         }
         let corner = |number: usize| boxes.place(&std::array::from_fn(|axis| if number >> axis & 1 == 1 { high[axis] } else { low[axis] }));
         let holds = |body: u32, x: &Point| [Kind::Dilation, Kind::Polytope].iter().all(|&kind| self.above(kind, body, x).0 < -slack);

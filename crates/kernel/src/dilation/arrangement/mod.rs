@@ -125,8 +125,10 @@ impl<'a> Arrangement<'a> {
         let Some(near) = pieces::near(&bodies, [MOST_NEAR[0], MOST_NEAR[1].max(sets)], budget)? else { return Ok(None) };
         drop(bodies);
         let solids = rule.attractor().surfaces();
+        // About half of what is around the faces of solids is inside of these.
+        let inside = 0.5 * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
         let mut arrangement = Self { setting, sites, beyond, near, forms, solids, cubes, triangles: 0.0 };
-        arrangement.triangles = arrangement.expected_triangles(budget)?;
+        arrangement.triangles = (1.0 - inside) * arrangement.expected_triangles(budget)?;
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
     }
@@ -161,9 +163,7 @@ impl<'a> Arrangement<'a> {
         for trial in 0..TRIALS {
             match self.engine(trial, &solids).run(budget)? {
                 Run::Done(mut arranged) => {
-                    // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
-                    let is_sure = solids.is_empty() || arranged.uncertain == 0;
-                    if !is_sure || !solids::leave_out(&solids, &mut arranged.surface) {
+                    if !solids::leave_out(&solids, &mut arranged.surface) {
                         break;
                     }
                     arranged.surface.leaves = self.sites.leaves;
@@ -318,6 +318,10 @@ impl Engine<'_> {
             }
             allowed = most;
             changed = self.refine(sets.doubts());
+        }
+        // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
+        if !self.solids.is_empty() && !sets.doubts().is_empty() {
+            return Ok(Run::Doubtful);
         }
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
         let Some(boundary) = facets::boundary(&self.polytopes, &pieces, budget)? else { return Ok(Run::Open) };

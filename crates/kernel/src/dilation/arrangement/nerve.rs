@@ -9,15 +9,15 @@
 //! * (neither meets) neither the D_i have a common point, nor the P_i: every body is within one of these, or
 //! * (hidden) all common points of the D_i, and all of the P_i, are in the interior of some E_j, or of a solid, and so in that of the union, all the time.
 //!
-//! If that is shown of all sets, both unions have as many components, handles and voids. Sets that hold one which does not meet, or which is hidden, are so, too.
+//! If that is shown of all sets, both unions, with the solids, have as many components, handles and voids. Sets that hold one which does not meet, or which is hidden, are so, too.
 
 use super::bodies::{Bodies, Common, Verdict};
 use crate::attractor::cell::{Point, between};
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 
-/// Hubs that a site suggests at most: half of all, others are met later.
-const OWN_HUBS: usize = 32;
+/// Corners at most that a site suggests as hubs, with the middles between them: half of the room, others are met later.
+const OWN_CORNERS: usize = 7;
 /// Bodies of a set at most.
 const MOST_BODIES: usize = 4;
 /// Sites that are looked at before doubts are counted.
@@ -144,8 +144,11 @@ impl<'a> Search<'a> {
     fn new(bodies: &'a Bodies<'a>, first: u32, later: Vec<u32>, changed: &'a [bool]) -> Self {
         let mut search = Self { bodies, first, hubs: vec![0; later.len()], count: 0, later, changed, found: Doubts::default() };
         let corners = bodies.figures[first as usize].corners();
-        let middles = (0..corners.len()).flat_map(|p| (0..=p).map(move |q| between(&corners[p], &corners[q], 0.5)));
-        middles.take(OWN_HUBS).for_each(|middle| search.add_hub(&middle));
+        // Of many some, from all around.
+        let some: Vec<Point> = corners.iter().step_by(corners.len().div_ceil(OWN_CORNERS)).copied().collect();
+        for (place, one) in some.iter().enumerate() {
+            some[..=place].iter().for_each(|other| search.add_hub(&between(one, other, 0.5)));
+        }
         search
     }
 

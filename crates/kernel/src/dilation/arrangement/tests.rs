@@ -482,7 +482,6 @@ fn solids_keep_their_bounds_and_agree_with_the_lattice() {
             continue;
         };
         let Some(dilation) = arranged_unless_left(&shape, radius, tolerance) else {
-            println!("LEFT {round} {radius} {tolerance} {} faces", vertices.len());
             left += 1;
             continue;
         };
@@ -637,6 +636,42 @@ fn hidden_places_are_hidden() {
         }
     }
     assert!(hidden > 300 && shown > 500 && agreed > 500, "{hidden} hidden, {shown} places, {agreed} agreed");
+}
+
+/// Plates side by side with a chamfered corner, so small that rounding turns its side anyhow, far from the origin: they do not meet, and nothing between them is hidden.
+#[test]
+fn short_sides_turn_no_boxes() {
+    let mut random = Random(47);
+    for tiny in [1e-3, 1e-7, 1e-9, 1e-11] {
+        for trial in 0..30 {
+            let turn = glam::DQuat::from_scaled_axis(place(&mut random, 2.0));
+            let flat = [[0.0, 0.0], [40.0, 0.0], [40.0, 20.0], [tiny, 20.0], [0.0, 20.0 - tiny]];
+            let corner = |k: usize, z: f64| {
+                let [x, y] = flat[((if trial / 5 % 2 == 1 { 4 - k } else { k }) + trial) % 5];
+                turn * DVec3::new(x + 1000.0, y, z)
+            };
+            let vertices: Vec<DVec3> =
+                [0.0, 2.002].into_iter().flat_map(|z| (0..5).map(move |k| (k, z))).map(|(k, z)| corner(k, z)).collect();
+            let faces = [0, 5].into_iter().flat_map(|first| (1..4).map(move |k| vec![first, first + k, first + k + 1])).collect();
+            let shape = lowered(&vertices, faces);
+            let (plan, budget) = (plan(&shape, 1.0, 0.1), Budget::default());
+            let setting = plan.setting(plan.pitch(), &budget);
+            let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
+            let mut engine = arrangement.engine(0, &[]);
+            assert!(engine.begin(&budget).unwrap());
+            let bodies = engine.bodies();
+            for body in 0..arrangement.sites.list.len() as u32 {
+                let axes = bodies.axes(body).map(DVec3::from_array);
+                let skew = |p: usize, q: usize| (axes[p].dot(axes[q]) - f64::from(u8::from(p == q))).abs();
+                assert!((0..9).all(|place| skew(place / 3, place % 3) < 1e-14), "{tiny} {trial}: {axes:?}");
+            }
+            if arrangement.sites.list.len() == 2 {
+                assert!(!bodies.is_hidden(&[0, 1], Common::Unknown), "{tiny} {trial}");
+            }
+            let dilation = arranged(&shape, 1.0, 0.1);
+            assert!(!dilation.topology_exact || topology(&dilation) == (2, 0, 4), "{tiny} {trial}");
+        }
+    }
 }
 
 /// Plates as thick as two radii, or a little less: what both faces' dilations have in common is within the plate, or near its rim.
