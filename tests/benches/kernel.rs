@@ -1,4 +1,4 @@
-//! Speed of the kernel: dilation of the Sierpinski tetrahedron, evaluation of millions of leaves, also beside the same
+//! Speed of the kernel: dilation of the Sierpinski tetrahedron and of prisms, evaluation of millions of leaves, also beside the same
 //! loop by hand, and proofs of convergence.
 //!
 //! `cargo bench --package lacuna-tests --bench kernel`
@@ -19,7 +19,7 @@ use lacuna_fabrication::{Input, Job, JobKind, Outcome, Params, run};
 use lacuna_kernel::attractor::count_cells;
 use lacuna_kernel::automaton::convergence::contraction;
 use lacuna_kernel::budget::{Budget, Limits};
-use lacuna_kernel::model::{AffineMap, Ifs, Model, Shape};
+use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::Tolerance;
 
 /// Homotheties of a ratio towards points.
@@ -56,6 +56,31 @@ fn dilation(criterion: &mut Criterion) {
         let job = job(tetrahedron(), JobKind::Solidify, tolerance, Some(radius));
         group.throughput(Throughput::Elements(done(&job).certificate.triangles));
         group.bench_with_input(BenchmarkId::from_parameter(radius), &job, |bencher, job| bencher.iter(|| black_box(done(job))));
+    }
+    group.finish();
+}
+
+/// An upright prism on a regular polygon with circumradius 20 mm, 20 mm high: few corners or many, faces as fans of needles.
+fn prism(sides: u32) -> Shape {
+    let rim = (0..sides).map(|k| (std::f64::consts::TAU * f64::from(k) / f64::from(sides)).sin_cos());
+    let ring: Vec<DVec3> = rim.map(|(sine, cosine)| 20.0 * DVec3::new(cosine, sine, 0.0)).collect();
+    let vertices = ring.iter().copied().chain(ring.iter().map(|corner| *corner + 20.0 * DVec3::Z)).collect();
+    let mut faces = Vec::new();
+    for (k, next) in (0..sides).map(|k| (k, (k + 1) % sides)) {
+        faces.extend([vec![k, next, sides + next], vec![k, sides + next, sides + k]]);
+        if (1..sides - 1).contains(&k) {
+            faces.extend([vec![0, k + 1, k], vec![sides, sides + k, sides + k + 1]]);
+        }
+    }
+    Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Solid })
+}
+
+fn solids(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("solidify a prism of 40 mm by 1 mm within 0.1 mm");
+    group.sample_size(10).measurement_time(Duration::from_secs(10));
+    for sides in [4, 64, 1_000] {
+        let job = job(prism(sides), JobKind::Solidify, 0.1, Some(1.0));
+        group.bench_with_input(BenchmarkId::from_parameter(sides), &job, |bencher, job| bencher.iter(|| black_box(done(job))));
     }
     group.finish();
 }
@@ -110,5 +135,5 @@ fn convergence(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, dilation, evaluation, leaves, convergence);
+criterion_group!(benches, dilation, solids, evaluation, leaves, convergence);
 criterion_main!(benches);
