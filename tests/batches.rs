@@ -299,6 +299,8 @@ fn a_service_killed_while_it_accepts_has_whole_batches_or_none() {
         let service = Service::start_with(scratch.path(), &environment);
         assert!(assert_whole(&service, SIZE as usize) >= accepted.len());
         accepted.iter().for_each(|id: &String| assert_eq!(service.get(&format!("/v1/batches/{id}")).status, 200));
+        // What was begun when the last one was killed ends first: a job whose worker goes twice is given up.
+        accepted.iter().for_each(|id| drop(ended(&service, id)));
         let count = AtomicUsize::new(0);
         std::thread::scope(|scope| {
             let (service_there, ids, count) = (&service, &mut accepted, &count);
@@ -321,16 +323,10 @@ fn a_service_killed_while_it_accepts_has_whole_batches_or_none() {
     let service = Service::start_with(scratch.path(), &environment);
     let there = assert_whole(&service, SIZE as usize);
     assert!(there >= accepted.len());
-    let mut interrupted = 0;
     for id in &accepted {
         let view = ended(&service, id);
-        // Whoever was at work when it was killed, twice, is not begun again.
-        let is_right = |job: &Value| job["state"] == "succeeded" || job["problem"]["code"] == "interrupted";
-        assert!(view["jobs"].as_array().unwrap().iter().all(is_right), "{view}");
-        interrupted += view["counts"]["failed"].as_u64().unwrap();
+        assert_eq!(view["state"], "succeeded", "{view}");
     }
-    // One worker has one job at a time.
-    assert!(interrupted <= 3, "{interrupted} of 6 kills came twice to one job");
     eprintln!("killed 6 times while it accepted batches of {SIZE}: all {} accepted ones are there and have ended", accepted.len());
     assert!(accepted.len() >= 12, "{} accepted", accepted.len());
 }

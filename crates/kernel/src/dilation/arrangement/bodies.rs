@@ -26,6 +26,9 @@ const ROUNDING: f64 = 1e-9;
 /// Boxes no wider than this, in units of the radius, are not halved for the face of a solid across them.
 const NARROW: f64 = 0.25;
 
+/// The axes of coordinates.
+const AXES: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// The figures and what stands for them.
 pub(super) struct Bodies<'a> {
     pub(super) setting: &'a Setting,
@@ -73,7 +76,7 @@ impl Bodies<'_> {
     pub(super) fn verdict(&self, set: &[u32]) -> Verdict {
         let settled = |common: Common| Verdict { common, is_doubtful: false, hub: None };
         let Setting { reach, outer, slack, .. } = *self.setting;
-        let within = self.common_box(set, |body| self.figures[body as usize].bounds_of_dilation(outer + slack));
+        let within = common_box(&AXES, set.iter().map(|&body| self.around(body, outer + slack)));
         if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
             return settled(Common::None);
         }
@@ -134,10 +137,10 @@ impl Bodies<'_> {
         self.cut_off(set, x, by - self.setting.reach)
     }
 
-    fn common_box(&self, set: &[u32], of: impl Fn(u32) -> [Point; 2]) -> [Point; 2] {
-        set.iter().map(|&body| of(body)).fold([[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]], |[low, high], own| {
-            [std::array::from_fn(|axis| low[axis].max(own[0][axis])), std::array::from_fn(|axis| high[axis].min(own[1][axis]))]
-        })
+    /// A body's corners, and how far from their hull places are that are in its dilation by a radius.
+    fn around(&self, body: u32, radius: f64) -> (&[Point], f64) {
+        let figure = &self.figures[body as usize];
+        (figure.corners(), figure.in_space(radius))
     }
 
     /// Whether the places that the dilations of a set have in common, unless they have none, and those that its polytopes have, are all in the interior of others, of their dilation and their polytope, or of solids.
@@ -148,10 +151,11 @@ impl Bodies<'_> {
         let halvings = if self.solids.is_empty() { HALVINGS } else { HALVINGS_IN_SOLIDS };
         [Kind::Dilation, Kind::Polytope].into_iter().all(|kind| {
             boxes.kind = kind;
-            let common = boxes.common(|body| match kind {
-                Kind::Dilation => (self.figures[body as usize].corners(), self.figures[body as usize].in_space(reach + slack)),
-                Kind::Polytope => (&self.polytopes.of(body).corners, slack),
-            });
+            let part = |&body: &u32| match kind {
+                Kind::Dilation => self.around(body, reach + slack),
+                Kind::Polytope => (&*self.polytopes.of(body).corners, slack),
+            };
+            let common = common_box(&boxes.axes, set.iter().map(part));
             (matches!(kind, Kind::Dilation) && common_points == Common::None) || self.are_hidden(&mut boxes, common, &around, halvings)
         })
     }
@@ -167,7 +171,7 @@ impl Bodies<'_> {
             [along, cross(&polygon.up, &along), polygon.up]
         };
         let axes = self.figures[body as usize].polygon().filter(|polygon| !polygon.is_needle()).map(of_polygon);
-        axes.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        axes.unwrap_or(AXES)
     }
 
     /// How far a place is beyond a body, or less, and where it is within, how far it is from being beyond, or less, as a negative number: a convex function, with a subgradient.
@@ -182,8 +186,7 @@ impl Bodies<'_> {
             }
             Kind::Polytope => (&polytope.planes, (f64::NEG_INFINITY, [0.0; 3])),
         };
-        let highest = planes.iter().map(|plane| (height(plane, x), plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
-        highest.filter(|&(height, _)| height > beyond.0).map_or(beyond, |(height, plane)| (height, normal(plane)))
+        top(x, planes.iter()).filter(|&(height, _)| height > beyond.0).unwrap_or(beyond)
     }
 
     /// Whether the places in a box that bodies of a set have in common are all hidden, by one of those around or by a solid.
@@ -258,29 +261,34 @@ struct Boxes<'s> {
 }
 
 impl Boxes<'_> {
-    /// The box that bodies have in common, each the hull of points and what is no farther from it than a length.
-    fn common<'p>(&self, of: impl Fn(u32) -> (&'p [Point], f64)) -> [Point; 2] {
-        let mut common = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
-        for (points, by) in self.set.iter().map(|&body| of(body)) {
-            for (axis, direction) in self.axes.iter().enumerate() {
-                let along = points.iter().map(|point| dot(direction, point));
-                let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
-                (common[0][axis], common[1][axis]) = (common[0][axis].max(low - by), common[1][axis].min(high + by));
-            }
-        }
-        common
-    }
-
     /// The place with some coordinates.
     fn place(&self, along: &Point) -> Point {
         std::array::from_fn(|k| (0..3).map(|axis| along[axis] * self.axes[axis][k]).sum())
     }
 }
 
-/// The highest plane of some at a place, if it is higher than something: by how much, and its normal.
+/// The box along some axes that parts have in common, each the hull of points and what is no farther from it than a length.
+fn common_box<'p>(axes: &[Point; 3], parts: impl Iterator<Item = (&'p [Point], f64)>) -> [Point; 2] {
+    let mut common = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
+    for (points, by) in parts {
+        for (axis, direction) in axes.iter().enumerate() {
+            let along = points.iter().map(|point| dot(direction, point));
+            let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+            (common[0][axis], common[1][axis]) = (common[0][axis].max(low - by), common[1][axis].min(high + by));
+        }
+    }
+    common
+}
+
+/// How high a place is above the plane of some that it is highest above, and the plane's normal.
+fn top<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>) -> Option<(f64, Point)> {
+    let top = planes.map(|plane| (height(plane, x), plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+    top.map(|(height, plane)| (height, normal(plane)))
+}
+
+/// The same, if it is higher than something, and by how much.
 fn highest<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>, than: f64) -> Option<(f64, Point)> {
-    let highest = planes.map(|plane| (height(plane, x), plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
-    highest.filter(|&(height, _)| height > than).map(|(height, plane)| (height - than, normal(plane)))
+    top(x, planes).filter(|&(height, _)| height > than).map(|(height, normal)| (height - than, normal))
 }
 
 /// Whether convex functions are all at most 0 somewhere in a box. `above` gives, for a place where one is not, its value and a subgradient there that is no longer than 1.

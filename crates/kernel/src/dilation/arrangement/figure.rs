@@ -90,12 +90,6 @@ impl Figure {
         in_space(distance, self.deficit)
     }
 
-    /// The box of its dilation by a radius, the deficit included.
-    pub(super) fn bounds_of_dilation(&self, radius: f64) -> [Point; 2] {
-        let ([low, high], by) = (self.bounds(), self.in_space(radius));
-        [low.map(|x| x - by), high.map(|x| x + by)]
-    }
-
     /// Its box.
     pub(super) fn bounds(&self) -> [Point; 2] {
         let extreme = |first: f64, choose: fn(f64, f64) -> f64| -> Point {

@@ -41,15 +41,16 @@ impl Polytope {
         let lift = |facet: usize| if facet < FACES { 0.5 * (shell.outer - shell.inner - room) } else { 0.0 };
         let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
         // Sides that hardly turn would meet elsewhere, were they shifted against each other.
-        let sides = polygon.main_sides(CORNER_SHARE * (shell.outer - shell.inner), |side| beyond[side].is_some());
-        let outside = |facet: usize| facet.checked_sub(FACES).map_or_else(|| offset(facet), |place| beyond[sides[place]].unwrap_or(all));
         let is_needle = polygon.is_needle();
+        let within = CORNER_SHARE * (shell.outer - shell.inner);
+        let sides = if is_needle { Vec::new() } else { polygon.main_sides(within, |side| beyond[side].is_some()) };
+        let outside = |facet: usize| facet.checked_sub(FACES).map_or_else(|| offset(facet), |place| beyond[sides[place]].unwrap_or(all));
         let mut hull = if is_needle { Hull::cuboid(&polygon, offset)? } else { Hull::prism(&polygon, &sides, outside)? };
         let noise = NOISE * shell.outer;
         // A polygon around a circle: half of it between both faces.
         let strips = (PI / (2.0 * ((shell.inner + room) / shell.outer).clamp(0.0, 1.0).acos())).ceil() as usize;
         let up = normal(&hull.planes[0]);
-        for (place, &side) in sides.iter().enumerate().filter(|&(_, &side)| !is_needle && beyond[side].is_none()) {
+        for (place, &side) in sides.iter().enumerate().filter(|&(_, &side)| beyond[side].is_none()) {
             let (out, corner) = (normal(&hull.planes[FACES + place]), &polygon.corners[side]);
             for k in 1..strips {
                 let (sine, cosine) = (PI * k as f64 / strips as f64).sin_cos();

@@ -1,5 +1,6 @@
 use super::bodies::Common;
 use super::polytopes::height;
+use super::{Arrangement, Engine};
 use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
 use crate::dilation::plan::{Balls, Plan};
@@ -10,6 +11,7 @@ use crate::solid::Inside;
 use crate::split_mix::Random;
 use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
+use std::fmt::Display;
 
 fn number(random: &mut Random) -> f64 {
     random.share()
@@ -75,6 +77,38 @@ fn topology(dilation: &Dilation) -> (u64, u64, i64) {
     (topology.components, topology.cavities, topology.euler)
 }
 
+/// Asserts that a place is inside if it is deeper than the bounds, and not if it is beyond; d is its distance from what was dilated.
+fn assert_bounds(case: impl Display, inside: &Inside<'_>, dilation: &Dilation, radius: f64, x: DVec3, d: f64) {
+    if d < radius - dilation.inner_mm {
+        assert_eq!(inside.winding(x), 1, "{case}: {x} is {d} from the sites");
+    } else if d > radius + dilation.outer_mm {
+        assert_eq!(inside.winding(x), 0, "{case}: {x} is {d} from the sites");
+    }
+}
+
+/// The distance of a place from triangles.
+fn distance_of_triangles(x: DVec3, vertices: &[DVec3], faces: &[Vec<u32>]) -> f64 {
+    let of = |face: &Vec<u32>| {
+        let [a, b, c] = [0, 1, 2].map(|k| vertices[face[k] as usize].to_array());
+        x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
+    };
+    faces.iter().map(of).fold(f64::INFINITY, f64::min)
+}
+
+/// Whether a place is in the dilation of a body by 1, and in its polytope.
+fn is_in(engine: &Engine<'_>, body: u32, x: DVec3) -> [bool; 2] {
+    let (x, polytope) = (x.to_array(), engine.polytopes.of(body));
+    let is_kept = polytope.cuts.iter().all(|plane| height(plane, &x) <= 0.0);
+    [engine.sites[body as usize].distance_squared(&x).sqrt() <= 1.0 && is_kept, polytope.contains(&x)]
+}
+
+/// What is told of a shape's arrangement, which there is.
+fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&Arrangement<'_>) -> T) -> T {
+    let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
+    let setting = plan.setting(plan.pitch(), &budget);
+    told(&Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
+}
+
 /// Whether all places deeper than the bounds are inside and all beyond are not.
 fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, size: f64, random: &mut Random) {
     let inside = Inside::new(dilation.solid.mesh());
@@ -95,12 +129,7 @@ fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, s
         } else {
             place(random, size)
         };
-        let d = distance(x);
-        if d < radius - dilation.inner_mm {
-            assert_eq!(inside.winding(x), 1, "{x} is {d} from the sites");
-        } else if d > radius + dilation.outer_mm {
-            assert_eq!(inside.winding(x), 0, "{x} is {d} from the sites");
-        }
+        assert_bounds("segments", &inside, dilation, radius, x, distance(x));
     }
 }
 
@@ -238,13 +267,11 @@ fn triangles_are_told_beforehand() {
     let mut random = Random(19);
     for size in [60.0, 14.0] {
         let segments = sticks(&mut random, 200, size, 3.0);
-        let (shape, budget) = (wires(&segments), Budget::default());
-        let plan = plan(&shape, 1.0, 0.1);
-        let setting = plan.setting(plan.pitch(), &budget);
-        let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
-        let made = arrangement.run(&budget).unwrap().unwrap().surface.triangles.len() as f64;
-        // Finer polytopes, where some nearly touch, are not foreseen.
-        assert!((0.5..1.4).contains(&(arrangement.triangles / made)), "{size}: {} for {made}", arrangement.triangles);
+        with_arrangement(&wires(&segments), 1.0, 0.1, |arrangement| {
+            let made = arrangement.run(&Budget::default()).unwrap().unwrap().surface.triangles.len() as f64;
+            // Finer polytopes, where some nearly touch, are not foreseen.
+            assert!((0.5..1.4).contains(&(arrangement.triangles / made)), "{size}: {} for {made}", arrangement.triangles);
+        });
     }
 }
 
@@ -346,25 +373,13 @@ fn panels_keep_their_bounds_and_agree_with_the_lattice() {
         assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
         let inside = Inside::new(dilation.solid.mesh());
         let corners = |face: &Vec<u32>| [0, 1, 2].map(|k| vertices[face[k] as usize]);
-        let distance = |x: DVec3| {
-            let of = |face: &Vec<u32>| {
-                let [a, b, c] = corners(face).map(|corner| corner.to_array());
-                x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
-            };
-            faces.iter().map(of).fold(f64::INFINITY, f64::min)
-        };
         for _ in 0..300 {
             let face = &faces[(random.next() % faces.len() as u64) as usize];
             let [a, b, c] = corners(face);
             let on = a.lerp(b, number(&mut random)).lerp(c, number(&mut random));
             let away = place(&mut random, 2.0) - DVec3::ONE;
             let x = on + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(&mut random));
-            let d = distance(x);
-            if d < radius - dilation.inner_mm {
-                assert_eq!(inside.winding(x), 1, "{round}: {x} is {d} from the triangles");
-            } else if d > radius + dilation.outer_mm {
-                assert_eq!(inside.winding(x), 0, "{round}: {x} is {d} from the triangles");
-            }
+            assert_bounds(round, &inside, &dilation, radius, x, distance_of_triangles(x, &vertices, &faces));
         }
         let other = on_lattice(&shape, radius, tolerance);
         if dilation.topology_exact && other.topology_exact {
@@ -400,13 +415,6 @@ fn prism(sides: u32, radius: f64, height: f64) -> (Vec<DVec3>, Vec<Vec<u32>>) {
         }
     }
     (vertices, faces)
-}
-
-/// A solid's own distance: none inside.
-fn distance_of_solid(x: DVec3, vertices: &[DVec3], attractor: &Attractor) -> f64 {
-    let surfaces = attractor.surfaces();
-    assert!(!surfaces.is_empty(), "{} vertices bound no solid", vertices.len());
-    surfaces.iter().map(|surface| Inside::new(surface).distance(x)).fold(f64::INFINITY, f64::min)
 }
 
 /// Steps, prisms, blocks with a void, and plates as thick as two radii or nearly: within their bounds, filled, with the topology of the lattice's, and far fewer triangles.
@@ -473,7 +481,7 @@ fn solids_keep_their_bounds_and_agree_with_the_lattice() {
             let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 1.1);
             vertices.iter_mut().for_each(|vertex| *vertex = turn * *vertex);
         }
-        // Faces that are not flat after that are cut as they come.
+        // In another order, too.
         if round % 2 == 1 {
             faces.reverse();
         }
@@ -489,14 +497,12 @@ fn solids_keep_their_bounds_and_agree_with_the_lattice() {
         assert!(dilation.topology_exact, "{round}: {} uncertain", dilation.uncertain);
         let inside = Inside::new(dilation.solid.mesh());
         let bounds = vertices.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)]);
+        let surfaces = shape.surfaces();
+        let [solid] = surfaces.as_slice() else { panic!("{round}: {} solids", surfaces.len()) };
+        let solid = Inside::new(solid);
         for _ in 0..400 {
             let x = bounds[0] - 1.3 * radius + place(&mut random, 1.0) * (bounds[1] - bounds[0] + 2.6 * radius);
-            let d = distance_of_solid(x, &vertices, &shape);
-            if d < radius - dilation.inner_mm {
-                assert_eq!(inside.winding(x), 1, "{round}: {x} is {d} from the solid");
-            } else if d > radius + dilation.outer_mm {
-                assert_eq!(inside.winding(x), 0, "{round}: {x} is {d} from the solid");
-            }
+            assert_bounds(round, &inside, &dilation, radius, x, solid.distance(x));
         }
         if round % 4 == 3 {
             // A lattice takes long for what is as thick as two radii, and does not tell.
@@ -530,23 +536,11 @@ fn fine_rims_are_arranged() {
             let dilation = arranged(&shape, radius, tolerance);
             assert!(dilation.topology_exact && dilation.crossings == 0 && topology(&dilation) == (1, 0, 2), "{count} {share}");
             let inside = Inside::new(dilation.solid.mesh());
-            let distance = |x: DVec3| {
-                let of = |face: &Vec<u32>| {
-                    let [a, b, c] = [0, 1, 2].map(|k| vertices[face[k] as usize].to_array());
-                    x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
-                };
-                faces.iter().map(of).fold(f64::INFINITY, f64::min)
-            };
             for _ in 0..400 {
                 let on = vertices[(random.next() % u64::from(count)) as usize + 1] * number(&mut random).powf(0.3);
                 let away = place(&mut random, 2.0) - DVec3::ONE;
                 let x = on + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(&mut random));
-                let d = distance(x);
-                if d < radius - dilation.inner_mm {
-                    assert_eq!(inside.winding(x), 1, "{count} {share}: {x} is {d} from the disc");
-                } else if d > radius + dilation.outer_mm {
-                    assert_eq!(inside.winding(x), 0, "{count} {share}: {x} is {d} from the disc");
-                }
+                assert_bounds(format_args!("{count} {share}"), &inside, &dilation, radius, x, distance_of_triangles(x, &vertices, &faces));
             }
         }
     }
@@ -598,42 +592,36 @@ fn hidden_places_are_hidden() {
     for round in 0..6 {
         let size = 1.0 + 0.5 * f64::from(round);
         let segments = sticks(&mut random, 24, size, 1.0);
-        let (shape, budget) = (wires(&segments), Budget::default());
-        let plan = plan(&shape, 1.0, 0.1);
-        let setting = plan.setting(plan.pitch(), &budget);
-        let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
-        let mut engine = arrangement.engine(0, &[]);
-        assert!(engine.begin(&budget).unwrap());
-        let bodies = engine.bodies();
-        let count = segments.len() as u32;
-        for _ in 0..400 {
-            let mut set: Vec<u32> = (0..2 + random.next() % 3).map(|_| (random.next() % u64::from(count)) as u32).collect();
-            set.sort_unstable();
-            set.dedup();
-            let verdict = bodies.verdict(&set);
-            let is_in = |body: u32, x: &DVec3| {
-                let figure = &arrangement.sites.list[body as usize];
-                let is_kept = engine.polytopes.of(body).cuts.iter().all(|plane| height(plane, &x.to_array()) <= 0.0);
-                [figure.distance_squared(&x.to_array()).sqrt() <= 1.0 && is_kept, engine.polytopes.of(body).contains(&x.to_array())]
-            };
-            let places: Vec<DVec3> = (0..300).map(|_| place(&mut random, size + 3.0) - DVec3::ONE).collect();
-            let common = |kind: usize| places.iter().filter(|x| set.iter().all(|&body| is_in(body, x)[kind])).collect::<Vec<_>>();
-            let [of_dilations, of_polytopes] = [common(0), common(1)];
-            if verdict.common == Common::None {
-                assert!(of_dilations.is_empty(), "{round}: {set:?}");
-            }
-            if !verdict.is_doubtful {
-                assert!(verdict.common != Common::None || of_polytopes.is_empty(), "{round}: {set:?}");
-                agreed += 1;
-            }
-            if bodies.is_hidden(&set, verdict.common) {
-                hidden += 1;
-                for x in of_dilations.into_iter().chain(of_polytopes) {
-                    assert!((0..count).any(|body| is_in(body, x) == [true; 2]), "{round}: {set:?} {x}");
-                    shown += 1;
+        with_arrangement(&wires(&segments), 1.0, 0.1, |arrangement| {
+            let mut engine = arrangement.engine(0, &[]);
+            assert!(engine.begin(&Budget::default()).unwrap());
+            let bodies = engine.bodies();
+            let count = segments.len() as u32;
+            for _ in 0..400 {
+                let mut set: Vec<u32> = (0..2 + random.next() % 3).map(|_| (random.next() % u64::from(count)) as u32).collect();
+                set.sort_unstable();
+                set.dedup();
+                let verdict = bodies.verdict(&set);
+                let places: Vec<DVec3> = (0..300).map(|_| place(&mut random, size + 3.0) - DVec3::ONE).collect();
+                let common =
+                    |kind: usize| places.iter().filter(|x| set.iter().all(|&body| is_in(&engine, body, **x)[kind])).collect::<Vec<_>>();
+                let [of_dilations, of_polytopes] = [common(0), common(1)];
+                if verdict.common == Common::None {
+                    assert!(of_dilations.is_empty(), "{round}: {set:?}");
+                }
+                if !verdict.is_doubtful {
+                    assert!(verdict.common != Common::None || of_polytopes.is_empty(), "{round}: {set:?}");
+                    agreed += 1;
+                }
+                if bodies.is_hidden(&set, verdict.common) {
+                    hidden += 1;
+                    for x in of_dilations.into_iter().chain(of_polytopes) {
+                        assert!((0..count).any(|body| is_in(&engine, body, *x) == [true; 2]), "{round}: {set:?} {x}");
+                        shown += 1;
+                    }
                 }
             }
-        }
+        });
     }
     assert!(hidden > 300 && shown > 500 && agreed > 500, "{hidden} hidden, {shown} places, {agreed} agreed");
 }
@@ -654,20 +642,19 @@ fn short_sides_turn_no_boxes() {
                 [0.0, 2.002].into_iter().flat_map(|z| (0..5).map(move |k| (k, z))).map(|(k, z)| corner(k, z)).collect();
             let faces = [0, 5].into_iter().flat_map(|first| (1..4).map(move |k| vec![first, first + k, first + k + 1])).collect();
             let shape = lowered(&vertices, faces);
-            let (plan, budget) = (plan(&shape, 1.0, 0.1), Budget::default());
-            let setting = plan.setting(plan.pitch(), &budget);
-            let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
-            let mut engine = arrangement.engine(0, &[]);
-            assert!(engine.begin(&budget).unwrap());
-            let bodies = engine.bodies();
-            for body in 0..arrangement.sites.list.len() as u32 {
-                let axes = bodies.axes(body).map(DVec3::from_array);
-                let skew = |p: usize, q: usize| (axes[p].dot(axes[q]) - f64::from(u8::from(p == q))).abs();
-                assert!((0..9).all(|place| skew(place / 3, place % 3) < 1e-14), "{tiny} {trial}: {axes:?}");
-            }
-            if arrangement.sites.list.len() == 2 {
-                assert!(!bodies.is_hidden(&[0, 1], Common::Unknown), "{tiny} {trial}");
-            }
+            with_arrangement(&shape, 1.0, 0.1, |arrangement| {
+                let mut engine = arrangement.engine(0, &[]);
+                assert!(engine.begin(&Budget::default()).unwrap());
+                let bodies = engine.bodies();
+                for body in 0..arrangement.sites.list.len() as u32 {
+                    let axes = bodies.axes(body).map(DVec3::from_array);
+                    let skew = |p: usize, q: usize| (axes[p].dot(axes[q]) - f64::from(u8::from(p == q))).abs();
+                    assert!((0..9).all(|place| skew(place / 3, place % 3) < 1e-14), "{tiny} {trial}: {axes:?}");
+                }
+                if arrangement.sites.list.len() == 2 {
+                    assert!(!bodies.is_hidden(&[0, 1], Common::Unknown), "{tiny} {trial}");
+                }
+            });
             let dilation = arranged(&shape, 1.0, 0.1);
             assert!(!dilation.topology_exact || topology(&dilation) == (2, 0, 4), "{tiny} {trial}");
         }
@@ -684,35 +671,30 @@ fn places_hidden_in_solids_are_hidden() {
         let (vertices, faces) = prism(3 + round, 2.0 + f64::from(round % 5), thickness);
         let turn = glam::DQuat::from_scaled_axis(f64::from(round / 4) * DVec3::new(0.3, 0.2, 0.1));
         let vertices: Vec<DVec3> = vertices.into_iter().map(|vertex| turn * vertex).collect();
-        let (shape, budget) = (lowered_as(Interior::Solid, &vertices, faces).unwrap(), Budget::default());
-        let plan = plan(&shape, 1.0, 0.05);
-        let setting = plan.setting(plan.pitch(), &budget);
-        let arrangement = super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
-        let solids: Vec<Inside<'_>> = arrangement.solids.iter().map(Inside::new).collect();
-        let mut engine = arrangement.engine(0, &solids);
-        assert!(engine.begin(&budget).unwrap());
-        let (bodies, count) = (engine.bodies(), arrangement.sites.list.len() as u32);
-        let is_in = |body: u32, x: &DVec3| {
-            let figure = &arrangement.sites.list[body as usize];
-            let is_kept = engine.polytopes.of(body).cuts.iter().all(|plane| height(plane, &x.to_array()) <= 0.0);
-            [figure.distance_squared(&x.to_array()).sqrt() <= 1.0 && is_kept, engine.polytopes.of(body).contains(&x.to_array())]
-        };
-        for (first, second) in (0..count).flat_map(|first| (0..first).map(move |second| (second, first))) {
-            if !bodies.is_hidden(&[first, second], Common::Unknown) {
-                continue;
-            }
-            hidden += 1;
-            for _ in 0..1_000 {
-                // Around the middle, where faces' dilations meet, as far as beyond the rim.
-                let x = turn * (place(&mut random, 1.0) * DVec3::new(16.0, 16.0, 1.0) + DVec3::new(-8.0, -8.0, 0.5 * (thickness - 1.0)));
-                let is_common = (0..2).any(|kind| is_in(first, &x)[kind] && is_in(second, &x)[kind]);
-                if is_common {
-                    let is_hidden = solids[0].winding(x) > 0 || (0..count).any(|body| is_in(body, &x) == [true; 2]);
-                    assert!(is_hidden, "{round}: {first} {second} {x}");
-                    shown += 1;
+        let shape = lowered_as(Interior::Solid, &vertices, faces).unwrap();
+        with_arrangement(&shape, 1.0, 0.05, |arrangement| {
+            let solids: Vec<Inside<'_>> = arrangement.solids.iter().map(Inside::new).collect();
+            let mut engine = arrangement.engine(0, &solids);
+            assert!(engine.begin(&Budget::default()).unwrap());
+            let (bodies, count) = (engine.bodies(), arrangement.sites.list.len() as u32);
+            for (first, second) in (0..count).flat_map(|first| (0..first).map(move |second| (second, first))) {
+                if !bodies.is_hidden(&[first, second], Common::Unknown) {
+                    continue;
+                }
+                hidden += 1;
+                for _ in 0..1_000 {
+                    // Around the middle, where faces' dilations meet, as far as beyond the rim.
+                    let x =
+                        turn * (place(&mut random, 1.0) * DVec3::new(16.0, 16.0, 1.0) + DVec3::new(-8.0, -8.0, 0.5 * (thickness - 1.0)));
+                    let is_common = (0..2).any(|kind| is_in(&engine, first, x)[kind] && is_in(&engine, second, x)[kind]);
+                    if is_common {
+                        let is_hidden = solids[0].winding(x) > 0 || (0..count).any(|body| is_in(&engine, body, x) == [true; 2]);
+                        assert!(is_hidden, "{round}: {first} {second} {x}");
+                        shown += 1;
+                    }
                 }
             }
-        }
+        });
     }
     assert!(hidden > 100 && shown > 400, "{hidden} hidden, {shown} places");
 }
