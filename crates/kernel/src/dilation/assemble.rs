@@ -7,7 +7,7 @@ use super::pool::Pool;
 use super::simplify::{Core, OF_LATTICE, Simplifier};
 use super::stitch;
 use super::surface::{BlockSurface, Blocks};
-use super::tree::Candidates;
+use super::tree::{Candidates, Tree};
 use rayon::prelude::*;
 
 /// Share of the pitch that keeps a node's core from its neighbours' surfaces: far above rounding, which moves these.
@@ -17,7 +17,7 @@ const MARGIN: f64 = 0.01;
 pub(super) struct Assembly<'a, 'b> {
     pub(super) pass: &'b Pass<'a>,
     pub(super) blocks: &'b Blocks,
-    pub(super) simplifiers: Pool<Simplifier<'a>>,
+    pub(super) simplifiers: Pool<Simplifier<Tree<'a>>>,
 }
 
 impl Assembly<'_, '_> {
@@ -47,8 +47,8 @@ impl Assembly<'_, '_> {
         }
         let core = self.pass.core(node);
         let Pass { rule, setting, budget, .. } = *self.pass;
-        let simplified = |simplifier: &mut Simplifier<'_>| simplifier.run(setting, &OF_LATTICE, &core, &kept, &mut surface, budget);
-        self.simplifiers.with(|| Simplifier::new(rule, setting), simplified)?;
+        let simplified = |simplifier: &mut Simplifier<Tree<'_>>| simplifier.run(setting, &OF_LATTICE, &core, &kept, &mut surface, budget);
+        self.simplifiers.with(|| Simplifier::new(Tree::of(rule, setting), setting), simplified)?;
         // No other node has vertices in the core.
         let vertices = &surface.vertices;
         surface.shared.retain(|&(_, number)| !core.contains(&vertices[number as usize]));

@@ -12,6 +12,7 @@
 //! face or on an edge of the lattice, the polytopes of the tetrahedra there join along whole polygons or intervals that end at the point.
 
 use super::affine::Affine;
+use super::convex::{Convex, SiteSearch};
 use super::critical::Critical;
 use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored};
 use super::octree::Task;
@@ -166,7 +167,7 @@ impl<'a> Workshop<'a> {
     pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
         Self {
             attractor: rule.attractor(),
-            tree: Tree::new(rule, setting.slack, 4 * setting.cells),
+            tree: Tree::of(rule, setting),
             values: [vec![NOTHING; VERTICES], vec![NOTHING; VERTICES]],
             fine: NameMap::default(),
             near: Vec::new(),

@@ -1,19 +1,20 @@
 //! The certificate of a changed surface: which sites are near, how far it stays from them, and that they cover what it swept.
 
+use super::convex::{Convex, SiteSearch};
 use super::surface::NameHasher;
-use super::tree::{NodeId, SiteId, Tree, Weighted, in_space};
-use crate::attractor::cell::{Point, Site, between, distance_squared, dot, subtract};
+use super::tree::{NodeId, SiteId, in_space};
+use crate::attractor::cell::{Point, between, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_on_triangle;
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 
 /// A lower bound of the distance of a triangle from a site is raised by so many steps of alternating projection.
 const STEPS: usize = 6;
-/// Sites that tell coverage.
+/// SiteSearch that tell coverage.
 const MOST_COVERING: usize = 64;
 /// Tetrahedra that a swept one is cut into at most.
 const MOST_PIECES: usize = 16;
-/// Sites that are tried to cut a tetrahedron at a corner: for the three others, and for the rest.
+/// SiteSearch that are tried to cut a tetrahedron at a corner: for the three others, and for the rest.
 const MOST_FIRST: usize = 1;
 const MOST_SECOND: usize = 2;
 /// Views that are kept at most: where sites are dense a vertex has hundreds, which are found again when they are asked for again.
@@ -24,8 +25,8 @@ const HALVINGS: usize = 16;
 /// A direction that shows that a triangle is farther than `least` from a convex site. For closest candidates p of the site and q of the
 /// triangle, the plane across q - p parts them: distance >= min over corners t of (t - p') . u, u the unit vector and p' the site's
 /// extreme point along u. Alternating projections converge to the closest pair.
-pub(super) fn parting(triangle: &[Point; 3], weighted: &Weighted, least: f64) -> Option<Direction> {
-    let (site, least) = (&weighted.site, weighted.in_space(least));
+fn parting(triangle: &[Point; 3], site: &impl Convex, least: f64) -> Option<Direction> {
+    let least = site.in_space(least);
     let mut q: Point = std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0);
     for _ in 0..STEPS {
         let p = site.closest(&q);
@@ -58,17 +59,17 @@ impl Direction {
 
     /// Whether it shows that the triangle is farther from a site than `least`, the deficit included.
     #[inline]
-    fn parts(&self, weighted: &Weighted, least: f64) -> bool {
-        self.is_beyond(&weighted.site, weighted.in_space(least))
+    fn parts(&self, site: &impl Convex, least: f64) -> bool {
+        self.is_beyond(site, site.in_space(least))
     }
 
     #[inline]
-    fn is_beyond(&self, site: &Site, least: f64) -> bool {
-        self.lowest - highest(site, &self.unit) > least
+    fn is_beyond(&self, site: &impl Convex, least: f64) -> bool {
+        self.lowest - site.highest(&self.unit) > least
     }
 }
 
-/// Sites near places, from lists of nodes that are refined from coarse to fine places.
+/// SiteSearch near places, from lists of nodes that are refined from coarse to fine places.
 #[derive(Debug, Default)]
 pub(super) struct Places {
     lists: HashMap<u128, Vec<NodeId>, BuildHasherDefault<NameHasher>>,
@@ -89,14 +90,14 @@ impl Places {
 
     /// Visits all sites within `reach` + `radius` of x, with their closest points and squared distances.
     #[inline]
-    fn visit(&mut self, tree: &mut Tree<'_>, x: &Point, radius: f64, reach: f64, visit: impl FnMut(SiteId, &Point, f64)) {
+    fn visit(&mut self, search: &mut impl SiteSearch, x: &Point, radius: f64, reach: f64, visit: impl FnMut(SiteId, &Point, f64)) {
         let mut level = 0;
         while level < self.top && radius > self.edge * f64::from(1_u32 << level) {
             level += 1;
         }
-        self.refine(tree, level, x, reach);
+        self.refine(search, level, x, reach);
         let list = self.lists.get(&self.key(level, x)).unwrap_or(&self.starts);
-        tree.visit_near(x, list, reach + radius, visit);
+        search.visit_near(x, list, reach + radius, visit);
     }
 
     fn place(&self, level: u32, x: &Point) -> [i32; 3] {
@@ -108,19 +109,19 @@ impl Places {
         self.place(level, x).iter().fold(u128::from(level), |key, &index| key << 32 | u128::from(index as u32))
     }
 
-    fn refine(&mut self, tree: &mut Tree<'_>, level: u32, x: &Point, reach: f64) {
+    fn refine(&mut self, search: &mut impl SiteSearch, level: u32, x: &Point, reach: f64) {
         let key = self.key(level, x);
         if level >= self.top || self.lists.contains_key(&key) {
             return;
         }
-        self.refine(tree, level + 1, x, reach);
+        self.refine(search, level + 1, x, reach);
         let (edge, place) = (self.edge * f64::from(1_u32 << level), self.place(level, x));
         let middle: Point = std::array::from_fn(|axis| self.origin[axis] + edge * (f64::from(place[axis]) + 0.5));
         let mut list = Vec::new();
         // Half a diagonal, and the radius that the level serves.
         let horizon = reach + edge * (0.5 * 3.0_f64.sqrt() * 1.000_001 + 1.0);
         let from = self.lists.get(&self.key(level + 1, x)).unwrap_or(&self.starts);
-        tree.gather(&middle, from, horizon, &mut list);
+        search.gather(&middle, from, horizon, &mut list);
         self.lists.insert(key, list);
     }
 }
@@ -174,14 +175,14 @@ pub(super) struct Nearby {
     square: f64,
     first_square: f64,
     reach: f64,
-    /// Sites with a bit, and what bit a site has in the star of that number.
+    /// SiteSearch with a bit, and what bit a site has in the star of that number.
     sites: Vec<SiteId>,
     bits: Vec<(u32, u32)>,
     star: u32,
     /// Corners of the star with the sites within reach.
     marked: Vec<Marked>,
     pieces: Vec<[Marked; 4]>,
-    /// Sites that a triangle is clear of.
+    /// SiteSearch that a triangle is clear of.
     cleared: Vec<SiteId>,
     /// Directions that showed it.
     directions: Vec<Direction>,
@@ -227,25 +228,25 @@ impl Nearby {
 
     /// Sees to it that all sites within a squared distance of a vertex at x are known.
     #[inline]
-    fn see(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point, square: f64) {
+    fn see(&mut self, search: &mut impl SiteSearch, places: &mut Places, vertex: u32, x: &Point, square: f64) {
         if self.ranges[vertex as usize].square < square {
-            self.look(tree, places, vertex, x, square);
+            self.look(search, places, vertex, x, square);
         }
     }
 
-    fn look(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point, square: f64) {
+    fn look(&mut self, search: &mut impl SiteSearch, places: &mut Places, vertex: u32, x: &Point, square: f64) {
         // Twice as far beyond the first, so that a vertex is asked for seldom.
         let square = if square <= self.first_square { self.first_square } else { self.first_square + 2.0 * (square - self.first_square) };
         let first = self.views.len();
         let views = &mut self.views;
-        places.visit(tree, x, square.sqrt() - self.reach, self.reach, |site, closest, square| {
+        places.visit(search, x, square.sqrt() - self.reach, self.reach, |site, closest, square| {
             views.push(View { site, square, normal: *closest, highest: f64::INFINITY, deficit: 0.0 });
         });
         for view in &mut views[first..] {
-            let Weighted { site, deficit } = tree.site(view.site);
-            let length = in_space(view.square.sqrt(), deficit);
+            let site = search.site(view.site);
+            let (deficit, length) = (site.deficit(), site.in_space(view.square.sqrt()));
             view.normal = if length > 0.0 { subtract(x, &view.normal).map(|part| part / length) } else { [0.0; 3] };
-            (view.highest, view.deficit) = (highest(&site, &view.normal), deficit);
+            (view.highest, view.deficit) = (site.highest(&view.normal), deficit);
         }
         let views = &mut views[first..];
         let nearer = |a: &View, b: &View| a.square.total_cmp(&b.square).then_with(|| a.site.cmp(&b.site));
@@ -275,19 +276,19 @@ impl Nearby {
     }
 
     /// Begins with a star: its corners, the middle first, are `corners` afterwards.
-    pub(super) fn begin(&mut self, tree: &mut Tree<'_>, places: &mut Places, corners: impl Iterator<Item = (u32, Point)>) {
+    pub(super) fn begin(&mut self, search: &mut impl SiteSearch, places: &mut Places, corners: impl Iterator<Item = (u32, Point)>) {
         self.forget_many();
         self.star += 1;
         self.sites.clear();
         self.marked.clear();
         for (vertex, at) in corners {
-            self.mark(tree, places, vertex, at);
+            self.mark(search, places, vertex, at);
         }
     }
 
     /// Adds a corner to the star.
-    pub(super) fn mark(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, at: Point) {
-        self.see(tree, places, vertex, &at, self.square);
+    pub(super) fn mark(&mut self, search: &mut impl SiteSearch, places: &mut Places, vertex: u32, at: Point) {
+        self.see(search, places, vertex, &at, self.square);
         let range = self.ranges[vertex as usize];
         let mut mask = 0;
         for view in self.views[range.first as usize..(range.first + range.count) as usize].iter().take(MOST_COVERING) {
@@ -316,9 +317,9 @@ impl Nearby {
     }
 
     /// The point of the sites that is closest to a vertex at x, if all sites within reach have the same, and the nearest site's deficit: there the distance is smooth.
-    pub(super) fn foot(&mut self, tree: &mut Tree<'_>, places: &mut Places, vertex: u32, x: &Point) -> Option<(Point, f64)> {
+    pub(super) fn foot(&mut self, search: &mut impl SiteSearch, places: &mut Places, vertex: u32, x: &Point) -> Option<(Point, f64)> {
         self.forget_many();
-        self.see(tree, places, vertex, x, self.square);
+        self.see(search, places, vertex, x, self.square);
         let mut foot: Option<(Point, f64)> = None;
         for view in self.views(vertex).iter().filter(|view| view.square <= self.square) {
             let length = in_space(view.square.sqrt(), view.deficit);
@@ -335,7 +336,7 @@ impl Nearby {
 
     /// Whether sites cover the tetrahedron of four of the points. One convex site that reaches all four corners does; else it is cut where two sites
     /// are equally far, until one does.
-    pub(super) fn cover(&mut self, tree: &Tree<'_>, corners: [usize; 4]) -> bool {
+    pub(super) fn cover(&mut self, search: &impl SiteSearch, corners: [usize; 4]) -> bool {
         let whole = corners.map(|corner| self.marked[corner]);
         if whole[0].mask & whole[1].mask & whole[2].mask & whole[3].mask != 0 || self.is_near(&whole) {
             return true;
@@ -353,10 +354,10 @@ impl Nearby {
             if made >= MOST_PIECES {
                 return false;
             }
-            if self.is_cut(tree, &piece) {
+            if self.is_cut(search, &piece) {
                 continue;
             }
-            let Some((p, q, middle)) = self.split(tree, &piece) else { return false };
+            let Some((p, q, middle)) = self.split(search, &piece) else { return false };
             let (mut first, mut second) = (piece, piece);
             (first[p], second[q]) = (middle, middle);
             self.pieces.extend([first, second]);
@@ -374,7 +375,7 @@ impl Nearby {
     }
 
     /// Where to cut a piece: two corners and a covered point between them.
-    fn split(&self, tree: &Tree<'_>, piece: &[Marked; 4]) -> Option<(usize, usize, Marked)> {
+    fn split(&self, search: &impl SiteSearch, piece: &[Marked; 4]) -> Option<(usize, usize, Marked)> {
         let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
         // The longest edge of those whose ends no site covers together, if there are such.
         let rank = |&(p, q): &(usize, usize)| (piece[p].mask & piece[q].mask == 0, distance_squared(&piece[p].at, &piece[q].at));
@@ -385,7 +386,7 @@ impl Nearby {
         let (a, b) = (&piece[p], &piece[q]);
         let mut share = 0.5;
         if a.mask & b.mask == 0 {
-            let (first, second) = (self.nearest(tree, a)?, self.nearest(tree, b)?);
+            let (first, second) = (self.nearest(search, a)?, self.nearest(search, b)?);
             // The first covers a beginning of the edge, the second an end: a place in both is looked for.
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..HALVINGS {
@@ -403,7 +404,7 @@ impl Nearby {
         let mut mask = a.mask & b.mask;
         let some = piece.iter().fold(0, |some, corner| some | corner.mask) & !mask;
         for bit in bits(some) {
-            if tree.site(self.sites[bit]).distance_squared(&at) <= self.square {
+            if search.site(self.sites[bit]).distance_squared(&at) <= self.square {
                 mask |= 1 << bit;
             }
         }
@@ -413,11 +414,11 @@ impl Nearby {
 
     /// Whether a site covers three of the corners, and another what the first leaves at the fourth. The square of the distance is convex: with D at the
     /// fourth corner and at most F at the others, of every line from there the first covers all from the share (D - square) / (D - F) on.
-    fn is_cut(&self, tree: &Tree<'_>, piece: &[Marked; 4]) -> bool {
+    fn is_cut(&self, search: &impl SiteSearch, piece: &[Marked; 4]) -> bool {
         (0..4).any(|k| {
             let others = [(k + 1) % 4, (k + 2) % 4, (k + 3) % 4].map(|other| &piece[other]);
             bits(others[0].mask & others[1].mask & others[2].mask).take(MOST_FIRST).any(|first| {
-                let site = tree.site(self.sites[first]);
+                let site = search.site(self.sites[first]);
                 let from = site.distance_squared(&piece[k].at);
                 let far = others.iter().map(|other| site.distance_squared(&other.at)).fold(0.0, f64::max);
                 let share = ((from - self.square) / (from - far)) * (1.0 + 1e-9);
@@ -425,7 +426,7 @@ impl Nearby {
                     return false;
                 }
                 bits(piece[k].mask).take(MOST_SECOND).any(|second| {
-                    let site = tree.site(self.sites[second]);
+                    let site = search.site(self.sites[second]);
                     others.iter().all(|other| {
                         other.mask >> second & 1 == 1 || site.distance_squared(&between(&piece[k].at, &other.at, share)) <= self.square
                     })
@@ -435,9 +436,9 @@ impl Nearby {
     }
 
     /// The nearest site of those that cover a point.
-    fn nearest(&self, tree: &Tree<'_>, marked: &Marked) -> Option<Weighted> {
-        let with_square = |site: Weighted| (site.distance_squared(&marked.at), site);
-        bits(marked.mask).map(|bit| with_square(tree.site(self.sites[bit]))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
+    fn nearest<'b, S: SiteSearch>(&self, search: &'b S, marked: &Marked) -> Option<S::Site<'b>> {
+        let with_square = |site: S::Site<'b>| (site.distance_squared(&marked.at), site);
+        bits(marked.mask).map(|bit| with_square(search.site(self.sites[bit]))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
     }
 
     /// Whether a triangle of vertices is at least `least` from all sites.
@@ -447,7 +448,7 @@ impl Nearby {
     /// of the corners.
     pub(super) fn is_clear(
         &mut self,
-        tree: &mut Tree<'_>,
+        search: &mut impl SiteSearch,
         places: &mut Places,
         corners: [u32; 3],
         triangle: &[Point; 3],
@@ -456,7 +457,7 @@ impl Nearby {
         let longest = (0..3).map(|k| distance_squared(&triangle[k], &triangle[(k + 1) % 3])).fold(0.0, f64::max);
         let enough = least * least * 1.000_000_001 + longest / 3.0;
         for (&corner, point) in corners.iter().zip(triangle) {
-            self.see(tree, places, corner, point, enough);
+            self.see(search, places, corner, point, enough);
         }
         let Self { ranges, views, cleared, directions, .. } = self;
         let views = |corner: u32| {
@@ -473,9 +474,9 @@ impl Nearby {
                 if view.square >= enough || view.parts(triangle, least) || cleared.contains(&view.site) {
                     continue;
                 }
-                let site = tree.site(view.site);
+                let site = search.site(view.site);
                 if directions.is_empty() {
-                    // Sites with a common closest point are parted by one plane.
+                    // SiteSearch with a common closest point are parted by one plane.
                     let nearest = corners.iter().filter_map(|&corner| views(corner).first());
                     let sum = nearest.fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.normal[axis]));
                     let length = dot(&sum, &sum).sqrt().max(f64::MIN_POSITIVE);
@@ -499,14 +500,4 @@ fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
         mask &= mask.wrapping_sub(1);
         (bit < 64).then_some(bit)
     })
-}
-
-/// The largest value of a site's points along a direction.
-#[inline]
-pub(super) fn highest(site: &Site, direction: &Point) -> f64 {
-    match site {
-        Site::Point(a) => dot(a, direction),
-        Site::Segment(ends) => ends.iter().map(|end| dot(end, direction)).fold(f64::NEG_INFINITY, f64::max),
-        Site::Triangle(corners) => corners.iter().map(|corner| dot(corner, direction)).fold(f64::NEG_INFINITY, f64::max),
-    }
 }

@@ -18,14 +18,15 @@
 
 use super::affine::{Affine, range};
 use super::block::{Frame, Nearby};
-use super::certificate::highest;
+
+use super::convex::{Convex, SiteSearch};
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
 use super::parting::{avoids_origin, farthest};
 use super::plan::Setting;
 use super::smooth::{self, MOST_NOISE};
 use super::surface::BlockSurface;
-use super::tree::Tree;
+use super::tree::{Tree, highest};
 use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
 use crate::measure::triangle::closest_feature;
 

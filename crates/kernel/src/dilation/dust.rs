@@ -11,6 +11,7 @@
 //! A shell no longer than rounding may move what it bounds, see [`NUDGE`], has no volume to speak of, nor a sign of it: it goes, and the bound for rounding covers that. As a void
 //! of D(r) it would have held a critical point of the distance, which has two sites at one distance at least; where there is one site alone, there was none.
 
+use super::convex::SiteSearch;
 use super::plan::Setting;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Tree};
@@ -98,7 +99,7 @@ fn fate<'a>(
         return Fate::Goes;
     }
     let (tree, starts) = tree.get_or_insert_with(|| {
-        let mut tree = Tree::new(rule, setting.slack, 4 * setting.cells);
+        let mut tree = Tree::of(rule, setting);
         let starts = tree.reset(candidates);
         (tree, starts)
     });

@@ -25,6 +25,7 @@ mod arrangement;
 mod assemble;
 mod block;
 mod certificate;
+mod convex;
 mod critical;
 mod dust;
 mod error;

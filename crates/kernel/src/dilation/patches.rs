@@ -2,14 +2,13 @@
 //!
 //! A part has all triangles whose boxes meet its own. It changes triangles only that are inside with all corners: no other part has these.
 
+use super::arrangement::Index;
 use super::plan::Setting;
 use super::pool::Pool;
 use super::simplify::{Core, OF_POLYTOPES, Simplifier};
 use super::surface::BlockSurface;
-use super::tree::Candidates;
-use crate::attractor::Attractor;
-use crate::attractor::cell::{Ball, Point, distance_squared};
-use crate::attractor::sites::SiteRule;
+use super::tree::NodeId;
+use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 
 /// Triangles of a part that is not halved, about.
@@ -27,15 +26,14 @@ const MOST_SHARED: usize = 3;
 /// [`Stopped`]; the surface is lost then.
 pub(super) fn simplify(
     setting: &Setting,
-    rule: &SiteRule<'_>,
+    index: &Index,
     core: Core,
-    candidates: &Candidates,
     surface: &mut BlockSurface,
     budget: &Budget,
 ) -> Result<(), Stopped> {
     let all = Part { core, triangles: (0..surface.triangles.len() as u32).collect(), halvings: 0 };
-    let patches = Patches { setting, rule, surface, simplifiers: Pool::default(), budget };
-    let Patch { inside, across, .. } = patches.of(all, candidates)?;
+    let patches = Patches { setting, index, surface, simplifiers: Pool::default(), budget };
+    let Patch { inside, across, .. } = patches.of(all, &index.all())?;
     let across = across.into_iter().map(|triangle| surface.triangles[triangle as usize]);
     surface.triangles = inside.into_iter().chain(across).collect();
     surface.drop_unused();
@@ -62,17 +60,17 @@ struct Patch {
 
 struct Patches<'a> {
     setting: &'a Setting,
-    rule: &'a SiteRule<'a>,
+    index: &'a Index,
     surface: &'a BlockSurface,
-    simplifiers: Pool<Simplifier<'a>>,
+    simplifiers: Pool<Simplifier<&'a Index>>,
     budget: &'a Budget,
 }
 
 impl Patches<'_> {
-    fn of(&self, part: Part, candidates: &Candidates) -> Result<Patch, Stopped> {
+    fn of(&self, part: Part, figures: &[NodeId]) -> Result<Patch, Stopped> {
         self.budget.cancel.check()?;
-        // Sites that are farther from all places inside cover none of them.
-        let near = candidates.near(self.rule.attractor(), &part.core, self.setting.near);
+        // Figures that are farther from all places inside cover none of them.
+        let near = self.index.near(figures, &part.core, self.setting.near);
         let (core, halvings) = (part.core, part.halvings);
         let patch = match self.halves(part) {
             Ok([below, above]) => {
@@ -141,7 +139,7 @@ impl Patches<'_> {
         Patch { inside, across, settled }
     }
 
-    fn simplified(&self, core: &Core, candidates: &Candidates, patch: Patch) -> Result<Patch, Stopped> {
+    fn simplified(&self, core: &Core, figures: &Vec<NodeId>, patch: Patch) -> Result<Patch, Stopped> {
         let Patch { inside, across, settled } = patch;
         let triangles: Vec<[u32; 3]> =
             inside.into_iter().chain(across.iter().map(|&triangle| self.surface.triangles[triangle as usize])).collect();
@@ -157,9 +155,9 @@ impl Patches<'_> {
             ..BlockSurface::default()
         };
         settled.iter().for_each(|vertex| own.settled[number(vertex)] = true);
-        let Self { setting, rule, budget, .. } = *self;
-        let run = |simplifier: &mut Simplifier<'_>| simplifier.run(setting, &OF_POLYTOPES, core, candidates, &mut own, budget);
-        self.simplifiers.with(|| Simplifier::new(rule, setting), run)?;
+        let Self { setting, index, budget, .. } = *self;
+        let run = |simplifier: &mut Simplifier<&Index>| simplifier.run(setting, &OF_POLYTOPES, core, figures, &mut own, budget);
+        self.simplifiers.with(|| Simplifier::new(index, setting), run)?;
         own.shared.iter().for_each(|&(name, number)| names[number as usize] = name as u32);
         let inside = (0..own.triangles.len() as u32).filter(|&triangle| own.is_within(triangle, core));
         Ok(Patch {
@@ -177,20 +175,5 @@ impl BlockSurface {
 
     fn is_within(&self, triangle: u32, core: &Core) -> bool {
         self.corners(triangle).iter().all(|corner| core.contains(corner))
-    }
-}
-
-impl Candidates {
-    /// Those whose balls come within a distance of a box.
-    fn near(&self, attractor: &Attractor, core: &Core, distance: f64) -> Self {
-        let mut kept = Self::default();
-        for candidate in &self.cells {
-            let Ball { centre, radius } = candidate.cell.ball;
-            let closest: Point = std::array::from_fn(|axis| centre[axis].clamp(core.low[axis], core.high[axis]));
-            if distance_squared(&centre, &closest) <= (radius + distance).powi(2) {
-                kept.push(candidate.cell, self.points_of(attractor, candidate), candidate.leaf);
-            }
-        }
-        kept
     }
 }

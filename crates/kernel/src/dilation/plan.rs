@@ -457,7 +457,7 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         let Some(Arranged { mut surface, uncertain }) = arrangement.run(budget)? else { return Ok(None) };
-        drop(arrangement);
+        let index = arrangement.into_index();
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
@@ -465,7 +465,8 @@ impl<'a> Plan<'a> {
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
-        patches::simplify(setting, &self.rule, core, &space.candidates, &mut surface, budget)?;
+        patches::simplify(setting, &index, core, &mut surface, budget)?;
+        drop(index);
         self.finish(setting, space, surface, uncertain, None, budget).map(Some)
     }
 

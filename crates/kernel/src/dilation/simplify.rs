@@ -14,12 +14,12 @@
 //! that what is checked is what is written.
 
 use super::certificate::{Nearby, Places};
+use super::convex::SiteSearch;
 use super::plan::Setting;
 use super::slivers;
 use super::surface::BlockSurface;
-use super::tree::{Candidates, Tree, in_space};
+use super::tree::in_space;
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
-use crate::attractor::sites::SiteRule;
 use crate::budget::{Budget, Stopped};
 use crate::solid::around::Around;
 use crate::solid::half_edges::{HalfEdges, NONE};
@@ -61,12 +61,12 @@ const SLIVER_MOVE: f64 = 64.0;
 /// Vertices are lifted by this share of the band at least, and no normal turns by more than this cosine.
 const LEAST_LIFT: f64 = 0.05;
 const LEAST_TURN: f64 = 0.7;
-/// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
+/// SiteSearch are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
 const FIRST_LOOK: f64 = 0.6;
 
 /// Working memory of a thread.
-pub(super) struct Simplifier<'a> {
-    tree: Tree<'a>,
+pub(super) struct Simplifier<S> {
+    search: S,
     places: Places,
     nearby: Nearby,
     mender: Mender,
@@ -79,10 +79,10 @@ pub(super) struct Simplifier<'a> {
     clean_only: bool,
 }
 
-impl<'a> Simplifier<'a> {
-    pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
+impl<S: SiteSearch> Simplifier<S> {
+    pub(super) fn new(search: S, setting: &Setting) -> Self {
         Self {
-            tree: Tree::new(rule, setting.slack, 4 * setting.cells),
+            search,
             places: Places::default(),
             nearby: Nearby::default(),
             mender: Mender::default(),
@@ -96,7 +96,7 @@ impl<'a> Simplifier<'a> {
 
     /// Bytes of what it has beside the surface since it was last run: what grows with the sites near a vertex.
     pub(super) fn bytes(&self) -> usize {
-        self.tree.bytes() + self.nearby.bytes()
+        self.search.bytes() + self.nearby.bytes()
     }
 
     /// Simplifies a node's surface. Vertices that are `settled` are tried again only when something around them changes; all that could be
@@ -109,7 +109,7 @@ impl<'a> Simplifier<'a> {
         setting: &Setting,
         course: &Course,
         core: &Core,
-        candidates: &Candidates,
+        candidates: &S::Candidates,
         surface: &mut BlockSurface,
         budget: &Budget,
     ) -> Result<(), Stopped> {
@@ -161,20 +161,20 @@ impl<'a> Simplifier<'a> {
     }
 
     /// Begins with a mesh in a node.
-    fn start(&mut self, setting: &Setting, core: &Core, candidates: &Candidates, mesh: &HalfEdges) {
-        let starts = self.tree.reset(candidates);
+    fn start(&mut self, setting: &Setting, core: &Core, candidates: &S::Candidates, mesh: &HalfEdges) {
+        let starts = self.search.reset(candidates);
         let edge = 2.0 * setting.lattice.pitch;
         let size = (0..3).map(|axis| core.high[axis] - core.low[axis]).fold(0.0, f64::max);
         let top = (size / edge).log2().ceil().max(0.0) as u32 + 1;
         self.places.reset(core.low, edge, top, starts);
         let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
-        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding, first_square);
+        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding - self.search.deviation(), first_square);
         self.mender.start(mesh);
     }
 
     /// Turns edges of slivers, or removes their vertices: rounding to single precision may fold them over their neighbours, and these are the
     /// only crossings that a lattice's surface was seen to have.
-    fn remove_slivers(&mut self, setting: &Setting, core: &Core, candidates: &Candidates, surface: &mut BlockSurface) {
+    fn remove_slivers(&mut self, setting: &Setting, core: &Core, candidates: &S::Candidates, surface: &mut BlockSurface) {
         if let Some(mut around) = slivers::around(surface, core, setting.rounding, 2.0 * setting.lattice.pitch) {
             let Around { mesh, numbers, is_whole, .. } = &mut around;
             let inside: Vec<bool> = mesh.points.iter().zip(is_whole).map(|(point, whole)| *whole && core.contains(point)).collect();
@@ -195,7 +195,7 @@ impl<'a> Simplifier<'a> {
             }
             self.mender.slivers = left;
             slivers::write(around, surface);
-            surface.site_error = surface.site_error.max(self.tree.largest_error);
+            surface.site_error = surface.site_error.max(self.search.largest_error());
         }
         slivers::settle(surface, core);
     }
@@ -230,13 +230,13 @@ impl<'a> Simplifier<'a> {
         }
         let count = self.mender.star.ring.len();
         let from = mesh.points[vertex as usize];
-        let Some((foot, deficit)) = self.nearby.foot(&mut self.tree, &mut self.places, vertex, &from) else { return false };
+        let Some((foot, deficit)) = self.nearby.foot(&mut self.search, &mut self.places, vertex, &from) else { return false };
         let share = in_space(setting.outer, deficit) / distance_squared(&from, &foot).sqrt();
         let to: Point = std::array::from_fn(|axis| f64::from((foot[axis] + (from[axis] - foot[axis]) * share) as f32));
         let moved = distance_squared(&from, &to).sqrt();
         // No height of a swept tetrahedron is more than the way.
         let worth = moved > LEAST_LIFT * (setting.outer - setting.least) && count as f64 * moved < 1.9 * setting.thinnest;
-        if self.tree.exhausted || !worth || !core.contains(&to) {
+        if self.search.is_exhausted() || !worth || !core.contains(&to) {
             return false;
         }
         let (ring, points) = (&self.mender.star.ring, &mesh.points);
@@ -254,17 +254,17 @@ impl<'a> Simplifier<'a> {
         let trial = self.nearby.trial();
         self.nearby.try_another();
         let corners = self.mender.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
-        self.nearby.begin(&mut self.tree, &mut self.places, corners);
-        self.nearby.mark(&mut self.tree, &mut self.places, trial, to);
+        self.nearby.begin(&mut self.search, &mut self.places, corners);
+        self.nearby.mark(&mut self.search, &mut self.places, trial, to);
         let certified = (0..count).all(|k| {
             let next = (k + 1) % count;
             let corners = [trial, self.mender.star.ring[k], self.mender.star.ring[next]];
             let triangle = [to, mesh.points[corners[1] as usize], mesh.points[corners[2] as usize]];
-            let least = setting.least - setting.rounding;
-            self.nearby.cover(&self.tree, [count, k, next, count + 1])
-                && self.nearby.is_clear(&mut self.tree, &mut self.places, corners, &triangle, least)
+            let least = setting.least - setting.rounding + self.search.deviation();
+            self.nearby.cover(&self.search, [count, k, next, count + 1])
+                && self.nearby.is_clear(&mut self.search, &mut self.places, corners, &triangle, least)
         });
-        if !certified || self.tree.exhausted {
+        if !certified || self.search.is_exhausted() {
             return false;
         }
         if !self.mender.stays_graph(mesh, vertex, None, Some(to)) && self.mender.meetings(mesh, vertex, None, Some(to), 0) > 0 {
@@ -289,7 +289,7 @@ impl<'a> Simplifier<'a> {
             *number = numbers[*number as usize];
         }
         surface.shared.retain(|&(_, number)| number != NONE);
-        surface.site_error = surface.site_error.max(self.tree.largest_error);
+        surface.site_error = surface.site_error.max(self.search.largest_error());
     }
 
     /// Tries to remove a vertex, moving it off its planes by more than `lower` and at most `upper`. Its star is left in `self.mender.star`.
@@ -306,10 +306,10 @@ impl<'a> Simplifier<'a> {
             }
             if !known {
                 let corners = self.mender.star.ring.iter().chain([&vertex]).map(|&corner| (corner, mesh.points[corner as usize]));
-                self.nearby.begin(&mut self.tree, &mut self.places, corners);
+                self.nearby.begin(&mut self.search, &mut self.places, corners);
                 known = true;
             }
-            if self.is_certified(setting, mesh, m) && !self.tree.exhausted && self.is_free(setting, mesh, vertex, m) {
+            if self.is_certified(setting, mesh, m) && !self.search.is_exhausted() && self.is_free(setting, mesh, vertex, m) {
                 mesh.collapse(vertex, &self.mender.star, m);
                 self.mender.place(mesh);
                 return true;
@@ -385,13 +385,14 @@ impl<'a> Simplifier<'a> {
 
     /// Whether the sites cover what is swept, and the new triangles keep from them.
     fn is_certified(&mut self, setting: &Setting, mesh: &HalfEdges, m: usize) -> bool {
-        let Self { tree, places, nearby, mender: Mender { star, .. }, .. } = self;
+        let Self { search, places, nearby, mender: Mender { star, .. }, .. } = self;
         let count = star.ring.len();
-        kept(m, count).all(|k| nearby.cover(tree, [m, k, (k + 1) % count, count]))
+        let least = setting.least - setting.rounding + search.deviation();
+        kept(m, count).all(|k| nearby.cover(search, [m, k, (k + 1) % count, count]))
             && kept(m, count).all(|k| {
                 let corners = [star.ring[m], star.ring[k], star.ring[(k + 1) % count]];
                 let triangle = corners.map(|corner| mesh.points[corner as usize]);
-                nearby.is_clear(tree, places, corners, &triangle, setting.least - setting.rounding)
+                nearby.is_clear(search, places, corners, &triangle, least)
             })
     }
 

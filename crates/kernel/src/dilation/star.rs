@@ -7,6 +7,7 @@
 //! Over a simplex with circumradius R the interpolant L_i of d_i^2 has d_i^2 <= L_i <= d_i^2 + R^2: a site is nowhere nearest there if another's squared distances are less by R^2 at all corners,
 //! or if its own exceed by R^2 what the surface's may be anywhere: all of it is within `outer` of some site.
 
+use super::convex::Convex;
 use super::critical::add_closest;
 use super::lattice::{Cube, Grading, LEVELS};
 use super::parting::{avoids_origin, farthest, parting};

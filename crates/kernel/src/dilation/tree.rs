@@ -6,7 +6,8 @@
 //! `slack` of the best distance, and among equal distances the lexicographically first closest point wins.
 //! So blocks agree on shared lattice vertices, and results do not depend on the number of threads.
 
-use super::certificate::highest;
+use super::convex::{Convex, SiteSearch};
+use super::plan::Setting;
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared, dot};
 use crate::attractor::sites::{SiteError, SiteRule};
@@ -79,23 +80,30 @@ pub(super) struct Weighted {
     pub(super) deficit: f64,
 }
 
-impl Weighted {
-    /// The squared distance of x, the deficit included.
+impl Convex for Weighted {
     #[inline]
-    pub(super) fn distance_squared(&self, x: &Point) -> f64 {
-        self.site.distance_squared(x) + self.deficit
+    fn deficit(&self) -> f64 {
+        self.deficit
     }
 
-    /// The point of the site closest to x.
     #[inline]
-    pub(super) fn closest(&self, x: &Point) -> Point {
+    fn closest(&self, x: &Point) -> Point {
         self.site.closest(x)
     }
 
-    /// The distance in space where that with the deficit is `distance`.
     #[inline]
-    pub(super) fn in_space(&self, distance: f64) -> f64 {
-        in_space(distance, self.deficit)
+    fn highest(&self, direction: &Point) -> f64 {
+        highest(&self.site, direction)
+    }
+}
+
+/// The largest value of a site's points along a direction.
+#[inline]
+pub(super) fn highest(site: &Site, direction: &Point) -> f64 {
+    match site {
+        Site::Point(a) => dot(a, direction),
+        Site::Segment(ends) => ends.iter().map(|end| dot(end, direction)).fold(f64::NEG_INFINITY, f64::max),
+        Site::Triangle(corners) => corners.iter().map(|corner| dot(corner, direction)).fold(f64::NEG_INFINITY, f64::max),
     }
 }
 
@@ -147,6 +155,11 @@ pub(super) struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
+    /// One with the slack and the limit of a setting.
+    pub(super) fn of(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
+        Self::new(rule, setting.slack, 4 * setting.cells)
+    }
+
     pub(super) fn new(rule: &'a SiteRule<'a>, slack: f64, most_nodes: usize) -> Self {
         Self {
             rule,
@@ -167,50 +180,6 @@ impl<'a> Tree<'a> {
             found: 0,
             largest_error: SiteError::default(),
         }
-    }
-
-    /// Bytes of what its lists hold.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.nodes)
-            + size_of_val(&*self.cells)
-            + size_of_val(&*self.points)
-            + size_of_val(&*self.sites)
-            + size_of_val(&*self.point_sites)
-    }
-
-    /// Empties the tree and adds the candidates under groups of neighbours; returns the ids of the groups that have none above them. A group has
-    /// candidates of one solid, or of none.
-    pub(super) fn reset(&mut self, candidates: &Candidates) -> Vec<NodeId> {
-        self.nodes.clear();
-        self.deficits.clear();
-        self.site_deficits.iter_mut().for_each(Vec::clear);
-        self.cells.clear();
-        self.points.clear();
-        self.sites.clear();
-        self.leaves = 0;
-        self.looked = 0;
-        self.found = 0;
-        self.exhausted = false;
-        self.largest_error = SiteError::default();
-        self.point_sites.clear();
-        let attractor = self.rule.attractor();
-        let solid_of = |cell: &Cell| attractor.roots()[cell.root as usize].solid;
-        let order = spatial_order(candidates, |cell| solid_of(cell).map_or(0, |solid| solid + 1));
-        for &index in &order {
-            let candidate = &candidates.cells[index as usize];
-            self.add(candidate.cell, candidates.points_of(attractor, candidate));
-        }
-        let mut level: Vec<NodeId> = (0..self.nodes.len() as NodeId).collect();
-        while level.len() > GROUP {
-            let same = |a: &NodeId, b: &NodeId| solid_of(&self.cells[*a as usize]) == solid_of(&self.cells[*b as usize]);
-            let groups: Vec<&[NodeId]> = level.chunk_by(same).flat_map(|own| own.chunks(GROUP)).collect();
-            let above: Vec<NodeId> = groups.into_iter().map(|children| self.group(children)).collect();
-            if above.len() == level.len() {
-                break;
-            }
-            level = above;
-        }
-        level
     }
 
     /// Adds a node above nodes that follow one another.
@@ -285,15 +254,6 @@ impl<'a> Tree<'a> {
         let count = self.nodes.len() as u32 - first;
         self.nodes[id as usize].content = Content::Open(first, count);
         (first, count)
-    }
-
-    /// A site by its id.
-    pub(super) fn site(&self, id: SiteId) -> Weighted {
-        let (site, kind, index) = match id {
-            SiteId::Point(index) => (Site::Point(self.point_sites[index as usize]), 0, index),
-            SiteId::Listed(index) => (self.sites[index as usize], 1, index),
-        };
-        Weighted { site, deficit: self.site_deficits[kind].get(index as usize).copied().unwrap_or(0.0) }
     }
 
     /// The least deficit below a node.
@@ -455,10 +415,71 @@ impl<'a> Tree<'a> {
         }
         self.stack = stack;
     }
+}
+
+impl<'a> SiteSearch for Tree<'a> {
+    type Site<'b>
+        = Weighted
+    where
+        Self: 'b;
+    type Candidates = Candidates;
+
+    /// Those of its lists.
+    fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes)
+            + size_of_val(&*self.cells)
+            + size_of_val(&*self.points)
+            + size_of_val(&*self.sites)
+            + size_of_val(&*self.point_sites)
+    }
+
+    /// Empties the tree and adds the candidates under groups of neighbours; returns the ids of the groups that have none above them. A group has
+    /// candidates of one solid, or of none.
+    fn reset(&mut self, candidates: &Candidates) -> Vec<NodeId> {
+        self.nodes.clear();
+        self.deficits.clear();
+        self.site_deficits.iter_mut().for_each(Vec::clear);
+        self.cells.clear();
+        self.points.clear();
+        self.sites.clear();
+        self.leaves = 0;
+        self.looked = 0;
+        self.found = 0;
+        self.exhausted = false;
+        self.largest_error = SiteError::default();
+        self.point_sites.clear();
+        let attractor = self.rule.attractor();
+        let solid_of = |cell: &Cell| attractor.roots()[cell.root as usize].solid;
+        let order = spatial_order(candidates, |cell| solid_of(cell).map_or(0, |solid| solid + 1));
+        for &index in &order {
+            let candidate = &candidates.cells[index as usize];
+            self.add(candidate.cell, candidates.points_of(attractor, candidate));
+        }
+        let mut level: Vec<NodeId> = (0..self.nodes.len() as NodeId).collect();
+        while level.len() > GROUP {
+            let same = |a: &NodeId, b: &NodeId| solid_of(&self.cells[*a as usize]) == solid_of(&self.cells[*b as usize]);
+            let groups: Vec<&[NodeId]> = level.chunk_by(same).flat_map(|own| own.chunks(GROUP)).collect();
+            let above: Vec<NodeId> = groups.into_iter().map(|children| self.group(children)).collect();
+            if above.len() == level.len() {
+                break;
+            }
+            level = above;
+        }
+        level
+    }
+
+    /// A site by its id.
+    fn site(&self, id: SiteId) -> Weighted {
+        let (site, kind, index) = match id {
+            SiteId::Point(index) => (Site::Point(self.point_sites[index as usize]), 0, index),
+            SiteId::Listed(index) => (self.sites[index as usize], 1, index),
+        };
+        Weighted { site, deficit: self.site_deficits[kind].get(index as usize).copied().unwrap_or(0.0) }
+    }
 
     /// Calls `visit` with all sites below `starts` that are within `reach` of x, their closest points and squared distances.
     #[inline]
-    pub(super) fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, mut visit: impl FnMut(SiteId, &Point, f64)) {
+    fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, mut visit: impl FnMut(SiteId, &Point, f64)) {
         let mut stack = std::mem::take(&mut self.stack);
         stack.clear();
         stack.extend_from_slice(starts);
@@ -508,7 +529,7 @@ impl<'a> Tree<'a> {
     }
 
     /// Nodes that may hold a site within `reach` of x: as small as possible without becoming many.
-    pub(super) fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
+    fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
         let may = |tree: &Self, id: NodeId| {
             let threshold = tree.threshold(id, reach);
             distance_squared(x, &tree.nodes[id as usize].centre) <= threshold * threshold
@@ -538,6 +559,18 @@ impl<'a> Tree<'a> {
             std::mem::swap(found, &mut next);
         }
         self.stack = next;
+    }
+
+    fn deviation(&self) -> f64 {
+        0.0
+    }
+
+    fn largest_error(&self) -> SiteError {
+        self.largest_error
+    }
+
+    fn is_exhausted(&self) -> bool {
+        self.exhausted
     }
 }
 

@@ -4,6 +4,7 @@
 //! are nowhere nearer to M's surface than w - inner, so each lies inside of M or outside as a whole. Those inside bound what is left of M when everything
 //! near its surface is taken away: M less the wall, an erosion of M. No boolean is needed, and nothing can cross.
 
+use super::convex::SiteSearch;
 use super::tree::{Candidates, Tree};
 use super::{Dilation, DilationError, dilate, dilate_unsimplified};
 use crate::attractor::Attractor;

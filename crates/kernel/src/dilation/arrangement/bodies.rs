@@ -3,6 +3,7 @@
 //! How far a point is from the farthest of some figures is a convex function, and so is how high it is above the highest plane of some polytopes: whether they are anywhere low enough is told by the method of ellipsoids
 //! (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). Whether some bodies' common points are all within others is told by halving boxes.
 
+use crate::dilation::convex::Convex;
 use super::figure::{Figure, Polygon};
 use super::pieces::Lists;
 use super::polytopes::{Plane, Polytopes, height, normal};

@@ -1,11 +1,12 @@
-//! What polytopes stand around: points, segments, and convex polygons, which coplanar triangles are joined to where they can be.
+//! What polytopes stand around: points, segments, which collinear ones are joined to, and convex polygons, which coplanar triangles are joined to where they can be.
 //!
-//! The dilation of a union is the union of the dilations, and that of a convex polygon is convex as that of a triangle: so a polygon stands for its triangles, and no bound, nor what is known of the
+//! The dilation of a union is the union of the dilations, and that of a convex polygon is convex as that of a triangle: so a polygon stands for its triangles, and a segment for its parts, and no bound, nor what is known of the
 //! topology, changes. What changes is that there are fewer bodies: the sets of them that `nerve` looks at grow with the fourth power of how many are near to each other.
 
 use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
-use crate::dilation::tree::{Weighted, in_space};
+use crate::dilation::convex::Convex;
+use crate::dilation::tree::Weighted;
 use crate::measure::triangle::closest_on_triangle;
 use std::cmp::Ordering;
 
@@ -21,7 +22,7 @@ const MOST_AT_A_SIDE: usize = 8;
 
 /// A site, or several that are one convex set.
 #[derive(Clone, Debug)]
-pub(super) struct Figure {
+pub(in crate::dilation) struct Figure {
     pub(super) outline: Outline,
     /// See [`Weighted`].
     pub(super) deficit: f64,
@@ -68,26 +69,13 @@ impl Figure {
         if let Outline::Polygon(polygon) = &self.outline { Some(polygon) } else { None }
     }
 
-    /// The point of the figure that is closest to x.
-    #[inline]
-    pub(super) fn closest(&self, x: &Point) -> Point {
-        match &self.outline {
-            Outline::Point(at) => *at,
-            Outline::Segment([a, b]) => closest_on_segment(x, a, b),
-            Outline::Polygon(polygon) => polygon.closest(x),
+    /// The union with another, which has a side in common with it, or an end: then both ends of the side are there.
+    fn joined(&self, other: &Self, [p, q]: [&Point; 2], flatness: f64, within: f64) -> Option<Outline> {
+        match (&self.outline, &other.outline) {
+            (Outline::Segment(own), Outline::Segment(theirs)) => straight(own, theirs, p, flatness).map(Outline::Segment),
+            (Outline::Polygon(own), Outline::Polygon(theirs)) => own.joined(theirs, [p, q], flatness, within).map(Outline::Polygon),
+            _ => None,
         }
-    }
-
-    /// The squared distance of x, the deficit included.
-    #[inline]
-    pub(super) fn distance_squared(&self, x: &Point) -> f64 {
-        distance_squared(x, &self.closest(x)) + self.deficit
-    }
-
-    /// The distance in space where that with the deficit is `distance`.
-    #[inline]
-    pub(super) fn in_space(&self, distance: f64) -> f64 {
-        in_space(distance, self.deficit)
     }
 
     /// Its box.
@@ -96,6 +84,27 @@ impl Figure {
             std::array::from_fn(|axis| self.corners().iter().map(|corner| corner[axis]).fold(first, choose))
         };
         [extreme(f64::INFINITY, f64::min), extreme(f64::NEG_INFINITY, f64::max)]
+    }
+}
+
+impl Convex for Figure {
+    #[inline]
+    fn deficit(&self) -> f64 {
+        self.deficit
+    }
+
+    #[inline]
+    fn closest(&self, x: &Point) -> Point {
+        match &self.outline {
+            Outline::Point(at) => *at,
+            Outline::Segment([a, b]) => closest_on_segment(x, a, b),
+            Outline::Polygon(polygon) => polygon.closest(x),
+        }
+    }
+
+    #[inline]
+    fn highest(&self, direction: &Point) -> f64 {
+        self.corners().iter().map(|corner| dot(corner, direction)).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -202,6 +211,15 @@ impl Polygon {
     }
 }
 
+/// The segment that two make which go straight on at a common end.
+fn straight(own: &[Point; 2], theirs: &[Point; 2], end: &Point, flatness: f64) -> Option<[Point; 2]> {
+    let [before, after] = [own, theirs].map(|ends| ends[usize::from(ends[0] == *end)]);
+    let (from, to, along) = (subtract(end, &before), subtract(&after, end), subtract(&after, &before));
+    let twice = cross(&from, &to);
+    let is_straight = dot(&twice, &twice) <= flatness * flatness * dot(&along, &along) && dot(&from, &to) > 0.0;
+    is_straight.then_some([before, after])
+}
+
 /// Whether a corner is one where the outline turns left, rather than one where it goes straight on; none where it turns right, or hardly.
 fn turn(up: &Point, before: &Point, corner: &Point, after: &Point, flatness: f64) -> Option<bool> {
     let (from, to, along) = (subtract(corner, before), subtract(after, corner), subtract(after, before));
@@ -212,7 +230,7 @@ fn turn(up: &Point, before: &Point, corner: &Point, after: &Point, flatness: f64
     (twice > LEAST_TURN * (dot(&from, &from) * dot(&to, &to)).sqrt()).then_some(true)
 }
 
-/// A side of a polygon.
+/// A side of a polygon, or an end of a segment as one of no length.
 struct Side {
     /// In single precision: sides that are as long but for rounding are taken in the order of their places, by which polygons grow side by side.
     length: f32,
@@ -227,31 +245,40 @@ pub(super) fn order(a: &Point, b: &Point) -> Ordering {
 }
 
 /// Figures with polygons of one radius joined across their common sides, the longest first, as far as unions are convex and flat to within `flatness`. Sides that turn by little, and
-/// leave no more than `within` beyond others, are no hindrance.
+/// leave no more than `within` beyond others, are no hindrance. Two segments that go straight on where no third one ends are joined, too.
 ///
 /// # Errors
 /// [`Stopped`].
 pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, within: f64, budget: &Budget) -> Result<Vec<Figure>, Stopped> {
     for figure in &mut figures {
-        if let Outline::Polygon(polygon) = &mut figure.outline {
-            // Zeros have two signs.
-            polygon.corners.iter_mut().flatten().for_each(|x| *x += 0.0);
-        }
+        let corners: &mut [Point] = match &mut figure.outline {
+            Outline::Point(at) => std::slice::from_mut(at),
+            Outline::Segment(ends) => ends,
+            Outline::Polygon(polygon) => &mut polygon.corners,
+        };
+        // Zeros have two signs.
+        corners.iter_mut().flatten().for_each(|x| *x += 0.0);
     }
     for _ in 0..ROUNDS {
         budget.cancel.check()?;
         let mut sides = Vec::new();
-        for (figure, polygon) in (0..).zip(&figures).filter_map(|(index, figure)| figure.polygon().map(|polygon| (index, polygon))) {
-            for [from, to] in polygon.sides() {
+        for (index, figure) in (0..).zip(&figures) {
+            let mut add = |[from, to]: [Point; 2]| {
                 let ends = if order(&from, &to).is_lt() { [from, to] } else { [to, from] };
-                sides.push(Side { length: distance_squared(&from, &to).sqrt() as f32, ends, figure });
+                sides.push(Side { length: distance_squared(&from, &to).sqrt() as f32, ends, figure: index });
+            };
+            match &figure.outline {
+                Outline::Point(_) => {}
+                Outline::Segment(ends) => ends.iter().for_each(|end| add([*end; 2])),
+                Outline::Polygon(polygon) => polygon.sides().for_each(add),
             }
         }
+        let most_at = |side: &Side| if side.length > 0.0 { MOST_AT_A_SIDE } else { 2 };
         let same = |a: &Side, b: &Side| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
         sides.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then_with(|| same(a, b)).then(a.figure.cmp(&b.figure)));
         let mut is_taken = vec![false; figures.len()];
         let mut gone = vec![false; figures.len()];
-        for around in sides.chunk_by(|a, b| same(a, b).is_eq()).filter(|around| around.len() <= MOST_AT_A_SIDE) {
+        for around in sides.chunk_by(|a, b| same(a, b).is_eq()).filter(|around| around.len() <= most_at(&around[0])) {
             for (place, one) in around.iter().enumerate() {
                 for other in &around[place + 1..] {
                     let [own, theirs] = [one, other].map(|side| side.figure as usize);
@@ -262,9 +289,9 @@ pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, within: f64, budge
                     {
                         continue;
                     }
-                    let (Some(first), Some(second)) = (figures[own].polygon(), figures[theirs].polygon()) else { continue };
-                    let Some(union) = first.joined(second, [&one.ends[0], &one.ends[1]], flatness, within) else { continue };
-                    figures[own].outline = Outline::Polygon(union);
+                    let side = [&one.ends[0], &one.ends[1]];
+                    let Some(union) = figures[own].joined(&figures[theirs], side, flatness, within) else { continue };
+                    figures[own].outline = union;
                     gone[theirs] = true;
                     (is_taken[own], is_taken[theirs]) = (true, true);
                 }

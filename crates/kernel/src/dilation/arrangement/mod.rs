@@ -11,6 +11,7 @@ mod figure;
 mod form;
 mod hinges;
 mod hull;
+mod index;
 mod joints;
 mod nerve;
 mod pieces;
@@ -21,6 +22,7 @@ mod structure;
 mod tests;
 mod triangulate;
 
+use crate::dilation::convex::Convex;
 use super::plan::Setting;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
@@ -31,6 +33,7 @@ use crate::solid::{Inside, TriMesh};
 use bodies::{Bodies, Common};
 use figure::{Figure, Polygon};
 use form::{Form, Kind};
+pub(super) use index::Index;
 use nerve::{Doubt, Sets};
 use pieces::{Body, Lists};
 use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
@@ -175,6 +178,11 @@ impl<'a> Arrangement<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// Its figures, for searches.
+    pub(super) fn into_index(self) -> Index {
+        Index::new(self.sites.list, self.setting.slack)
     }
 
     fn engine<'b>(&'b self, trial: u64, solids: &'b [Inside<'b>]) -> Engine<'b> {
