@@ -49,7 +49,7 @@ pub(super) struct Course {
 
 /// The course for a lattice's surface, whose vertices are all over the band, and for one whose vertices are as far out as may be.
 pub(super) const OF_LATTICE: Course = Course { passes: &[1e-6, 0.01, 0.05, 0.12, 0.3, 2.0], lift_before: Some(4) };
-pub(super) const OF_POLYTOPES: Course = Course { passes: &[0.15, 0.5, 2.0], lift_before: None };
+pub(super) const OF_POLYTOPES: Course = Course { passes: &[0.15, 0.4, 1.0, 2.0], lift_before: None };
 /// The share of an edge's length that is added: where all is flat, short edges go first.
 const LENGTH_SHARE: f64 = 1e-3;
 /// Cosine of the angle by which a normal may turn.
