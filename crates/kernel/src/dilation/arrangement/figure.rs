@@ -3,7 +3,7 @@
 //! The dilation of a union is the union of the dilations, and that of a convex polygon is convex as that of a triangle: so a polygon stands for its triangles, and a segment for its parts, and no bound, nor what is known of the
 //! topology, changes. What changes is that there are fewer bodies: the sets of them that `nerve` looks at grow with the fourth power of how many are near to each other.
 
-use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::dilation::tree::Weighted;
@@ -42,6 +42,8 @@ pub(super) struct Polygon {
     pub(super) corners: Box<[Point]>,
     /// Its unit normal; 0 where there is none.
     pub(super) up: Point,
+    /// The unit vectors in its plane out of its sides, of which the first begins at the first corner.
+    pub(super) outward: Box<[Point]>,
 }
 
 impl From<Weighted> for Figure {
@@ -117,12 +119,16 @@ impl Polygon {
         let across = fan.fold([0.0; 3], |sum: Point, part| std::array::from_fn(|axis| sum[axis] + part[axis]));
         let length = dot(&across, &across).sqrt();
         let up = if length > 0.0 { across.map(|part| part / length) } else { [0.0; 3] };
-        Self { corners, up }
+        let mut outward: Box<[Point]> = corners.clone();
+        for (side, out) in outward.iter_mut().enumerate() {
+            *out = unit(&cross(&subtract(&corners[(side + 1) % corners.len()], &corners[side]), &up));
+        }
+        Self { corners, up, outward }
     }
 
     /// The same with all places less `origin`.
     pub(super) fn from(&self, origin: &Point) -> Self {
-        Self { corners: self.corners.iter().map(|corner| subtract(corner, origin)).collect(), up: self.up }
+        Self { corners: self.corners.iter().map(|corner| subtract(corner, origin)).collect(), up: self.up, outward: self.outward.clone() }
     }
 
     /// The ends of its sides, in their order.
@@ -137,17 +143,15 @@ impl Polygon {
             return closest_on_triangle(x, a, b, c);
         }
         let mut best: Option<(f64, Point)> = None;
-        let mut from = &self.corners[self.corners.len() - 1];
-        for to in &self.corners {
+        for (side, (from, out)) in self.corners.iter().zip(&self.outward).enumerate() {
             // Beyond sides, the closest point is on one of these.
-            if dot(&cross(&subtract(to, from), &self.up), &subtract(x, from)) > 0.0 {
-                let on = closest_on_segment(x, from, to);
+            if dot(out, &subtract(x, from)) > 0.0 {
+                let on = closest_on_segment(x, from, &self.corners[(side + 1) % self.corners.len()]);
                 let square = distance_squared(x, &on);
                 if best.is_none_or(|(least, _)| square < least) {
                     best = Some((square, on));
                 }
             }
-            from = to;
         }
         best.map_or_else(
             || {

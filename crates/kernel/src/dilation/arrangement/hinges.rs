@@ -14,7 +14,7 @@
 use super::figure::{Figure, Polygon};
 use super::joints;
 use super::polytopes::Shell;
-use crate::attractor::cell::{Point, closest_on_segment, cross, distance_squared, dot, subtract, unit};
+use crate::attractor::cell::{Point, closest_on_segment, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
@@ -99,12 +99,6 @@ impl Polygon {
     }
 }
 
-/// The unit vector in the plane of a polygon out of a side.
-pub(super) fn outward(polygon: &Polygon, place: usize) -> Point {
-    let (from, to) = (&polygon.corners[place], &polygon.corners[(place + 1) % polygon.corners.len()]);
-    unit(&cross(&subtract(to, from), &polygon.up))
-}
-
 /// What a segment has in common with another within `flatness`, as shares of its length: the ends of both that are on the other.
 fn common(side: &[Point; 2], other: &[Point; 2], flatness: f64) -> Option<[f64; 2]> {
     let along = subtract(&side[1], &side[0]);
@@ -138,6 +132,7 @@ mod tests {
     use super::super::polytopes::{Plane, height};
     use super::*;
     use crate::attractor::cell::Site;
+    use crate::dilation::convex::Convex;
     use crate::dilation::tree::Weighted;
     use crate::split_mix::Random;
 

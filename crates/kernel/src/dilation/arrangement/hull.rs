@@ -1,7 +1,6 @@
 //! The polytope of a convex polygon.
 
 use super::figure::{Figure, Polygon};
-use super::hinges;
 use super::joints;
 use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, frame, height, meeting, normal, share};
 use super::structure::Structure;
@@ -87,7 +86,7 @@ impl Polygon {
     /// Sides, in their order, whose lines bound what is no farther from the polygon than `within`, or nearly: those that are needed, and of many that turn by little some.
     pub(super) fn main_sides(&self, within: f64, is_needed: impl Fn(usize) -> bool) -> Vec<usize> {
         let count = self.corners.len();
-        let out: Vec<Point> = (0..count).map(|side| hinges::outward(self, side)).collect();
+        let out = &self.outward;
         // Where the line of one meets that of a later one.
         let is_near = |one: usize, later: usize| {
             let along = cross(&self.up, &out[one]);
@@ -119,7 +118,7 @@ impl Polygon {
 impl Hull {
     /// Both faces, and a facet across the polygon at some of its sides.
     fn prism(polygon: &Polygon, sides: &[usize], offset: impl Fn(usize) -> f64) -> Option<Self> {
-        let out: Vec<Point> = sides.iter().map(|&side| hinges::outward(polygon, side)).collect();
+        let out: Vec<Point> = sides.iter().map(|&side| polygon.outward[side]).collect();
         Self::upright(polygon, &polygon.up, &out, offset)
     }
 

@@ -12,7 +12,6 @@
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
 use super::figure::{Figure, Outline, order};
-use super::hinges;
 use super::polytopes::{Plane, Shell, ordered};
 use crate::attractor::cell::{Point, between, dot, subtract, unit};
 use crate::split_mix;
@@ -98,7 +97,7 @@ pub(super) fn planes(figure: &Figure, beyond: &[Option<f64>]) -> Box<[Plane]> {
     let plane = |normal: Point, at: &Point, beyond: f64| [normal[0], normal[1], normal[2], dot(&normal, at) + beyond];
     let cut = beyond.iter().enumerate().filter_map(|(place, beyond)| beyond.map(|beyond| (place, beyond)));
     if let Some(polygon) = figure.polygon() {
-        return cut.map(|(side, beyond)| plane(hinges::outward(polygon, side), &polygon.corners[side], beyond)).collect();
+        return cut.map(|(side, beyond)| plane(polygon.outward[side], &polygon.corners[side], beyond)).collect();
     }
     let ends = ordered(figure);
     cut.map(|(end, beyond)| plane(unit(&subtract(&ends[end], &ends[1 - end])), &ends[end], beyond)).collect()
@@ -137,6 +136,7 @@ mod tests {
     use super::super::form::{Form, Kind};
     use super::*;
     use crate::attractor::cell::{Site, distance_squared};
+    use crate::dilation::convex::Convex;
     use crate::dilation::tree::Weighted;
     use crate::split_mix::Random;
 

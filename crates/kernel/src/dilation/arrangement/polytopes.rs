@@ -336,6 +336,7 @@ const TURN: f64 = 0.3819;
 mod tests {
     use super::*;
     use crate::attractor::cell::{Site, distance_squared};
+    use crate::dilation::convex::Convex;
     use crate::dilation::tree::Weighted;
     use crate::split_mix::Random;
 

@@ -3,6 +3,7 @@ use super::polytopes::height;
 use super::{Arrangement, Engine};
 use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
+use crate::dilation::convex::Convex;
 use crate::dilation::plan::{Balls, Plan};
 use crate::dilation::{Dilation, DilationError, dilate};
 use crate::measure::triangle::closest_on_triangle;
