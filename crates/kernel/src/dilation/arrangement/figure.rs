@@ -249,7 +249,7 @@ pub(super) fn order(a: &Point, b: &Point) -> Ordering {
 }
 
 /// Figures with polygons of one radius joined across their common sides, the longest first, as far as unions are convex and flat to within `flatness`. Sides that turn by little, and
-/// leave no more than `within` beyond others, are no hindrance. Two segments that go straight on where no third one ends are joined, too.
+/// leave no more than `within` beyond others, are no hindrance. Segments that go straight on at a common end are joined, too.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -277,12 +277,11 @@ pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, within: f64, budge
                 Outline::Polygon(polygon) => polygon.sides().for_each(add),
             }
         }
-        let most_at = |side: &Side| if side.length > 0.0 { MOST_AT_A_SIDE } else { 2 };
         let same = |a: &Side, b: &Side| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
         sides.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then_with(|| same(a, b)).then(a.figure.cmp(&b.figure)));
         let mut is_taken = vec![false; figures.len()];
         let mut gone = vec![false; figures.len()];
-        for around in sides.chunk_by(|a, b| same(a, b).is_eq()).filter(|around| around.len() <= most_at(&around[0])) {
+        for around in sides.chunk_by(|a, b| same(a, b).is_eq()).filter(|around| around.len() <= MOST_AT_A_SIDE) {
             for (place, one) in around.iter().enumerate() {
                 for other in &around[place + 1..] {
                     let [own, theirs] = [one, other].map(|side| side.figure as usize);

@@ -1,38 +1,47 @@
-//! Where segments meet end to end, their dilations are cut: what balls around the common end add lies in that of one of them, or of all together.
+//! Where segments end at others, their dilations are cut: what balls around the common end add lies in that of one of them, or of all together.
 //!
 //! Let site S_i have the end B and the unit vector u_i along it, out of B. Its dilations may be cut by the half-space H_i: (x - B) . u_i <= c_i, c_i > 0, if
 //!
-//! * (one keeps) another site that ends at B, with no smaller a radius, is not cut there, or
+//! * (one keeps) another site that ends at B, with no smaller a radius, is not cut there, or one that goes on through B has no smaller a radius, or
 //! * (none does) all sites that end at B have one radius, are cut there, and c_i > m r, with m the length of some vector w in the hull of the u_j.
 //!
 //! Then D_t(S) is the union of the D_t(S_i) in H_i, for all t up to r. For let S_i be nearest to x in D_t(S), and x not in H_i. Then B is its closest point. All other sites that end at B are no nearer, and those with no
-//! smaller a radius no farther: B is their closest point, too, so that x is beyond the other end of none of them. Where one keeps, x is in what is left of its dilation. Where none does and x is in no H_j,
+//! smaller a radius no farther: B is their closest point, too, so that x is beyond the other end of none of them, and beyond neither end of what goes on through B. Where one keeps, x is in what is left of its dilation. Where none does and x is in no H_j,
 //! (x - B) . u_j > m r for all of them, and for w; but (x - B) . w <= |x - B| m <= m r.
 //!
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
 use super::figure::{Figure, Outline, order};
 use super::polytopes::{Plane, Shell, ordered};
-use crate::attractor::cell::{Point, between, dot, subtract, unit};
+use crate::attractor::cell::{Point, between, distance_squared, dot, subtract, unit};
+use crate::dilation::convex::Convex;
+use crate::solid::box_tree::{Box32, BoxTree};
 use crate::split_mix;
 
 /// What a cut is farther out than it must be, in units of the band between the balls: by a half to a whole, so that none coincide.
 const SHIFT: f64 = 0.04;
 /// Steps towards the shortest vector of a hull.
 const STEPS: usize = 32;
+/// How far a place on a segment is from its ends that counts as between them, in units of the radius: far more than what closest points move by where places do by rounding.
+const CLEAR: f64 = 1e-3;
 /// The share of the room for shifts that cuts leave to strips.
 const LEAST_ROOM: f64 = 0.25;
 
-/// An end of a site.
+/// An end of a site, or a place on one where others end.
 struct End {
     at: Point,
     site: u32,
-    /// Which of the two, in their order; both of a point.
+    /// Which of the two, in their order; none in the middle, and of a point.
     end: Option<usize>,
 }
 
-/// How far beyond its ends, in their order, every site may be cut; none where it is not. Polytopes that are cut at both ends are around the inner ball where their corners are `girth` times as far, others where they are `reach` times as far.
-pub(super) fn cuts(sites: &[Figure], [reach, girth]: [f64; 2], shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
+/// How far beyond its ends, in their order, every site may be cut; none where it is not. What is no farther than `flatness` from a segment is on it. Polytopes that are cut at both ends are around the inner ball where their corners are `girth` times as far, others where they are `reach` times as far.
+pub(super) fn cuts(
+    sites: &[Figure],
+    flatness: f64,
+    [reach, girth]: [f64; 2],
+    shell: impl Fn(&Figure) -> Shell,
+) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
     for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
         // Zeros have two signs.
@@ -43,7 +52,11 @@ pub(super) fn cuts(sites: &[Figure], [reach, girth]: [f64; 2], shell: impl Fn(&F
             ends.extend([first, second].into_iter().enumerate().map(|(end, at)| End { at, site, end: Some(end) }));
         }
     }
-    ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
+    let sort = |ends: &mut Vec<End>| ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
+    sort(&mut ends);
+    let through = through(sites, flatness, ends.chunk_by(|a, b| a.at == b.at), &shell);
+    ends.extend(through);
+    sort(&mut ends);
     let joints = || ends.chunk_by(|a, b| a.at == b.at).filter(|joint| joint.len() > 1);
     let mut is_joined = vec![[false; 2]; sites.len()];
     for end in joints().flatten() {
@@ -84,6 +97,43 @@ pub(super) fn cuts(sites: &[Figure], [reach, girth]: [f64; 2], shell: impl Fn(&F
         cut.iter_mut().for_each(|cut| *cut = cut.filter(|beyond| *beyond < most));
     }
     cuts
+}
+
+/// The places between the ends of segments, and clear of these, where others end that have no larger a radius.
+fn through<'a>(
+    sites: &[Figure],
+    flatness: f64,
+    joints: impl Iterator<Item = &'a [End]>,
+    shell: impl Fn(&Figure) -> Shell,
+) -> Vec<End> {
+    let mut tree = BoxTree::default();
+    let boxes = |site: u32| match &sites[site as usize].outline {
+        Outline::Segment(ends) => Some(Box32::of(&around(ends, flatness))),
+        _ => None,
+    };
+    tree.build(sites.len(), boxes, true);
+    let mut found = Vec::new();
+    for joint in joints {
+        let (at, deficit) = (joint[0].at, |end: &End| sites[end.site as usize].deficit);
+        let least = joint.iter().map(deficit).fold(f64::INFINITY, f64::min);
+        tree.query(&Box32::of(&[at]), 0, |leaf| {
+            found.extend(tree.items(leaf).iter().filter_map(|&site| {
+                let figure = &sites[site as usize];
+                let is_on = distance_squared(&figure.closest(&at), &at) <= flatness * flatness;
+                let clear = CLEAR * shell(figure).outer;
+                let is_within = figure.corners().iter().all(|end| distance_squared(end, &at) > clear * clear);
+                (is_on && is_within && figure.deficit <= least).then_some(End { at, site, end: None })
+            }));
+            true
+        });
+    }
+    found
+}
+
+/// Two corners of a box with all that is no farther than a distance from a segment.
+fn around([a, b]: &[Point; 2], distance: f64) -> [Point; 2] {
+    let extreme = |choose: fn(f64, f64) -> f64, by: f64| std::array::from_fn(|axis| choose(a[axis], b[axis]) + by);
+    [extreme(f64::min, -distance), extreme(f64::max, distance)]
 }
 
 /// How far out a polytope may be cut so that its corners, which are so many times farther out than the inner radius at least, have room.
@@ -135,7 +185,7 @@ pub(super) fn shift(shell: Shell, seed: u64) -> f64 {
 mod tests {
     use super::super::form::{Form, Kind};
     use super::*;
-    use crate::attractor::cell::{Site, distance_squared};
+    use crate::attractor::cell::Site;
     use crate::dilation::convex::Convex;
     use crate::dilation::tree::Weighted;
     use crate::split_mix::Random;
@@ -165,7 +215,7 @@ mod tests {
                     Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }.into()
                 })
                 .collect();
-            let cuts = cuts(&sites, [covering.reach, covering.girth], |site| Shell {
+            let cuts = cuts(&sites, 1e-12, [covering.reach, covering.girth], |site| Shell {
                 inner: site.in_space(shell.inner),
                 outer: site.in_space(shell.outer),
             });

@@ -42,7 +42,7 @@ use std::sync::OnceLock;
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
 /// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
-const MOST_NEAR: [usize; 2] = [5_000, 250];
+const MOST_NEAR: [usize; 2] = [5_000, 600];
 /// So many sets, and so many doubts that the first polytopes leave about larger ones, take as long as the lattice at one of its cubes along a polygon: with large faces there may be more of both.
 const SETS_PER_CUBE: f64 = 100.0;
 const DOUBTS_PER_CUBE: f64 = 0.5;
@@ -114,7 +114,7 @@ impl<'a> Arrangement<'a> {
         } else {
             [1.0; 2]
         };
-        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, scales, shell)).filter(|(beyond, _)| beyond.is_empty()) {
+        for (beyond, cut) in beyond.iter_mut().zip(joints::cuts(&sites.list, FLATNESS * setting.slack, scales, shell)).filter(|(beyond, _)| beyond.is_empty()) {
             *beyond = Box::new(cut);
         }
         let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
