@@ -6,7 +6,7 @@
 use crate::dilation::convex::Convex;
 use super::figure::{Figure, Polygon};
 use super::pieces::Lists;
-use super::polytopes::{Plane, Polytopes, height, normal};
+use super::polytopes::{self, Plane, Polytopes, height, normal};
 use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
 use crate::dilation::plan::Setting;
 use crate::solid::Inside;
@@ -26,6 +26,12 @@ const HALVINGS_IN_SOLIDS: usize = 40;
 const ROUNDING: f64 = 1e-9;
 /// Boxes no wider than this, in units of the radius, are not halved for the face of a solid across them.
 const NARROW: f64 = 0.25;
+
+/// Dilations of a set are parted where there is no place that is nearer than this to all of them, in units of the slack.
+const LEAST_GAP: f64 = 64.0;
+
+/// How far from the dilations planes are that part them, as a share of what is between: at least, and how much more at most.
+const PARTING: [f64; 2] = [0.3, 0.4];
 
 /// The axes of coordinates.
 const AXES: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -98,6 +104,33 @@ impl Bodies<'_> {
         }
         let is_common = common_point(within, |x| self.beyond(set, x, reach - slack)) == Common::Some;
         Verdict { common: if is_common { Common::Some } else { Common::Unknown }, is_doubtful: true, hub: None }
+    }
+
+    /// For dilations of a set that have no common point: planes that each of some bodies' dilations is below, while nothing is below all of these planes, as far as one such place is found from which the farthest body is nearest. No more are needed where
+    /// that is so of those that are `known`, as several sets often have no common point for the same reason; `None` where rounding leaves none.
+    ///
+    /// With c_i the points of the figures closest to x, and a mean of the vectors x - c_i / |x - c_i| that is 0, the mean of their values at y is that at x, wherever y is: not all are less.
+    pub(super) fn parting(&self, set: &[u32], known: &[Plane], seed: u64) -> Option<Vec<(u32, Plane)>> {
+        let Setting { reach, outer, slack, .. } = *self.setting;
+        let within = common_box(&AXES, set.iter().map(|&body| self.around(body, outer + slack)));
+        if common_point(within, |x| highest(x, known.iter(), slack)) == Common::None {
+            return Some(Vec::new());
+        }
+        let beyond = |x: &Point| set.iter().map(|&body| self.above(Kind::Dilation, body, x)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+        let (x, gap) = lowest(within, |x| beyond(x).unwrap_or((0.0, [0.0; 3])))?;
+        if gap <= LEAST_GAP * slack {
+            return None;
+        }
+        let plane = |&body: &u32| {
+            let figure = &self.figures[body as usize];
+            let from = subtract(&x, &figure.closest(&x));
+            let away = unit(&from);
+            // Bodies may have their closest points in common.
+            let share = PARTING[0] + PARTING[1] * polytopes::share(seed, u64::from(body) % 1024);
+            let offset = figure.in_space(reach) + share * gap + figure.highest(&away);
+            (dot(&from, &from) > 0.0).then_some((body, [away[0], away[1], away[2], offset]))
+        };
+        Some(set.iter().filter_map(plane).collect())
     }
 
     /// The farthest figure of a set, and how far it is, the deficit included.
@@ -292,31 +325,89 @@ fn highest<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>, than: f64) ->
     top(x, planes).filter(|&(height, _)| height > than).map(|(height, normal)| (height - than, normal))
 }
 
+/// About where in a box a convex function is lowest, and its value there; `above` gives it with a subgradient. Ellipsoids hold the places where it is lower than at any before, and begin anew in smaller boxes, which rounding does less to; none where the box is empty.
+fn lowest([low, high]: [Point; 2], above: impl Fn(&Point) -> (f64, Point)) -> Option<(Point, f64)> {
+    if (0..3).any(|axis| low[axis] > high[axis]) {
+        return None;
+    }
+    let mut best = (between(&low, &high, 0.5), f64::INFINITY);
+    for share in ZOOM {
+        let half: Point = std::array::from_fn(|axis| 0.5 * share * (high[axis] - low[axis]));
+        let [from, to] = [-1.0, 1.0].map(|side| std::array::from_fn(|axis| best.0[axis] + side * half[axis]));
+        let mut ellipsoid = Ellipsoid::around(&from, &to);
+        for _ in 0..MOST_ELLIPSOIDS {
+            let (value, slope) = above(&ellipsoid.centre);
+            if value < best.1 {
+                best = (ellipsoid.centre, value);
+            }
+            if !matches!(ellipsoid.cut(value - best.1, &slope), Left::Some) {
+                break;
+            }
+        }
+    }
+    Some(best)
+}
+
+/// Sides of the boxes where the lowest place is sought, as shares of the first.
+const ZOOM: [f64; 3] = [1.0, 1e-3, 1e-6];
+
 /// Whether convex functions are all at most 0 somewhere in a box. `above` gives, for a place where one is not, its value and a subgradient there that is no longer than 1.
 ///
 /// The ellipsoid {y: (y - x)^T P^-1 (y - x) <= 1} holds all places of the box where they are; there the function is at least f(x) - sqrt(g^T P g).
 fn common_point([low, high]: [Point; 2], above: impl Fn(&Point) -> Option<(f64, Point)>) -> Common {
-    let mut x = between(&low, &high, 0.5);
-    // The ball around a box is an ellipsoid with the sides' half lengths times the root of 3.
-    let mut shape = [[0.0; 3]; 3];
-    (0..3).for_each(|axis| shape[axis][axis] = 0.75 * (high[axis] - low[axis]).powi(2) * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+    let mut ellipsoid = Ellipsoid::around(&low, &high);
     for _ in 0..MOST_ELLIPSOIDS {
-        let Some((value, slope)) = above(&x) else { return Common::Some };
-        let image = shape.map(|row| dot(&row, &slope));
-        let square = dot(&slope, &image);
+        let Some((value, slope)) = above(&ellipsoid.centre) else { return Common::Some };
+        match ellipsoid.cut(value, &slope) {
+            Left::Some => {}
+            Left::None => return Common::None,
+            Left::Little => break,
+        }
+    }
+    Common::Unknown
+}
+
+/// {y: (y - x)^T P^-1 (y - x) <= 1}.
+struct Ellipsoid {
+    /// x.
+    centre: Point,
+    /// P.
+    shape: [Point; 3],
+}
+
+/// What is left of an ellipsoid.
+enum Left {
+    Some,
+    /// Not enough to go on with.
+    Little,
+    None,
+}
+
+impl Ellipsoid {
+    /// The ball around a box is an ellipsoid with the sides' half lengths times the root of 3.
+    fn around(low: &Point, high: &Point) -> Self {
+        let mut shape = [[0.0; 3]; 3];
+        (0..3).for_each(|axis| shape[axis][axis] = 0.75 * (high[axis] - low[axis]).powi(2) * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+        Self { centre: between(low, high, 0.5), shape }
+    }
+
+    /// Cuts off the places where a function is not lower by `value` than at the centre, with the subgradient `slope` there, which is no longer than 1.
+    fn cut(&mut self, value: f64, slope: &Point) -> Left {
+        let Self { centre: x, shape } = self;
+        let image = shape.map(|row| dot(&row, slope));
+        let square = dot(slope, &image);
         // What rounding makes of an ellipsoid that is thin in some direction: there it proves nothing.
         let noise = NOISE * (0..3).map(|axis| shape[axis][axis]).sum::<f64>();
         if value > (square.max(0.0) + noise).sqrt() * (1.0 + 1e-9) {
-            return Common::None;
+            return Left::None;
         }
         if square <= noise {
-            break;
+            return Left::Little;
         }
         let reach = square.sqrt();
-        // Places where the function is not at most 0 are cut off.
         let depth = value / reach;
         if depth >= 1.0 {
-            break;
+            return Left::Little;
         }
         let step = (1.0 + 3.0 * depth) / 4.0;
         let grown = 9.0 / 8.0 * (1.0 - depth * depth) * (1.0 + 1e-12);
@@ -324,9 +415,9 @@ fn common_point([low, high]: [Point; 2], above: impl Fn(&Point) -> Option<(f64, 
         for axis in 0..3 {
             x[axis] -= step * image[axis] / reach;
         }
-        shape = std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
+        *shape = std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
+        Left::Some
     }
-    Common::Unknown
 }
 
 #[cfg(test)]

@@ -80,6 +80,11 @@ impl Figure {
         }
     }
 
+    /// How far apart the ends of a segment are; 0 of a point.
+    pub(super) fn length(&self) -> f64 {
+        if let Outline::Segment([a, b]) = &self.outline { distance_squared(a, b).sqrt() } else { 0.0 }
+    }
+
     /// Its box.
     pub(super) fn bounds(&self) -> [Point; 2] {
         let extreme = |first: f64, choose: fn(f64, f64) -> f64| -> Point {

@@ -15,7 +15,7 @@ pub(super) const CORNER_SHARE: f64 = 0.25;
 /// The least cosine of the angle between sides that are kept beside some that are not.
 const LEAST_COSINE: f64 = 0.7;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
-const NOISE: f64 = 1e-9;
+pub(super) const NOISE: f64 = 1e-9;
 /// The facets along the polygon come first.
 const FACES: usize = 2;
 

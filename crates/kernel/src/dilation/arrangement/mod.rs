@@ -36,19 +36,23 @@ use form::{Form, Kind};
 pub(super) use index::Index;
 use nerve::{Doubt, Sets};
 use pieces::{Body, Lists};
-use polytopes::{Cut, MOST_POLYTOPES, Polytope, Polytopes, Shell};
+use polytopes::{Cut, MOST_POLYTOPES, Plane, Polytope, Polytopes, Shell};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 /// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
 /// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
-const MOST_NEAR: [usize; 2] = [5_000, 600];
+const MOST_NEAR: [usize; 2] = [5_000, 250];
 /// So many sets, and so many doubts that the first polytopes leave about larger ones, take as long as the lattice at one of its cubes along a polygon: with large faces there may be more of both.
 const SETS_PER_CUBE: f64 = 100.0;
 const DOUBTS_PER_CUBE: f64 = 0.5;
+/// Of tubes so many sets at most: many of them are hidden where that many are near to each other.
+const MOST_OF_TUBES: f64 = 1_000.0;
 /// Doubts that polytopes may leave, of pairs and of larger sets, as shares of the sites, and in any case. Pairs nearly touch, and finer polytopes tell that they do, or do not. With more doubts of larger sets these are no matter of a few places, and finer polytopes
 /// everywhere cost more than a lattice.
-const MOST_DOUBTS: [f64; 2] = [4.0, 0.3];
+const MOST_DOUBTS: [f64; 2] = [4.0, 2.0];
 const FEW_DOUBTS: f64 = 16.0;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
@@ -124,7 +128,11 @@ impl<'a> Arrangement<'a> {
         // Both sides of all polygons.
         let areas = sites.list.iter().filter_map(Figure::polygon).map(Polygon::double);
         let cubes = areas.sum::<f64>() / setting.lattice.pitch.powi(2);
-        let sets = (SETS_PER_CUBE * cubes / sites.list.len() as f64) as usize;
+        // The sides of tubes.
+        let lengths = sites.list.iter().filter(|figure| figure.polygon().is_none()).map(Figure::length);
+        let around = TAU * setting.reach * lengths.sum::<f64>() / setting.lattice.pitch.powi(2);
+        let per_body = |cubes: f64| SETS_PER_CUBE * cubes / sites.list.len() as f64;
+        let sets = (per_body(cubes) + per_body(around).min(MOST_OF_TUBES)) as usize;
         let Some(near) = pieces::near(&bodies, [MOST_NEAR[0], MOST_NEAR[1].max(sets)], budget)? else { return Ok(None) };
         drop(bodies);
         let solids = rule.attractor().surfaces();
@@ -189,7 +197,7 @@ impl<'a> Arrangement<'a> {
         let sites = &self.sites.list;
         let states = vec![State::default(); sites.len()];
         let Self { setting, beyond, near, forms, cubes, .. } = self;
-        Engine { setting, sites, beyond, near, forms, solids, cubes: *cubes, polytopes: Polytopes::default(), states, trial }
+        Engine { setting, sites, beyond, near, forms, solids, cubes: *cubes, polytopes: Polytopes::default(), states, parted: BTreeSet::new(), planes: vec![Vec::new(); sites.len()], trial }
     }
 }
 
@@ -246,7 +254,7 @@ enum Side {
 }
 
 /// What a site's polytope is like.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct State {
     level: u32,
     side: Side,
@@ -308,6 +316,9 @@ struct Engine<'a> {
     cubes: f64,
     polytopes: Polytopes,
     states: Vec<State>,
+    /// The sets of sites whose dilations are parted by planes, and the planes that every site's is below.
+    parted: BTreeSet<Vec<u32>>,
+    planes: Vec<Vec<Plane>>,
     trial: u64,
 }
 
@@ -353,8 +364,14 @@ impl Engine<'_> {
         Ok(is_made)
     }
 
-    /// A site's polytope in a state; none where no form is fine enough, or no shift fits.
+    /// A site's polytope in a state, below the planes that part it from others; none where no form is fine enough, or no shift fits.
     fn polytope(&self, index: usize, state: State) -> Option<Polytope> {
+        let noise = hull::NOISE * self.setting.outer;
+        let whole = self.whole(index, state)?;
+        Some(self.planes[index].iter().fold(whole, |polytope, plane| polytope.below(plane, noise).unwrap_or(polytope)))
+    }
+
+    fn whole(&self, index: usize, state: State) -> Option<Polytope> {
         let (figure, beyond) = (&self.sites[index], &self.beyond[index]);
         let shell = self.setting.shell(figure, state);
         let seed = (self.trial << 8 | state.number()) << 32 | index as u64;
@@ -364,33 +381,53 @@ impl Engine<'_> {
         }
         let most = self.setting.shell(figure, State::default()).outer;
         let cut = Cut { beyond: [beyond[0], beyond[1]], most };
-        let form = self.forms.of(self.setting, self.sites, polytopes::kind(figure), state)?;
-        Polytope::new(figure, form, shell, cut, seed)
+        // Where a cut far out leaves a form no room, a finer one may have some.
+        let of_level = |level: u32| self.forms.of(self.setting, self.sites, polytopes::kind(figure), State { level, ..state });
+        (state.level..LEVELS).find_map(|level| Polytope::new(figure, of_level(level)?, shell, cut, seed))
     }
 
-    /// Changes polytopes of sites in doubt: they keep to the side that is wanted, or become finer where both are, as far as there are forms. Returns which ones are others now.
+    /// Changes polytopes of sites in doubt, and returns which ones are others now. Where dilations have no common point, planes between them part the polytopes, too; where they have one, polytopes are around the dilations; and where that was done,
+    /// or it is not known, they become finer as far as there are forms.
     fn refine(&mut self, doubts: &[Doubt]) -> Vec<bool> {
-        let mut wanted: Vec<Vec<Common>> = vec![Vec::new(); self.sites.len()];
-        for doubt in doubts {
-            doubt.sites.iter().for_each(|&site| wanted[site as usize].push(doubt.wanted));
-        }
         let mut changed = vec![false; self.sites.len()];
-        for (index, wanted) in wanted.iter().enumerate().filter(|(_, wanted)| !wanted.is_empty()) {
-            let State { level, side } = self.states[index];
-            let is_one_sided = |side: Common| wanted.iter().all(|wanted| *wanted == side);
-            let next = if side != Side::Both || !(is_one_sided(Common::Some) || is_one_sided(Common::None)) {
-                State { level: level + 1, side: Side::Both }
-            } else if is_one_sided(Common::Some) {
-                State { level, side: Side::Around }
-            } else {
-                State { level, side: Side::Within }
+        let mut next = self.states.clone();
+        for Doubt { sites, wanted } in doubts {
+            let is_new = match wanted {
+                Common::None if self.parted.insert(sites.clone()) => {
+                    let known: Vec<Plane> = sites.iter().flat_map(|&site| &self.planes[site as usize]).copied().collect();
+                    let planes = self.bodies().parting(sites, &known, self.parted.len() as u64);
+                    for &(site, plane) in planes.iter().flatten() {
+                        self.planes[site as usize].push(plane);
+                        changed[site as usize] = true;
+                    }
+                    planes.is_some()
+                }
+                Common::Some => {
+                    let mut is_new = false;
+                    for &site in sites {
+                        is_new |= self.states[site as usize].side == Side::Both;
+                        next[site as usize].side = Side::Around;
+                    }
+                    is_new
+                }
+                _ => false,
             };
-            if next.level < LEVELS
-                && let Some(polytope) = self.polytope(index, next)
-            {
-                self.states[index] = next;
+            if !is_new {
+                sites.iter().for_each(|&site| next[site as usize].level = self.states[site as usize].level + 1);
+            }
+        }
+        for (index, next) in next.into_iter().enumerate() {
+            let is_other = next != self.states[index];
+            if !(is_other || changed[index]) {
+                continue;
+            }
+            let made = |state: State| self.polytope(index, state).map(|polytope| (state, polytope));
+            let other = if is_other && next.level < LEVELS { made(next) } else { None };
+            let made = if changed[index] { other.or_else(|| made(self.states[index])) } else { other };
+            changed[index] = made.is_some();
+            if let Some((state, polytope)) = made {
+                self.states[index] = state;
                 self.polytopes.all[index] = polytope;
-                changed[index] = true;
             }
         }
         changed

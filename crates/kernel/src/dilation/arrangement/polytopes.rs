@@ -2,8 +2,8 @@
 
 use super::figure::{Figure, Outline};
 use super::form::{Form, Kind, Spot};
-use super::structure::Structure;
-use crate::attractor::cell::{Point, cross, dot, subtract, unit};
+use super::structure::{CutOff, Structure};
+use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
 use crate::split_mix;
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
@@ -256,6 +256,21 @@ impl Polytope {
         let low = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::INFINITY, f64::min));
         let high = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
         Self { structure, planes, cuts, corners, low, high }
+    }
+
+    /// What is left of it below a plane; none where that is all, or nothing, or where a corner is too near to the plane to tell, or there would be too many facets.
+    pub(super) fn below(&self, plane: &Plane, noise: f64) -> Option<Self> {
+        let CutOff { structure, facets, corners, made } = self.structure.cut(plane, &self.corners, noise)?;
+        if structure.facets > MOST_FACETS {
+            return None;
+        }
+        let planes: Box<[Plane]> = facets.iter().map(|&facet| self.planes[usize::from(facet)]).chain([*plane]).collect();
+        let at = |&(ends, share): &([u16; 2], f64)| {
+            let [from, to] = ends.map(|corner| &self.corners[usize::from(corner)]);
+            between(from, to, share)
+        };
+        let corners: Box<[Point]> = corners.iter().map(|&corner| self.corners[corner]).chain(made.iter().map(at)).collect();
+        structure.is_convex(&planes, &corners, 0.0).then(|| Self::with(Arc::new(structure), planes, self.cuts.clone(), corners))
     }
 
     /// Whether its box meets that of two points.

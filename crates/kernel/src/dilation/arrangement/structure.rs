@@ -20,6 +20,14 @@ pub(super) struct Edge {
     pub(super) facets: [u16; 2],
 }
 
+/// See [`Structure::cut`].
+pub(super) struct CutOff {
+    pub(super) structure: Structure,
+    pub(super) facets: Vec<u16>,
+    pub(super) corners: Vec<usize>,
+    pub(super) made: Vec<([u16; 2], f64)>,
+}
+
 impl Structure {
     /// That of a polytope whose facets have these corners, counter-clockwise seen from outside; none where they do not close, or not to a sphere.
     pub(super) fn closed(facets: &[Vec<u16>], corners: usize) -> Option<Self> {
@@ -54,6 +62,53 @@ impl Structure {
         let structure = Self { facets: planes.len(), corners: corners.len(), edges };
         let is_whole = 2 * structure.edges.len() == 3 * corners.len() && corners.len() + planes.len() == structure.edges.len() + 2;
         is_whole.then_some(structure)
+    }
+
+    /// What is left of a polytope below a plane, with a facet there, which comes last: the numbers of the facets and corners that are left, and between which two corners new ones lie, each followed by how far along the way. None where a corner is
+    /// no farther from the plane than `noise`, or nothing is cut off or left.
+    pub(super) fn cut(&self, plane: &Plane, places: &[Point], noise: f64) -> Option<CutOff> {
+        let heights: Vec<f64> = places.iter().map(|place| height(plane, place)).collect();
+        let kept: Vec<usize> = (0..self.corners).filter(|&corner| heights[corner] < 0.0).collect();
+        if heights.iter().any(|height| height.abs() <= noise) || kept.is_empty() || kept.len() == self.corners {
+            return None;
+        }
+        let mut edges: Vec<Edge> = Vec::new();
+        // Where the outline of every facet goes above the plane, and where it comes back.
+        let (mut ways, mut made) = (vec![[None; 2]; self.facets], Vec::new());
+        for Edge { corners, facets } in &self.edges {
+            let is_kept = corners.map(|corner| heights[usize::from(corner)] < 0.0);
+            if is_kept == [false; 2] {
+                continue;
+            }
+            let mut own = corners.map(|corner| kept.binary_search(&usize::from(corner)).map_or(u16::MAX, |place| place as u16));
+            if let Some(lost) = is_kept.iter().position(|is_kept| !is_kept) {
+                let number = (kept.len() + made.len()) as u16;
+                let [from, to] = corners.map(|corner| heights[usize::from(corner)]);
+                made.push((*corners, from / (from - to)));
+                own[lost] = number;
+                // The first facet has the edge in its own direction, the second against it.
+                ways[usize::from(facets[0])][1 - lost] = Some(number);
+                ways[usize::from(facets[1])][lost] = Some(number);
+            }
+            edges.push(Edge { corners: own, facets: *facets });
+        }
+        for (facet, way) in (0..).zip(&ways) {
+            match *way {
+                [Some(up), Some(down)] => edges.push(Edge { corners: [up, down], facets: [facet, self.facets as u16] }),
+                [None, None] => {}
+                _ => return None,
+            }
+        }
+        let mut left: Vec<u16> = edges.iter().flat_map(|edge| edge.facets).collect();
+        left.sort_unstable();
+        left.dedup();
+        for edge in &mut edges {
+            edge.facets = edge.facets.map(|facet| left.binary_search(&facet).map_or(u16::MAX, |place| place as u16));
+        }
+        let structure = Self { facets: left.len(), corners: kept.len() + made.len(), edges };
+        left.pop();
+        let is_whole = structure.corners + structure.facets == structure.edges.len() + 2;
+        is_whole.then_some(CutOff { structure, facets: left, corners: kept, made })
     }
 
     /// Whether all corners, which are on the planes of their own facets, are deeper than `least` below all others: then the polytope is what is below all planes.
