@@ -24,13 +24,7 @@ const MOST_SHARED: usize = 3;
 ///
 /// # Errors
 /// [`Stopped`]; the surface is lost then.
-pub(super) fn simplify(
-    setting: &Setting,
-    index: &Index,
-    core: Core,
-    surface: &mut BlockSurface,
-    budget: &Budget,
-) -> Result<(), Stopped> {
+pub(super) fn simplify(setting: &Setting, index: &Index, core: Core, surface: &mut BlockSurface, budget: &Budget) -> Result<(), Stopped> {
     let all = Part { core, triangles: (0..surface.triangles.len() as u32).collect(), halvings: 0 };
     let patches = Patches { setting, index, surface, simplifiers: Pool::default(), budget };
     let Patch { inside, across, .. } = patches.of(all, &index.all())?;

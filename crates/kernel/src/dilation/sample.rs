@@ -174,7 +174,14 @@ impl Pass<'_> {
         let (searched, found) = (surface.looked, surface.found);
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let core = self.core(node);
-        Simplifier::new(Tree::of(self.rule, cleaning), cleaning).run(cleaning, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
+        Simplifier::new(Tree::of(self.rule, cleaning), cleaning).run(
+            cleaning,
+            &OF_LATTICE,
+            &core,
+            candidates,
+            &mut surface,
+            self.budget,
+        )?;
         let triangles = surface.triangles.len() as u64;
         let (mut simplifying, mut tried) = (0, 0);
         if simplify {

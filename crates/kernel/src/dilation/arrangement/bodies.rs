@@ -3,11 +3,11 @@
 //! How far a point is from the farthest of some figures is a convex function, and so is how high it is above the highest plane of some polytopes: whether they are anywhere low enough is told by the method of ellipsoids
 //! (Yudin and Nemirovski, 1976; with deep cuts, Bland, Goldfarb and Todd, "The ellipsoid method: a survey", Oper. Res. 29, 1981). Whether some bodies' common points are all within others is told by halving boxes.
 
-use crate::dilation::convex::Convex;
 use super::figure::{Figure, Polygon};
 use super::pieces::Lists;
 use super::polytopes::{self, Plane, Polytopes, height, normal};
 use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
+use crate::dilation::convex::Convex;
 use crate::dilation::plan::Setting;
 use crate::solid::Inside;
 use glam::DVec3;
@@ -415,7 +415,8 @@ impl Ellipsoid {
         for axis in 0..3 {
             x[axis] -= step * image[axis] / reach;
         }
-        *shape = std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
+        *shape =
+            std::array::from_fn(|p| std::array::from_fn(|q| grown * (shape[p][q] - flattened * image[p] * image[q] / (reach * reach))));
         Left::Some
     }
 }

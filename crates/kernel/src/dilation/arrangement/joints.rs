@@ -36,12 +36,7 @@ struct End {
 }
 
 /// How far beyond its ends, in their order, every site may be cut; none where it is not. What is no farther than `flatness` from a segment is on it. Polytopes that are cut at both ends are around the inner ball where their corners are `girth` times as far, others where they are `reach` times as far.
-pub(super) fn cuts(
-    sites: &[Figure],
-    flatness: f64,
-    [reach, girth]: [f64; 2],
-    shell: impl Fn(&Figure) -> Shell,
-) -> Vec<[Option<f64>; 2]> {
+pub(super) fn cuts(sites: &[Figure], flatness: f64, [reach, girth]: [f64; 2], shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
     for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
         // Zeros have two signs.
@@ -100,12 +95,7 @@ pub(super) fn cuts(
 }
 
 /// The places between the ends of segments, and clear of these, where others end that have no larger a radius.
-fn through<'a>(
-    sites: &[Figure],
-    flatness: f64,
-    joints: impl Iterator<Item = &'a [End]>,
-    shell: impl Fn(&Figure) -> Shell,
-) -> Vec<End> {
+fn through<'a>(sites: &[Figure], flatness: f64, joints: impl Iterator<Item = &'a [End]>, shell: impl Fn(&Figure) -> Shell) -> Vec<End> {
     let mut tree = BoxTree::default();
     let boxes = |site: u32| match &sites[site as usize].outline {
         Outline::Segment(ends) => Some(Box32::of(&around(ends, flatness))),

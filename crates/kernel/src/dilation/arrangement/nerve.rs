@@ -56,11 +56,11 @@ impl Sets {
         self.meeting[first as usize].binary_search(&second).is_ok()
     }
 
-    /// Looks at the sets that have one of the sites that are `changed`, at first all of them. False where more pairs are in doubt than the first of `most`, or more larger sets than the second.
+    /// Looks at the sets that have one of the sites that are `changed`, at first all of them. False where more sets are in doubt than `most`.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn look(&mut self, bodies: &Bodies<'_>, changed: &[bool], most: [usize; 2], budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn look(&mut self, bodies: &Bodies<'_>, changed: &[bool], most: usize, budget: &Budget) -> Result<bool, Stopped> {
         let stale = bodies.near.around(changed);
         self.forget(bodies, changed, &stale, budget)?;
         let sites: Vec<u32> = (0..bodies.polytopes.count()).filter(|&site| stale[site as usize]).collect();
@@ -77,7 +77,7 @@ impl Sets {
                 self.meeting[first as usize] = after;
                 self.doubts.extend(found);
             }
-            if self.doubts.exceed(most) {
+            if self.doubts.open.len() > most {
                 return Ok(false);
             }
         }
@@ -89,7 +89,7 @@ impl Sets {
             };
             let found: Vec<Doubts> = some.par_iter().map(larger).collect::<Result<_, Stopped>>()?;
             found.into_iter().for_each(|found| self.doubts.extend(found));
-            if self.doubts.exceed(most) {
+            if self.doubts.open.len() > most {
                 return Ok(false);
             }
         }
@@ -113,12 +113,6 @@ impl Sets {
 }
 
 impl Doubts {
-    /// Whether more pairs are open, or more larger sets, than these numbers say.
-    fn exceed(&self, most: [usize; 2]) -> bool {
-        let pairs = self.open.iter().filter(|doubt| doubt.sites.len() == 2).count();
-        pairs > most[0] || self.open.len() - pairs > most[1]
-    }
-
     fn extend(&mut self, other: Self) {
         self.open.extend(other.open);
         self.hidden.extend(other.hidden);

@@ -4,11 +4,11 @@
 //! to intervals. Their ends are corners of polytopes, places where an edge pierces a facet, and places where facets of three polytopes meet: each is named by what meets there, whichever
 //! line it is found on, and ends with one name are one vertex. So the union's boundary is closed if every comparison of heights has one outcome only, which is checked by what comes out: see `facets`.
 
-use crate::dilation::convex::Convex;
 use super::figure::Figure;
 use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
 use crate::attractor::cell::{Point, between, cross, dot, subtract};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex;
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,6 +1,7 @@
+use super::Arrangement;
 use super::bodies::Common;
+use super::engine::Engine;
 use super::polytopes::height;
-use super::{Arrangement, Engine};
 use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
 use crate::dilation::convex::Convex;
@@ -594,7 +595,7 @@ fn hidden_places_are_hidden() {
         let size = 1.0 + 0.5 * f64::from(round);
         let segments = sticks(&mut random, 24, size, 1.0);
         with_arrangement(&wires(&segments), 1.0, 0.1, |arrangement| {
-            let mut engine = arrangement.engine(0, &[]);
+            let mut engine = Engine::new(arrangement, 0, &[]);
             assert!(engine.begin(&Budget::default()).unwrap());
             let bodies = engine.bodies();
             let count = segments.len() as u32;
@@ -644,7 +645,7 @@ fn short_sides_turn_no_boxes() {
             let faces = [0, 5].into_iter().flat_map(|first| (1..4).map(move |k| vec![first, first + k, first + k + 1])).collect();
             let shape = lowered(&vertices, faces);
             with_arrangement(&shape, 1.0, 0.1, |arrangement| {
-                let mut engine = arrangement.engine(0, &[]);
+                let mut engine = Engine::new(arrangement, 0, &[]);
                 assert!(engine.begin(&Budget::default()).unwrap());
                 let bodies = engine.bodies();
                 for body in 0..arrangement.sites.list.len() as u32 {
@@ -675,7 +676,7 @@ fn places_hidden_in_solids_are_hidden() {
         let shape = lowered_as(Interior::Solid, &vertices, faces).unwrap();
         with_arrangement(&shape, 1.0, 0.05, |arrangement| {
             let solids: Vec<Inside<'_>> = arrangement.solids.iter().map(Inside::new).collect();
-            let mut engine = arrangement.engine(0, &solids);
+            let mut engine = Engine::new(arrangement, 0, &solids);
             assert!(engine.begin(&Budget::default()).unwrap());
             let (bodies, count) = (engine.bodies(), arrangement.sites.list.len() as u32);
             for (first, second) in (0..count).flat_map(|first| (0..first).map(move |second| (second, first))) {

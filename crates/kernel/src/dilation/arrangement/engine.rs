@@ -1,0 +1,225 @@
+//! One trial of an arrangement: polytopes that are changed until the topology of their union is that of the dilation, and its boundary.
+
+use super::bodies::{Bodies, Common};
+use super::figure::Figure;
+use super::form::{Form, Kind};
+use super::nerve::{Doubt, Sets};
+use super::pieces::{self, Lists};
+use super::polytopes::{self, Cut, Plane, Polytope, Polytopes, Shell};
+use super::{Arranged, Arrangement};
+use super::{facets, hull};
+use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex;
+use crate::dilation::plan::Setting;
+use crate::dilation::surface::BlockSurface;
+use crate::solid::Inside;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+
+/// Doubts that polytopes may leave, as a share of the sites, and in any case. Nearly all of them end in the next rounds; with more, the lattice costs less.
+const MOST_DOUBTS: f64 = 4.0;
+const FEW_DOUBTS: f64 = 16.0;
+/// So many doubts take as long as the lattice at one of its cubes along a polygon.
+const DOUBTS_PER_CUBE: f64 = 0.5;
+/// How much narrower the band of finer polytopes is, level by level.
+const FINER: f64 = 3.0;
+/// Levels at most.
+const LEVELS: u32 = 5;
+/// What is tried where rounding leaves a boundary open.
+pub(super) const TRIALS: u64 = 3;
+
+/// What a site's polytope is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct State {
+    level: u32,
+    /// Whether it is around the dilation by r.
+    is_around: bool,
+}
+
+impl State {
+    /// Below 256.
+    fn number(self) -> u64 {
+        u64::from(2 * self.level) + u64::from(self.is_around)
+    }
+}
+
+impl Setting {
+    /// The band of a site's polytope.
+    pub(super) fn shell(&self, figure: &Figure, state: State) -> Shell {
+        let [inner, radius, outer] = [self.least, self.reach, self.outer].map(|distance| figure.in_space(distance));
+        let share = FINER.powi(-(state.level as i32));
+        let inner = if state.is_around { radius } else { radius - share * (radius - inner) };
+        Shell { inner: inner + self.slack, outer: radius + share * (outer - radius) - self.slack }
+    }
+
+    /// The form of polytopes for a state; none where none is fine enough.
+    fn form(&self, sites: &[Figure], kind: Kind, state: State) -> Option<Form> {
+        let reaches = sites.iter().map(|site| self.shell(site, state).reach());
+        Form::within(reaches.fold(f64::INFINITY, f64::min), kind)
+    }
+}
+
+/// The forms of an arrangement by their states, and where there is none: to look for one takes as long as hundreds of polytopes, so it is done once.
+#[derive(Default)]
+pub(super) struct Forms([[[OnceLock<Option<Form>>; 2]; 2]; LEVELS as usize]);
+
+impl Forms {
+    /// The form for a state below [`LEVELS`].
+    pub(super) fn of(&self, setting: &Setting, sites: &[Figure], kind: Kind, state: State) -> Option<&Form> {
+        let place = &self.0[state.level as usize][usize::from(state.is_around)][kind as usize];
+        place.get_or_init(|| setting.form(sites, kind, state)).as_ref()
+    }
+}
+
+/// What a trial came to.
+pub(super) enum Run {
+    Done(Box<Arranged>),
+    /// The boundary is not closed.
+    Open,
+    /// The topology is in doubt at too many places.
+    Doubtful,
+}
+
+pub(super) struct Engine<'a> {
+    setting: &'a Setting,
+    pub(super) sites: &'a [Figure],
+    beyond: &'a [Box<[Option<f64>]>],
+    near: &'a Lists,
+    forms: &'a Forms,
+    solids: &'a [Inside<'a>],
+    cubes: f64,
+    pub(super) polytopes: Polytopes,
+    states: Vec<State>,
+    /// The sets of sites whose dilations are parted by planes, and the planes that every site's is below.
+    parted: BTreeSet<Vec<u32>>,
+    planes: Vec<Vec<Plane>>,
+    trial: u64,
+}
+
+impl<'a> Engine<'a> {
+    pub(super) fn new(arrangement: &'a Arrangement<'_>, trial: u64, solids: &'a [Inside<'a>]) -> Self {
+        let Arrangement { setting, sites, beyond, near, forms, cubes, .. } = arrangement;
+        let sites = &sites.list;
+        Self {
+            setting,
+            sites,
+            beyond,
+            near,
+            forms,
+            solids,
+            cubes: *cubes,
+            polytopes: Polytopes::default(),
+            states: vec![State::default(); sites.len()],
+            parted: BTreeSet::new(),
+            planes: vec![Vec::new(); sites.len()],
+            trial,
+        }
+    }
+
+    pub(super) fn run(&mut self, budget: &Budget) -> Result<Run, Stopped> {
+        if !self.begin(budget)? {
+            return Ok(Run::Open);
+        }
+        let (mut changed, mut sets) = (vec![true; self.sites.len()], Sets::default());
+        let most = (MOST_DOUBTS * self.sites.len() as f64).max(DOUBTS_PER_CUBE * self.cubes).max(FEW_DOUBTS) as usize;
+        while changed.contains(&true) {
+            if !sets.look(&self.bodies(), &changed, most, budget)? {
+                return Ok(Run::Doubtful);
+            }
+            changed = self.refine(sets.doubts(), budget)?;
+        }
+        // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
+        if !self.solids.is_empty() && !sets.doubts().is_empty() {
+            return Ok(Run::Doubtful);
+        }
+        let pieces = pieces::find(&self.polytopes, self.near, budget)?;
+        let Some(boundary) = facets::boundary(&self.polytopes, &pieces, budget)? else { return Ok(Run::Open) };
+        let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
+        Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().len() as u64 })))
+    }
+
+    pub(super) fn bodies(&self) -> Bodies<'_> {
+        Bodies { setting: self.setting, figures: self.sites, polytopes: &self.polytopes, near: self.near, solids: self.solids }
+    }
+
+    /// Makes the first polytopes; whether there are such.
+    pub(super) fn begin(&mut self, budget: &Budget) -> Result<bool, Stopped> {
+        let first = |index: usize| {
+            budget.cancel.check()?;
+            Ok(self.polytope(index, State::default()))
+        };
+        let all: Option<Vec<Polytope>> = (0..self.sites.len()).into_par_iter().map(first).collect::<Result<_, Stopped>>()?;
+        let is_made = all.is_some();
+        self.polytopes.all = all.unwrap_or_default();
+        Ok(is_made)
+    }
+
+    /// A site's polytope in a state, below the planes that part it from others; none where no form is fine enough, or no shift fits.
+    fn polytope(&self, index: usize, state: State) -> Option<Polytope> {
+        let noise = hull::NOISE * self.setting.outer;
+        let whole = self.whole(index, state)?;
+        Some(self.planes[index].iter().fold(whole, |polytope, plane| polytope.below(plane, noise).unwrap_or(polytope)))
+    }
+
+    /// The same without these planes.
+    fn whole(&self, index: usize, state: State) -> Option<Polytope> {
+        let (figure, beyond) = (&self.sites[index], &self.beyond[index]);
+        let shell = self.setting.shell(figure, state);
+        let seed = (self.trial << 8 | state.number()) << 32 | index as u64;
+        if figure.polygon().is_some() {
+            // Planes may meet in a point by chance, not again and again.
+            return (0..TRIALS).find_map(|trial| Polytope::around(figure, beyond, shell, seed ^ trial << 48));
+        }
+        let most = self.setting.shell(figure, State::default()).outer;
+        let cut = Cut { beyond: [beyond[0], beyond[1]], most };
+        // Where a cut far out leaves a form no room, a finer one may have some.
+        let of_level = |level: u32| self.forms.of(self.setting, self.sites, polytopes::kind(figure), State { level, ..state });
+        (state.level..LEVELS).find_map(|level| Polytope::new(figure, of_level(level)?, shell, cut, seed))
+    }
+
+    /// Changes polytopes of sites in doubt, and returns which ones are others now. Where dilations have no common point, planes between them part the polytopes, too; where they have one, polytopes are around the dilations; and where that was done,
+    /// or it is not known, they become finer as far as there are forms.
+    fn refine(&mut self, doubts: &[Doubt], budget: &Budget) -> Result<Vec<bool>, Stopped> {
+        let mut is_cut = vec![false; self.sites.len()];
+        let mut next = self.states.clone();
+        for Doubt { sites, wanted } in doubts {
+            budget.cancel.check()?;
+            let is_new = match wanted {
+                Common::None if self.parted.insert(sites.clone()) => {
+                    let known: Vec<Plane> = sites.iter().flat_map(|&site| &self.planes[site as usize]).copied().collect();
+                    let planes = self.bodies().parting(sites, &known, self.parted.len() as u64);
+                    for &(site, plane) in planes.iter().flatten() {
+                        self.planes[site as usize].push(plane);
+                        is_cut[site as usize] = true;
+                    }
+                    planes.is_some()
+                }
+                Common::Some => {
+                    sites.iter().for_each(|&site| next[site as usize].is_around = true);
+                    sites.iter().any(|&site| !self.states[site as usize].is_around)
+                }
+                _ => false,
+            };
+            if !is_new {
+                sites.iter().for_each(|&site| next[site as usize].level = self.states[site as usize].level + 1);
+            }
+        }
+        let made = |index: usize| {
+            budget.cancel.check()?;
+            let (before, state) = (self.states[index], next[index]);
+            let made = |state: State| self.polytope(index, state).map(|polytope| (state, polytope));
+            let other = if state != before && state.level < LEVELS { made(state) } else { None };
+            Ok(if is_cut[index] { other.or_else(|| made(before)) } else { other })
+        };
+        let made: Vec<Option<(State, Polytope)>> = (0..next.len()).into_par_iter().map(made).collect::<Result<_, Stopped>>()?;
+        let changed = made.iter().map(Option::is_some).collect();
+        for (index, made) in made.into_iter().enumerate() {
+            if let Some((state, polytope)) = made {
+                self.states[index] = state;
+                self.polytopes.all[index] = polytope;
+            }
+        }
+        Ok(changed)
+    }
+}
