@@ -453,4 +453,24 @@ mod tests {
         }
         assert!(found > 300, "{found}");
     }
+
+    /// Where a convex function is lowest, and how low: distances from a point, and the farthest of some.
+    #[test]
+    fn the_lowest_place_is_found() {
+        let mut random = Random(23);
+        for _ in 0..200 {
+            let mut vector = || -> Point { std::array::from_fn(|_| 2.0 * random.share() - 1.0) };
+            let (a, b) = (vector(), vector());
+            let of = |x: &Point, from: &Point| {
+                let way = subtract(x, from);
+                let length = dot(&way, &way).sqrt();
+                (length, if length > 0.0 { way.map(|part| part / length) } else { way })
+            };
+            let farthest = |x: &Point| if of(x, &a).0 > of(x, &b).0 { of(x, &a) } else { of(x, &b) };
+            let (x, value) = lowest([[-1.5; 3], [1.5; 3]], farthest).expect("the box is not empty");
+            let half = 0.5 * of(&a, &b).0;
+            assert!((value - half).abs() < 1e-9 && of(&x, &between(&a, &b, 0.5)).0 < 1e-6, "{value} {half}");
+        }
+        assert!(lowest([[1.0; 3], [0.0; 3]], |_| (0.0, [0.0; 3])).is_none());
+    }
 }

@@ -392,4 +392,22 @@ mod tests {
             }
         }
     }
+
+    /// Also where others end, or cross; not where a segment turns, or goes back.
+    #[test]
+    fn segments_that_go_straight_on_are_one() {
+        let at = |x: f64, y: f64| -> Point { [0.1 + 0.3 * x - 0.2 * y, 0.7 - 0.1 * x + 0.5 * y, 0.2 * x] };
+        let segment = |from: Point, to: Point| Figure::from(Weighted { site: Site::Segment([from, to]), deficit: 0.0 });
+        let count = |figures: Vec<Figure>| joined(figures, 1e-12, 1e-3, &Budget::default()).unwrap().len();
+        let line = || (0..20).map(|k| segment(at(f64::from(k), 0.0), at(f64::from(k + 1), 0.0)));
+        assert_eq!(count(line().collect()), 1);
+        let across = (0..20).map(|k| segment(at(10.0, f64::from(k) - 10.0), at(10.0, f64::from(k) - 9.0)));
+        assert_eq!(count(line().chain(across).collect()), 2);
+        let ends = [[3.0, 1.0], [5.0, 2.0]].map(|[x, y]| segment(at(x, y), at(x, 0.0)));
+        assert_eq!(count(line().chain(ends).collect()), 3);
+        let other = Figure { deficit: 0.1, ..segment(at(20.0, 0.0), at(21.0, 0.0)) };
+        assert_eq!(count(line().chain([other]).collect()), 2);
+        assert_eq!(count(vec![segment(at(0.0, 0.0), at(1.0, 0.0)), segment(at(1.0, 0.0), at(2.0, 1e-6))]), 2);
+        assert_eq!(count(vec![segment(at(0.0, 0.0), at(1.0, 0.0)), segment(at(1.0, 0.0), at(0.5, 0.0))]), 2);
+    }
 }

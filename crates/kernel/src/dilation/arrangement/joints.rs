@@ -184,13 +184,14 @@ mod tests {
     #[test]
     fn what_is_cut_off_is_in_others() {
         let mut random = Random(11);
-        let (shell, mut one_keeps, mut none_does) = (Shell { inner: 0.9, outer: 1.1 }, 0, 0);
+        let (shell, mut one_keeps, mut none_does, mut one_goes_on) = (Shell { inner: 0.9, outer: 1.1 }, 0, 0, 0);
         let covering = Form::within(shell.reach(), Kind::Rod).expect("coarse enough").covering;
         for round in 0..400 {
             let mut unit = || (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
             let mut vector = || -> Point { std::array::from_fn(|_| unit()) };
             let (count, straight) = (2 + round % 5, vector());
-            let sites: Vec<Figure> = (0..count)
+            let through = vector();
+            let mut sites: Vec<Figure> = (0..count)
                 .map(|k| {
                     let bend = [1.0, 0.3, 0.05][round % 3];
                     let way = match round % 4 {
@@ -205,6 +206,11 @@ mod tests {
                     Weighted { site: if k == 5 { Site::Point(centre) } else { Site::Segment([end, centre]) }, deficit }.into()
                 })
                 .collect();
+            // One that goes on through the centre, as large as any or smaller.
+            if round % 3 == 1 {
+                let ends = [1.7, -2.3].map(|far| std::array::from_fn(|axis| [5.0, -7.0, 2.0][axis] + far * through[axis]));
+                sites.push(Weighted { site: Site::Segment(ends), deficit: if round % 2 == 0 { 0.0 } else { 0.1 } }.into());
+            }
             let cuts = cuts(&sites, 1e-12, [covering.reach, covering.girth], |site| Shell {
                 inner: site.in_space(shell.inner),
                 outer: site.in_space(shell.outer),
@@ -215,7 +221,9 @@ mod tests {
             // One of six is a point.
             assert!(cut + 1 + count / 6 >= count, "{round}");
             one_keeps += usize::from(cut < count);
-            none_does += usize::from(cut == count);
+            let is_whole = sites.get(count).is_some_and(|through| sites[..count].iter().all(|site| site.deficit >= through.deficit));
+            one_goes_on += usize::from(is_whole && cut + count / 6 == count);
+            none_does += usize::from(cut == count && sites.len() == count);
             for _ in 0..300 {
                 let x: Point = std::array::from_fn(|axis| centre[axis] + 1.5 * unit());
                 let nearest = sites.iter().map(|site| site.distance_squared(&x)).fold(f64::INFINITY, f64::min).sqrt();
@@ -231,6 +239,6 @@ mod tests {
                 assert!(nearest > 1.1 || sites.iter().zip(&cuts).any(holds), "{round}: {x:?}");
             }
         }
-        assert!(one_keeps > 100 && none_does > 100, "{one_keeps} {none_does}");
+        assert!(one_keeps > 100 && none_does > 60 && one_goes_on > 40, "{one_keeps} {none_does} {one_goes_on}");
     }
 }

@@ -128,6 +128,8 @@ impl Structure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attractor::cell::{between, unit};
+    use crate::split_mix::Random;
 
     #[test]
     fn only_closed_facets_around_a_ball_have_a_structure() {
@@ -151,5 +153,54 @@ mod tests {
         let ring = |k: u16| (0..4).map(move |side| [4 * k, 4 * ((k + 1) % 4)].map(|first| [first + side, first + (side + 1) % 4]));
         let sides: Vec<Vec<u16>> = (0..4).flat_map(ring).map(|[[a, b], [c, d]]| vec![a, b, d, c]).collect();
         assert!(Structure::closed(&sides, 16).is_none());
+    }
+
+    /// Cubes that are cut again and again: corners, edges and facets close, edges turn as they should, and what is left is what lies below all planes.
+    #[test]
+    fn what_is_left_below_planes_is_a_polytope() {
+        let corner = |code: usize| -> Point { std::array::from_fn(|axis| if code >> axis & 1 == 1 { 1.0 } else { -1.0 }) };
+        let cube: Vec<Vec<u16>> =
+            vec![vec![0, 4, 6, 2], vec![1, 3, 7, 5], vec![0, 1, 5, 4], vec![2, 6, 7, 3], vec![0, 2, 3, 1], vec![4, 5, 7, 6]];
+        let mut random = Random(41);
+        let (mut cuts, mut gone) = (0, 0);
+        for _ in 0..60 {
+            let mut structure = Structure::closed(&cube, 8).expect("a cube is closed");
+            let mut corners: Vec<Point> = (0..8).map(corner).collect();
+            let plane = |facet: usize| -> Plane {
+                let side = if facet % 2 == 1 { 1.0 } else { -1.0 };
+                std::array::from_fn(|k| if k == 3 { 1.0 } else { side * f64::from(u8::from(k == facet / 2)) })
+            };
+            let mut planes: Vec<Plane> = (0..6).map(plane).collect();
+            for _ in 0..12 {
+                let up: Point = unit(&std::array::from_fn(|_| 2.0 * random.share() - 1.0));
+                let plane = [up[0], up[1], up[2], 0.6 + 0.6 * random.share()];
+                planes.push(plane);
+                let Some(CutOff { structure: left, facets, corners: kept, made }) = structure.cut(&plane, &corners, 1e-9) else {
+                    assert!(corners.iter().all(|corner| height(&plane, corner) < 0.0));
+                    planes.pop();
+                    continue;
+                };
+                (cuts, gone) = (cuts + 1, gone + structure.facets + 1 - left.facets);
+                let new = made.iter().map(|&(ends, share)| between(&corners[usize::from(ends[0])], &corners[usize::from(ends[1])], share));
+                corners = kept.iter().map(|&corner| corners[corner]).chain(new).collect();
+                planes = facets.iter().map(|&facet| planes[usize::from(facet)]).chain([plane]).collect();
+                structure = left;
+                assert_eq!((structure.facets, structure.corners), (planes.len(), corners.len()));
+                assert!(structure.is_convex(&planes, &corners, 0.0));
+                for Edge { corners: ends, facets } in &structure.edges {
+                    let along = subtract(&corners[usize::from(ends[1])], &corners[usize::from(ends[0])]);
+                    let [left, right] = facets.map(|facet| super::normal(&planes[usize::from(facet)]));
+                    assert!(dot(&cross(&left, &along), &right) < 0.0);
+                    let on = |corner: u16, facet: u16| height(&planes[usize::from(facet)], &corners[usize::from(corner)]).abs() < 1e-12;
+                    assert!(ends.iter().all(|&corner| facets.iter().all(|&facet| on(corner, facet))));
+                }
+            }
+        }
+        assert!(cuts > 300 && gone > 20, "{cuts} {gone}");
+        // Nothing is left, or all, or a corner is on the plane.
+        let (structure, corners) = (Structure::closed(&cube, 8).expect("a cube is closed"), (0..8).map(corner).collect::<Vec<_>>());
+        for offset in [-2.0, 2.0, 1.0] {
+            assert!(structure.cut(&[1.0, 0.0, 0.0, offset], &corners, 1e-9).is_none());
+        }
     }
 }

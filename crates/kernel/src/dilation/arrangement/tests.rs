@@ -201,6 +201,36 @@ fn unions_keep_their_bounds_and_agree_with_the_lattice() {
 }
 
 /// Handles of a net of wires: edges less vertices, and one.
+/// Each twig grows from the end of an earlier one, straight on or not, or from its middle; many nearly touch, in twos, threes and fours.
+#[test]
+fn trees_are_arranged_without_a_doubt() {
+    let mut random = Random(19);
+    let mut compared = 0;
+    for round in 0..6 {
+        let mut segments: Vec<[DVec3; 2]> = vec![[DVec3::splat(8.0), DVec3::new(8.0, 8.0, 11.0)]];
+        while segments.len() < 90 {
+            let [from, to] = segments[(random.next() % segments.len() as u64) as usize];
+            let way = match random.next() % 3 {
+                0 => (to - from).normalize() * 2.0,
+                _ => 3.0 * (place(&mut random, 2.0) - DVec3::ONE),
+            };
+            let at = if random.next().is_multiple_of(3) { from.midpoint(to) } else { to };
+            segments.push([at, at + way]);
+        }
+        let shape = wires(&segments);
+        let (radius, tolerance) = ([0.35, 0.5][round % 2], [0.05, 0.02][round / 2 % 2]);
+        let dilation = arranged(&shape, radius, tolerance);
+        assert!(dilation.topology_exact && dilation.crossings == 0, "{round}: {} uncertain", dilation.uncertain);
+        keeps_its_bounds(&dilation, &segments, radius, 16.0, &mut random);
+        let other = on_lattice(&shape, radius, tolerance);
+        if other.topology_exact {
+            compared += 1;
+            assert_eq!(topology(&dilation), topology(&other), "{round}");
+        }
+    }
+    assert!(compared > 4, "{compared}");
+}
+
 #[test]
 fn nets_have_as_many_handles_as_cycles() {
     let (sides, mut segments) = (4, Vec::new());
