@@ -10,11 +10,11 @@ use std::hash::BuildHasherDefault;
 
 /// A lower bound of the distance of a triangle from a site is raised by so many steps of alternating projection.
 const STEPS: usize = 6;
-/// SiteSearch that tell coverage.
+/// Sites that tell coverage.
 const MOST_COVERING: usize = 64;
 /// Tetrahedra that a swept one is cut into at most.
 const MOST_PIECES: usize = 16;
-/// SiteSearch that are tried to cut a tetrahedron at a corner: for the three others, and for the rest.
+/// Sites that are tried to cut a tetrahedron at a corner: for the three others, and for the rest.
 const MOST_FIRST: usize = 1;
 const MOST_SECOND: usize = 2;
 /// Views that are kept at most: where sites are dense a vertex has hundreds, which are found again when they are asked for again.
@@ -69,7 +69,7 @@ impl Direction {
     }
 }
 
-/// SiteSearch near places, from lists of nodes that are refined from coarse to fine places.
+/// Sites near places, from lists of nodes that are refined from coarse to fine places.
 #[derive(Debug, Default)]
 pub(super) struct Places {
     lists: HashMap<u128, Vec<NodeId>, BuildHasherDefault<NameHasher>>,
@@ -175,14 +175,14 @@ pub(super) struct Nearby {
     square: f64,
     first_square: f64,
     reach: f64,
-    /// SiteSearch with a bit, and what bit a site has in the star of that number.
+    /// Sites with a bit, and what bit a site has in the star of that number.
     sites: Vec<SiteId>,
     bits: Vec<(u32, u32)>,
     star: u32,
     /// Corners of the star with the sites within reach.
     marked: Vec<Marked>,
     pieces: Vec<[Marked; 4]>,
-    /// SiteSearch that a triangle is clear of.
+    /// Sites that a triangle is clear of.
     cleared: Vec<SiteId>,
     /// Directions that showed it.
     directions: Vec<Direction>,
@@ -476,7 +476,7 @@ impl Nearby {
                 }
                 let site = search.site(view.site);
                 if directions.is_empty() {
-                    // SiteSearch with a common closest point are parted by one plane.
+                    // Sites with a common closest point are parted by one plane.
                     let nearest = corners.iter().filter_map(|&corner| views(corner).first());
                     let sum = nearest.fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.normal[axis]));
                     let length = dot(&sum, &sum).sqrt().max(f64::MIN_POSITIVE);

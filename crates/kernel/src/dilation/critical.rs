@@ -18,7 +18,6 @@
 
 use super::affine::{Affine, range};
 use super::block::{Frame, Nearby};
-
 use super::convex::{Convex, SiteSearch};
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;

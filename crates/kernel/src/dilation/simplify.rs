@@ -61,7 +61,7 @@ const SLIVER_MOVE: f64 = 64.0;
 /// Vertices are lifted by this share of the band at least, and no normal turns by more than this cosine.
 const LEAST_LIFT: f64 = 0.05;
 const LEAST_TURN: f64 = 0.7;
-/// SiteSearch are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
+/// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
 const FIRST_LOOK: f64 = 0.6;
 
 /// Working memory of a thread.

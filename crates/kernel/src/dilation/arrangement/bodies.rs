@@ -106,31 +106,32 @@ impl Bodies<'_> {
         Verdict { common: if is_common { Common::Some } else { Common::Unknown }, is_doubtful: true, hub: None }
     }
 
-    /// For dilations of a set that have no common point: planes that each of some bodies' dilations is below, while nothing is below all of these planes, as far as one such place is found from which the farthest body is nearest. No more are needed where
-    /// that is so of those that are `known`, as several sets often have no common point for the same reason; `None` where rounding leaves none.
+    /// For dilations of a set that have no common point: planes that each of some bodies' dilations is below, while nothing is below all of these planes. None where that is so of those that are `known`, or where rounding leaves none.
     ///
-    /// With c_i the points of the figures closest to x, and a mean of the vectors x - c_i / |x - c_i| that is 0, the mean of their values at y is that at x, wherever y is: not all are less.
-    pub(super) fn parting(&self, set: &[u32], known: &[Plane], seed: u64) -> Option<Vec<(u32, Plane)>> {
+    /// Let x be where the farthest body is nearest, and c_i the points closest to it of the figures that are as far. A mean of the unit vectors along x - c_i is 0, so that of how far y is beyond the planes across these is that at x, wherever y is: not all are less.
+    pub(super) fn parting(&self, set: &[u32], known: &[Plane], seed: u64) -> Vec<(u32, Plane)> {
         let Setting { reach, outer, slack, .. } = *self.setting;
         let within = common_box(&AXES, set.iter().map(|&body| self.around(body, outer + slack)));
-        if common_point(within, |x| highest(x, known.iter(), slack)) == Common::None {
-            return Some(Vec::new());
+        let part = |planes: &[Plane]| common_point(within, |x| highest(x, planes.iter(), slack)) == Common::None;
+        if part(known) {
+            return Vec::new();
         }
         let beyond = |x: &Point| set.iter().map(|&body| self.above(Kind::Dilation, body, x)).reduce(|a, b| if b.0 > a.0 { b } else { a });
-        let (x, gap) = lowest(within, |x| beyond(x).unwrap_or((0.0, [0.0; 3])))?;
-        if gap <= LEAST_GAP * slack {
-            return None;
-        }
-        let plane = |&body: &u32| {
+        let lowest = lowest(within, |x| beyond(x).unwrap_or((0.0, [0.0; 3])));
+        let Some((x, gap)) = lowest.filter(|&(_, gap)| gap > LEAST_GAP * slack) else { return Vec::new() };
+        let plane = |(place, &body): (usize, &u32)| {
             let figure = &self.figures[body as usize];
             let from = subtract(&x, &figure.closest(&x));
-            let away = unit(&from);
+            let (away, radius) = (unit(&from), figure.in_space(reach));
             // Bodies may have their closest points in common.
-            let share = PARTING[0] + PARTING[1] * polytopes::share(seed, u64::from(body) % 1024);
-            let offset = figure.in_space(reach) + share * gap + figure.highest(&away);
-            (dot(&from, &from) > 0.0).then_some((body, [away[0], away[1], away[2], offset]))
+            let share = PARTING[0] + PARTING[1] * polytopes::share(seed, place as u64);
+            let offset = radius + share * gap + figure.highest(&away);
+            let is_far = dot(&from, &from).sqrt() > radius + 0.5 * gap;
+            is_far.then_some((body, [away[0], away[1], away[2], offset]))
         };
-        Some(set.iter().filter_map(plane).collect())
+        let planes: Vec<(u32, Plane)> = set.iter().enumerate().filter_map(plane).collect();
+        let all: Vec<Plane> = planes.iter().map(|&(_, plane)| plane).chain(self.cuts(set).copied()).collect();
+        if part(&all) { planes } else { Vec::new() }
     }
 
     /// The farthest figure of a set, and how far it is, the deficit included.
@@ -141,7 +142,12 @@ impl Bodies<'_> {
 
     /// The highest plane that dilations of a set are cut by, if it is higher than something.
     fn cut_off(&self, set: &[u32], x: &Point, than: f64) -> Option<(f64, Point)> {
-        highest(x, set.iter().flat_map(|&body| self.polytopes.of(body).cuts.iter()), than)
+        highest(x, self.cuts(set), than)
+    }
+
+    /// The planes that dilations of a set are cut by.
+    fn cuts(&self, set: &[u32]) -> impl Iterator<Item = &Plane> {
+        set.iter().flat_map(|&body| self.polytopes.of(body).cuts.iter())
     }
 
     /// A place in the dilations of a set by the band's inner end, or how far the farthest site is from where none was met. Steps towards the farthest site end where the farthest is nearest; where that is cut off, the way

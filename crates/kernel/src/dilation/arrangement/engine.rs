@@ -22,6 +22,8 @@ const MOST_DOUBTS: f64 = 4.0;
 const FEW_DOUBTS: f64 = 16.0;
 /// So many doubts take as long as the lattice at one of its cubes along a polygon.
 const DOUBTS_PER_CUBE: f64 = 0.5;
+/// Planes that part a site's polytope from others, on average over a set.
+const MOST_PLANES: usize = 64;
 /// How much narrower the band of finer polytopes is, level by level.
 const FINER: f64 = 3.0;
 /// Levels at most.
@@ -188,12 +190,15 @@ impl<'a> Engine<'a> {
             let is_new = match wanted {
                 Common::None if self.parted.insert(sites.clone()) => {
                     let known: Vec<Plane> = sites.iter().flat_map(|&site| &self.planes[site as usize]).copied().collect();
-                    let planes = self.bodies().parting(sites, &known, self.parted.len() as u64);
-                    for &(site, plane) in planes.iter().flatten() {
+                    let has_room = known.len() < MOST_PLANES * sites.len();
+                    let seed = self.trial << 32 | self.parted.len() as u64;
+                    let planes = if has_room { self.bodies().parting(sites, &known, seed) } else { Vec::new() };
+                    for (site, plane) in planes {
                         self.planes[site as usize].push(plane);
                         is_cut[site as usize] = true;
                     }
-                    planes.is_some()
+                    // Several sets often have no common point for the same reason.
+                    sites.iter().any(|&site| is_cut[site as usize])
                 }
                 Common::Some => {
                     sites.iter().for_each(|&site| next[site as usize].is_around = true);
@@ -209,8 +214,10 @@ impl<'a> Engine<'a> {
             budget.cancel.check()?;
             let (before, state) = (self.states[index], next[index]);
             let made = |state: State| self.polytope(index, state).map(|polytope| (state, polytope));
-            let other = if state != before && state.level < LEVELS { made(state) } else { None };
-            Ok(if is_cut[index] { other.or_else(|| made(before)) } else { other })
+            // Where both cannot be had, one of them; planes may cut what is as it was.
+            let all = [state, State { level: before.level, ..state }, State { is_around: before.is_around, ..state }, before];
+            let mut wanted = all.into_iter().filter(|&state| state.level < LEVELS && (state != before || is_cut[index]));
+            Ok(wanted.find_map(made))
         };
         let made: Vec<Option<(State, Polytope)>> = (0..next.len()).into_par_iter().map(made).collect::<Result<_, Stopped>>()?;
         let changed = made.iter().map(Option::is_some).collect();

@@ -17,7 +17,7 @@ const MOST_CORNERS: usize = 256;
 const LEAST_TURN: f64 = 1e-6;
 /// Rounds of joining, each of which may double a polygon.
 const ROUNDS: usize = 24;
-/// Polygons with a common side that are looked at: at any number of them most lie in planes of their own.
+/// Polygons with a common side, or segments with a common end, that are looked at: of any number of them most lie in planes of their own, or on lines.
 const MOST_AT_A_SIDE: usize = 8;
 
 /// A site, or several that are one convex set.

@@ -14,6 +14,7 @@
 use super::figure::{Figure, Outline, order};
 use super::polytopes::{Plane, Shell, ordered};
 use crate::attractor::cell::{Point, between, distance_squared, dot, subtract, unit};
+use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::split_mix;
@@ -36,7 +37,16 @@ struct End {
 }
 
 /// How far beyond its ends, in their order, every site may be cut; none where it is not. What is no farther than `flatness` from a segment is on it. Polytopes that are cut at both ends are around the inner ball where their corners are `girth` times as far, others where they are `reach` times as far.
-pub(super) fn cuts(sites: &[Figure], flatness: f64, [reach, girth]: [f64; 2], shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<f64>; 2]> {
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn cuts(
+    sites: &[Figure],
+    flatness: f64,
+    [reach, girth]: [f64; 2],
+    shell: impl Fn(&Figure) -> Shell,
+    budget: &Budget,
+) -> Result<Vec<[Option<f64>; 2]>, Stopped> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
     for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
         // Zeros have two signs.
@@ -49,7 +59,7 @@ pub(super) fn cuts(sites: &[Figure], flatness: f64, [reach, girth]: [f64; 2], sh
     }
     let sort = |ends: &mut Vec<End>| ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
     sort(&mut ends);
-    let through = through(sites, flatness, ends.chunk_by(|a, b| a.at == b.at), &shell);
+    let through = through(sites, flatness, ends.chunk_by(|a, b| a.at == b.at), &shell, budget)?;
     ends.extend(through);
     sort(&mut ends);
     let joints = || ends.chunk_by(|a, b| a.at == b.at).filter(|joint| joint.len() > 1);
@@ -91,39 +101,43 @@ pub(super) fn cuts(sites: &[Figure], flatness: f64, [reach, girth]: [f64; 2], sh
         let most = farthest(shell(site), reach);
         cut.iter_mut().for_each(|cut| *cut = cut.filter(|beyond| *beyond < most));
     }
-    cuts
+    Ok(cuts)
 }
 
-/// The places between the ends of segments, and clear of these, where others end that have no larger a radius.
-fn through<'a>(sites: &[Figure], flatness: f64, joints: impl Iterator<Item = &'a [End]>, shell: impl Fn(&Figure) -> Shell) -> Vec<End> {
+/// The places between the ends of segments, and clear of these, where others end that have no larger a radius: one segment for each place.
+fn through<'a>(
+    sites: &[Figure],
+    flatness: f64,
+    joints: impl Iterator<Item = &'a [End]>,
+    shell: impl Fn(&Figure) -> Shell,
+    budget: &Budget,
+) -> Result<Vec<End>, Stopped> {
     let mut tree = BoxTree::default();
-    let boxes = |site: u32| match &sites[site as usize].outline {
-        Outline::Segment(ends) => Some(Box32::of(&around(ends, flatness))),
-        _ => None,
+    let box_of = |site: u32| {
+        let figure = &sites[site as usize];
+        let [low, high] = figure.bounds();
+        let is_segment = matches!(figure.outline, Outline::Segment(_));
+        is_segment.then(|| Box32::of(&[low.map(|x| x - flatness), high.map(|x| x + flatness)]))
     };
-    tree.build(sites.len(), boxes, true);
+    tree.build(sites.len(), box_of, true);
     let mut found = Vec::new();
     for joint in joints {
+        budget.cancel.check()?;
         let (at, deficit) = (joint[0].at, |end: &End| sites[end.site as usize].deficit);
         let least = joint.iter().map(deficit).fold(f64::INFINITY, f64::min);
+        let keeps = |site: &u32| {
+            let figure = &sites[*site as usize];
+            let is_on = distance_squared(&figure.closest(&at), &at) <= flatness * flatness;
+            let clear = CLEAR * shell(figure).outer;
+            is_on && figure.corners().iter().all(|end| distance_squared(end, &at) > clear * clear) && figure.deficit <= least
+        };
         tree.query(&Box32::of(&[at]), 0, |leaf| {
-            found.extend(tree.items(leaf).iter().filter_map(|&site| {
-                let figure = &sites[site as usize];
-                let is_on = distance_squared(&figure.closest(&at), &at) <= flatness * flatness;
-                let clear = CLEAR * shell(figure).outer;
-                let is_within = figure.corners().iter().all(|end| distance_squared(end, &at) > clear * clear);
-                (is_on && is_within && figure.deficit <= least).then_some(End { at, site, end: None })
-            }));
-            true
+            let keeper = tree.items(leaf).iter().find(|site| keeps(site));
+            found.extend(keeper.map(|&site| End { at, site, end: None }));
+            keeper.is_none()
         });
     }
-    found
-}
-
-/// Two corners of a box with all that is no farther than a distance from a segment.
-fn around([a, b]: &[Point; 2], distance: f64) -> [Point; 2] {
-    let extreme = |choose: fn(f64, f64) -> f64, by: f64| std::array::from_fn(|axis| choose(a[axis], b[axis]) + by);
-    [extreme(f64::min, -distance), extreme(f64::max, distance)]
+    Ok(found)
 }
 
 /// How far out a polytope may be cut so that its corners, which are so many times farther out than the inner radius at least, have room.
@@ -211,10 +225,8 @@ mod tests {
                 let ends = [1.7, -2.3].map(|far| std::array::from_fn(|axis| [5.0, -7.0, 2.0][axis] + far * through[axis]));
                 sites.push(Weighted { site: Site::Segment(ends), deficit: if round % 2 == 0 { 0.0 } else { 0.1 } }.into());
             }
-            let cuts = cuts(&sites, 1e-12, [covering.reach, covering.girth], |site| Shell {
-                inner: site.in_space(shell.inner),
-                outer: site.in_space(shell.outer),
-            });
+            let of = |site: &Figure| Shell { inner: site.in_space(shell.inner), outer: site.in_space(shell.outer) };
+            let cuts = cuts(&sites, 1e-12, [covering.reach, covering.girth], of, &Budget::default()).unwrap();
             let centre = [5.0, -7.0, 2.0];
             let joint = |k: usize| ordered(&sites[k]).iter().position(|end| *end == centre).expect("all end there");
             let cut = (0..count).filter(|&k| cuts[k][joint(k)].is_some()).count();

@@ -105,7 +105,7 @@ impl<'a> Arrangement<'a> {
         };
         for (beyond, cut) in beyond
             .iter_mut()
-            .zip(joints::cuts(&sites.list, FLATNESS * setting.slack, scales, shell))
+            .zip(joints::cuts(&sites.list, FLATNESS * setting.slack, scales, shell, budget)?)
             .filter(|(beyond, _)| beyond.is_empty())
         {
             *beyond = Box::new(cut);

@@ -270,7 +270,7 @@ impl Polytope {
             between(from, to, share)
         };
         let corners: Box<[Point]> = corners.iter().map(|&corner| self.corners[corner]).chain(made.iter().map(at)).collect();
-        structure.is_convex(&planes, &corners, 0.0).then(|| Self::with(Arc::new(structure), planes, self.cuts.clone(), corners))
+        structure.is_convex(&planes, &corners, noise).then(|| Self::with(Arc::new(structure), planes, self.cuts.clone(), corners))
     }
 
     /// Whether its box meets that of two points.
