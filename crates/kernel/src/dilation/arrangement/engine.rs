@@ -1,4 +1,7 @@
 //! One trial of an arrangement: polytopes that are changed until the topology of their union is that of the dilation, and its boundary.
+//!
+//! A set of sites is in doubt where it is not shown that the polytopes have a common point exactly where the dilations have one. Where these have one, polytopes that are around the dilations have it, too. Where they have none, there are half-spaces, each around one of
+//! the dilations, without a common point: polytopes that are cut by these have none either, however coarse they are, and still are around the dilations if they were. So polytopes only become finer where rounding does not let the planes be told apart.
 
 use super::bodies::{Bodies, Common};
 use super::figure::Figure;
@@ -214,8 +217,12 @@ impl<'a> Engine<'a> {
             budget.cancel.check()?;
             let (before, state) = (self.states[index], next[index]);
             let made = |state: State| self.polytope(index, state).map(|polytope| (state, polytope));
-            // Where both cannot be had, one of them; planes may cut what is as it was.
-            let all = [state, State { level: before.level, ..state }, State { is_around: before.is_around, ..state }, before];
+            // Where both cannot be had, one of them, or what is finer instead; planes may cut what is as it was.
+            let finer = State { level: before.level + 1, ..before };
+            let all = [state, State { level: before.level, ..state }, State { is_around: before.is_around, ..state }, finer, before];
+            if state == before && !is_cut[index] {
+                return Ok(None);
+            }
             let mut wanted = all.into_iter().filter(|&state| state.level < LEVELS && (state != before || is_cut[index]));
             Ok(wanted.find_map(made))
         };

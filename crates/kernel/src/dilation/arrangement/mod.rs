@@ -2,7 +2,7 @@
 //!
 //! With s < r < outer the ends of the band, figure S_i (see `figure`) has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
 //! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
-//! `nerve` shows it; where that is in doubt, polytopes are changed until it does.
+//! `nerve` shows it; where that is in doubt, polytopes are changed until it does, see `engine`.
 
 mod bodies;
 mod covering;

@@ -9,6 +9,8 @@
 //! * (neither meets) neither the D_i have a common point, nor the P_i: every body is within one of these, or
 //! * (hidden) all common points of the D_i, and all of the P_i, are in the interior of some E_j, or of a solid, and so in that of the union, all the time.
 //!
+//! Polytopes that are below planes which part dilations, or are around the dilations, settle what is in doubt (see `engine`).
+//!
 //! If that is shown of all sets, both unions, with the solids, have as many components, handles and voids. Sets that hold one which does not meet, or which is hidden, are so, too.
 
 use super::bodies::{Bodies, Common, Verdict};
