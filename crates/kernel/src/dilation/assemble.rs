@@ -48,7 +48,7 @@ impl Assembly<'_, '_> {
         let core = self.pass.core(node);
         let Pass { rule, setting, budget, .. } = *self.pass;
         let simplified = |simplifier: &mut Simplifier<Tree<'_>>| simplifier.run(setting, &OF_LATTICE, &core, &kept, &mut surface, budget);
-        self.simplifiers.with(|| Simplifier::new(Tree::of(rule, setting), setting), simplified)?;
+        self.simplifiers.with(|| Simplifier::of(rule, setting), simplified)?;
         // No other node has vertices in the core.
         let vertices = &surface.vertices;
         surface.shared.retain(|&(_, number)| !core.contains(&vertices[number as usize]));

@@ -52,7 +52,7 @@ pub(super) trait SiteSearch {
         Self: 'b;
 
     /// What a search in a part of space begins with.
-    type Candidates;
+    type Candidates: ?Sized;
 
     /// Begins in another part of space; returns the nodes that all searches there may begin with.
     fn reset(&mut self, candidates: &Self::Candidates) -> Vec<NodeId>;

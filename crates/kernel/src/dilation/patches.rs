@@ -133,7 +133,7 @@ impl Patches<'_> {
         Patch { inside, across, settled }
     }
 
-    fn simplified(&self, core: &Core, figures: &Vec<NodeId>, patch: Patch) -> Result<Patch, Stopped> {
+    fn simplified(&self, core: &Core, figures: &[NodeId], patch: Patch) -> Result<Patch, Stopped> {
         let Patch { inside, across, settled } = patch;
         let triangles: Vec<[u32; 3]> =
             inside.into_iter().chain(across.iter().map(|&triangle| self.surface.triangles[triangle as usize])).collect();

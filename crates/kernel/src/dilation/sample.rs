@@ -12,7 +12,7 @@ use super::octree::{Changed, Node, Pass, Task};
 use super::plan::Setting;
 use super::simplify::{OF_LATTICE, Simplifier};
 use super::surface::Blocks;
-use super::tree::{Candidates, Tree};
+use super::tree::Candidates;
 use crate::split_mix::Random;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
@@ -174,19 +174,12 @@ impl Pass<'_> {
         let (searched, found) = (surface.looked, surface.found);
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let core = self.core(node);
-        Simplifier::new(Tree::of(self.rule, cleaning), cleaning).run(
-            cleaning,
-            &OF_LATTICE,
-            &core,
-            candidates,
-            &mut surface,
-            self.budget,
-        )?;
+        Simplifier::of(self.rule, cleaning).run(cleaning, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
         let triangles = surface.triangles.len() as u64;
         let (mut simplifying, mut tried) = (0, 0);
         if simplify {
             surface.settled.clear();
-            let mut simplifier = Simplifier::new(Tree::of(self.rule, self.setting), self.setting);
+            let mut simplifier = Simplifier::of(self.rule, self.setting);
             simplifier.run(self.setting, &OF_LATTICE, &core, candidates, &mut surface, self.budget)?;
             (simplifying, tried) = (simplifier.bytes(), triangles);
         }

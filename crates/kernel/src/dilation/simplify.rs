@@ -18,8 +18,9 @@ use super::convex::SiteSearch;
 use super::plan::Setting;
 use super::slivers;
 use super::surface::BlockSurface;
-use super::tree::in_space;
+use super::tree::{Tree, in_space};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
+use crate::attractor::sites::SiteRule;
 use crate::budget::{Budget, Stopped};
 use crate::solid::around::Around;
 use crate::solid::half_edges::{HalfEdges, NONE};
@@ -77,6 +78,13 @@ pub(super) struct Simplifier<S> {
     due: Vec<f64>,
     /// Only what cannot be a solid is removed.
     clean_only: bool,
+}
+
+impl<'a> Simplifier<Tree<'a>> {
+    /// One over an attractor's sites.
+    pub(super) fn of(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
+        Self::new(Tree::of(rule, setting), setting)
+    }
 }
 
 impl<S: SiteSearch> Simplifier<S> {

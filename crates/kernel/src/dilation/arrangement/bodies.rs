@@ -83,8 +83,8 @@ impl Bodies<'_> {
     pub(super) fn verdict(&self, set: &[u32]) -> Verdict {
         let settled = |common: Common| Verdict { common, is_doubtful: false, hub: None };
         let Setting { reach, outer, slack, .. } = *self.setting;
-        let within = common_box(&AXES, set.iter().map(|&body| self.around(body, outer + slack)));
-        if (0..3).any(|axis| within[0][axis] > within[1][axis]) {
+        let within = self.within(set);
+        if is_empty(&within) {
             return settled(Common::None);
         }
         let planes = |x: &Point, than: f64| highest(x, set.iter().flat_map(|&body| self.polytopes.of(body).planes.iter()), than);
@@ -110,13 +110,13 @@ impl Bodies<'_> {
     ///
     /// Let x be where the farthest body is nearest, and c_i the points closest to it of the figures that are as far. A mean of the unit vectors along x - c_i is 0, so that of how far y is beyond the planes across these is that at x, wherever y is: not all are less.
     pub(super) fn parting(&self, set: &[u32], known: &[Plane], seed: u64) -> Vec<(u32, Plane)> {
-        let Setting { reach, outer, slack, .. } = *self.setting;
-        let within = common_box(&AXES, set.iter().map(|&body| self.around(body, outer + slack)));
+        let Setting { reach, slack, .. } = *self.setting;
+        let within = self.within(set);
         let part = |planes: &[Plane]| common_point(within, |x| highest(x, planes.iter(), slack)) == Common::None;
         if part(known) {
             return Vec::new();
         }
-        let beyond = |x: &Point| set.iter().map(|&body| self.above(Kind::Dilation, body, x)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+        let beyond = |x: &Point| set.iter().map(|&body| self.above(Kind::Dilation, body, x)).reduce(higher);
         let lowest = lowest(within, |x| beyond(x).unwrap_or((0.0, [0.0; 3])));
         let Some((x, gap)) = lowest.filter(|&(_, gap)| gap > LEAST_GAP * slack) else { return Vec::new() };
         let plane = |(place, &body): (usize, &u32)| {
@@ -137,7 +137,7 @@ impl Bodies<'_> {
     /// The farthest figure of a set, and how far it is, the deficit included.
     fn farthest(&self, set: &[u32], x: &Point) -> Option<(f64, &Figure)> {
         let far = set.iter().map(|&body| &self.figures[body as usize]).map(|figure| (figure.distance_squared(x), figure));
-        far.reduce(|a, b| if b.0 > a.0 { b } else { a }).map(|(square, figure)| (square.sqrt(), figure))
+        far.reduce(higher).map(|(square, figure)| (square.sqrt(), figure))
     }
 
     /// The highest plane that dilations of a set are cut by, if it is higher than something.
@@ -175,6 +175,12 @@ impl Bodies<'_> {
             return Some((distance - by, subtract(x, &figure.closest(x)).map(|part| part / distance)));
         }
         self.cut_off(set, x, by - self.setting.reach)
+    }
+
+    /// A box around what the dilations of a set have in common.
+    fn within(&self, set: &[u32]) -> [Point; 2] {
+        let Setting { outer, slack, .. } = *self.setting;
+        common_box(&AXES, set.iter().map(|&body| self.around(body, outer + slack)))
     }
 
     /// A body's corners, and how far from their hull places are that are in its dilation by a radius.
@@ -231,7 +237,7 @@ impl Bodies<'_> {
 
     /// Whether the places in a box that bodies of a set have in common are all hidden, by one of those around or by a solid.
     fn are_hidden(&self, boxes: &mut Boxes<'_>, [low, high]: [Point; 2], around: &[u32], halvings: usize) -> bool {
-        if (0..3).any(|axis| low[axis] > high[axis]) {
+        if is_empty(&[low, high]) {
             return true;
         }
         boxes.left = boxes.left.saturating_sub(1);
@@ -320,9 +326,19 @@ fn common_box<'p>(axes: &[Point; 3], parts: impl Iterator<Item = (&'p [Point], f
     common
 }
 
+/// Whether nothing is in a box.
+fn is_empty([low, high]: &[Point; 2]) -> bool {
+    (0..3).any(|axis| low[axis] > high[axis])
+}
+
+/// The one with the larger number; the first of equal ones.
+fn higher<T>(a: (f64, T), b: (f64, T)) -> (f64, T) {
+    if b.0 > a.0 { b } else { a }
+}
+
 /// How high a place is above the plane of some that it is highest above, and the plane's normal.
 fn top<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>) -> Option<(f64, Point)> {
-    let top = planes.map(|plane| (height(plane, x), plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+    let top = planes.map(|plane| (height(plane, x), plane)).reduce(higher);
     top.map(|(height, plane)| (height, normal(plane)))
 }
 
@@ -333,7 +349,7 @@ fn highest<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>, than: f64) ->
 
 /// About where in a box a convex function is lowest, and its value there; `above` gives it with a subgradient. Ellipsoids hold the places where it is lower than at any before, and begin anew in smaller boxes, which rounding does less to; none where the box is empty.
 fn lowest([low, high]: [Point; 2], above: impl Fn(&Point) -> (f64, Point)) -> Option<(Point, f64)> {
-    if (0..3).any(|axis| low[axis] > high[axis]) {
+    if is_empty(&[low, high]) {
         return None;
     }
     let mut best = (between(&low, &high, 0.5), f64::INFINITY);

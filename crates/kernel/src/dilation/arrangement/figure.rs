@@ -8,6 +8,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::dilation::tree::Weighted;
 use crate::measure::triangle::closest_on_triangle;
+use crate::solid::box_tree::Box32;
 use std::cmp::Ordering;
 
 /// Sides of a polygon at most by which a polytope begins, which has room for their facets, and corners at most, many of which may turn by little.
@@ -92,6 +93,12 @@ impl Figure {
         };
         [extreme(f64::INFINITY, f64::min), extreme(f64::NEG_INFINITY, f64::max)]
     }
+
+    /// A box around all that is no farther from it than a distance.
+    pub(super) fn box_within(&self, distance: f64) -> Box32 {
+        let [low, high] = self.bounds();
+        Box32::of(&[low.map(|x| x - distance), high.map(|x| x + distance)])
+    }
 }
 
 impl Convex for Figure {
@@ -124,10 +131,8 @@ impl Polygon {
         let across = fan.fold([0.0; 3], |sum: Point, part| std::array::from_fn(|axis| sum[axis] + part[axis]));
         let length = dot(&across, &across).sqrt();
         let up = if length > 0.0 { across.map(|part| part / length) } else { [0.0; 3] };
-        let mut outward: Box<[Point]> = corners.clone();
-        for (side, out) in outward.iter_mut().enumerate() {
-            *out = unit(&cross(&subtract(&corners[(side + 1) % corners.len()], &corners[side]), &up));
-        }
+        let out = |side: usize| unit(&cross(&subtract(&corners[(side + 1) % corners.len()], &corners[side]), &up));
+        let outward = (0..corners.len()).map(out).collect();
         Self { corners, up, outward }
     }
 

@@ -60,10 +60,10 @@ impl SiteSearch for &Index {
         = &'b Figure
     where
         Self: 'b;
-    type Candidates = Vec<NodeId>;
+    type Candidates = [NodeId];
 
-    fn reset(&mut self, candidates: &Vec<NodeId>) -> Vec<NodeId> {
-        candidates.clone()
+    fn reset(&mut self, candidates: &[NodeId]) -> Vec<NodeId> {
+        candidates.to_vec()
     }
 
     fn site(&self, id: SiteId) -> &Figure {

@@ -115,9 +115,8 @@ fn through<'a>(
     let mut tree = BoxTree::default();
     let box_of = |site: u32| {
         let figure = &sites[site as usize];
-        let [low, high] = figure.bounds();
         let is_segment = matches!(figure.outline, Outline::Segment(_));
-        is_segment.then(|| Box32::of(&[low.map(|x| x - flatness), high.map(|x| x + flatness)]))
+        is_segment.then(|| figure.box_within(flatness))
     };
     tree.build(sites.len(), box_of, true);
     let mut found = Vec::new();

@@ -48,6 +48,7 @@ const SETS_PER_CUBE: f64 = 100.0;
 const MOST_OF_TUBES: f64 = 1_000.0;
 /// How far corners may be off the plane of a union, and off a side that goes straight on, as a share of the slack that all bounds leave: in all rounds together polygons are off by a little more than half of it.
 const FLATNESS: f64 = 1.0 / 128.0;
+
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: usize = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.

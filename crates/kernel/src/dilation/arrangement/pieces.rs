@@ -75,11 +75,7 @@ pub(super) struct Body<'a> {
 /// # Errors
 /// [`Stopped`].
 pub(super) fn near(bodies: &[Body<'_>], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
-    let grown = |body: &Body<'_>| {
-        let [low, high] = body.figure.bounds();
-        Box32::of(&[low.map(|x| x - body.reach), high.map(|x| x + body.reach)])
-    };
-    let boxes: Vec<Box32> = bodies.iter().map(grown).collect();
+    let boxes: Vec<Box32> = bodies.iter().map(|body| body.figure.box_within(body.reach)).collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
     let [squares, sets] = most.map(|most| most.saturating_mul(bodies.len() + FEW));

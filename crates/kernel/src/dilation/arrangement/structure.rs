@@ -131,10 +131,14 @@ mod tests {
     use crate::attractor::cell::{between, unit};
     use crate::split_mix::Random;
 
+    /// The facets of a cube, across each axis the lower one first; the bits of a corner's number are its coordinates.
+    fn cube() -> Vec<Vec<u16>> {
+        vec![vec![0, 4, 6, 2], vec![1, 3, 7, 5], vec![0, 1, 5, 4], vec![2, 6, 7, 3], vec![0, 2, 3, 1], vec![4, 5, 7, 6]]
+    }
+
     #[test]
     fn only_closed_facets_around_a_ball_have_a_structure() {
-        let cube: Vec<Vec<u16>> =
-            vec![vec![0, 3, 2, 1], vec![4, 5, 6, 7], vec![0, 1, 5, 4], vec![1, 2, 6, 5], vec![2, 3, 7, 6], vec![3, 0, 4, 7]];
+        let cube = cube();
         let structure = Structure::closed(&cube, 8).expect("a cube is closed");
         assert_eq!((structure.facets, structure.corners, structure.edges.len()), (6, 8, 12));
         for edge in &structure.edges {
@@ -159,8 +163,7 @@ mod tests {
     #[test]
     fn what_is_left_below_planes_is_a_polytope() {
         let corner = |code: usize| -> Point { std::array::from_fn(|axis| if code >> axis & 1 == 1 { 1.0 } else { -1.0 }) };
-        let cube: Vec<Vec<u16>> =
-            vec![vec![0, 4, 6, 2], vec![1, 3, 7, 5], vec![0, 1, 5, 4], vec![2, 6, 7, 3], vec![0, 2, 3, 1], vec![4, 5, 7, 6]];
+        let cube = cube();
         let mut random = Random(41);
         let (mut cuts, mut gone) = (0, 0);
         for _ in 0..60 {
