@@ -127,8 +127,9 @@ def topology(vertices, triangles):
     fans, _ = pieces(np.column_stack([np.arange(3 * n), after]), 3 * n)
     shells, shell = pieces(half, len(vertices))
     shells -= len(vertices) - len(used)
-    _, face_shell = np.unique(shell[faces[:, 0]], return_inverse=True)
-    corner = vertices[faces]
+    _, first, face_shell = np.unique(shell[faces[:, 0]], return_index=True, return_inverse=True)
+    # Seen from one of its own corners: of a void that is small beside how far it is from the origin, rounding would take the sign.
+    corner = vertices[faces].astype(float) - vertices[faces[first, 0]].astype(float)[face_shell][:, None]
     volumes = np.zeros(shells)
     np.add.at(volumes, face_shell, np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6)
     euler = len(used) - len(half) // 2 + n

@@ -108,6 +108,15 @@ class Faults(unittest.TestCase):
         self.assertEqual([right["shells"], right["cavities"]], [2, 1])
         self.assertFalse(wrong["solid"])
 
+    def test_small_voids_are_counted_far_from_the_origin(self):
+        for k in range(40):
+            centre = np.array([40.2, 109.9, 118.9]) + 0.37 * k
+            vertices, triangles = octahedral_sphere(1.0, 6, centre)
+            small, faces = octahedral_sphere(1e-6, 1, centre)
+            both = np.concatenate([vertices, small]), np.concatenate([triangles, len(vertices) + faces[:, ::-1]]).astype(np.int32)
+            found = topology(*both)
+            self.assertEqual([found["shells"], found["cavities"]], [2, 1])
+
     def test_crossings_are_found(self):
         vertices, triangles = octahedral_sphere(1.0, 6)
         other, more = octahedral_sphere(1.0, 6, (1.0, 0.2, 0.1))

@@ -21,10 +21,8 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// Doubts that polytopes may leave, as a share of the sites, and in any case. Nearly all of them end in the next rounds; with more, the lattice costs less.
-const MOST_DOUBTS: f64 = 4.0;
-const FEW_DOUBTS: f64 = 16.0;
-/// So many doubts take as long as the lattice at one of its cubes along a polygon.
-const DOUBTS_PER_CUBE: f64 = 0.5;
+const MOST_DOUBTS: f64 = 20.0;
+const FEW_DOUBTS: f64 = 1_000.0;
 /// Planes that part a site's polytope from others, on average over a set.
 const MOST_PLANES: usize = 64;
 /// How much narrower the band of finer polytopes is, level by level.
@@ -93,7 +91,6 @@ pub(super) struct Engine<'a> {
     near: &'a Lists,
     forms: &'a Forms,
     solids: &'a [Inside<'a>],
-    cubes: f64,
     pub(super) polytopes: Polytopes,
     states: Vec<State>,
     /// The sets of sites whose dilations are parted by planes, and the planes that every site's is below.
@@ -104,7 +101,7 @@ pub(super) struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     pub(super) fn new(arrangement: &'a Arrangement<'_>, trial: u64, solids: &'a [Inside<'a>]) -> Self {
-        let Arrangement { setting, sites, beyond, near, forms, cubes, .. } = arrangement;
+        let Arrangement { setting, sites, beyond, near, forms, .. } = arrangement;
         let sites = &sites.list;
         Self {
             setting,
@@ -113,7 +110,6 @@ impl<'a> Engine<'a> {
             near,
             forms,
             solids,
-            cubes: *cubes,
             polytopes: Polytopes::default(),
             states: vec![State::default(); sites.len()],
             parted: BTreeSet::new(),
@@ -126,13 +122,14 @@ impl<'a> Engine<'a> {
         if !self.begin(budget)? {
             return Ok(Run::Open);
         }
-        let (mut changed, mut sets) = (vec![true; self.sites.len()], Sets::default());
-        let most = (MOST_DOUBTS * self.sites.len() as f64).max(DOUBTS_PER_CUBE * self.cubes).max(FEW_DOUBTS) as usize;
+        let Some(mut sets) = Sets::new(&self.bodies(), budget)? else { return Ok(Run::Doubtful) };
+        let mut changed = vec![true; self.sites.len()];
+        let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
         while changed.contains(&true) {
             if !sets.look(&self.bodies(), &changed, most, budget)? {
                 return Ok(Run::Doubtful);
             }
-            changed = self.refine(sets.doubts(), budget)?;
+            changed = self.refine(&sets.doubts(), budget)?;
         }
         // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
         if !self.solids.is_empty() && !sets.doubts().is_empty() {
@@ -145,7 +142,7 @@ impl<'a> Engine<'a> {
     }
 
     pub(super) fn bodies(&self) -> Bodies<'_> {
-        Bodies { setting: self.setting, figures: self.sites, polytopes: &self.polytopes, near: self.near, solids: self.solids }
+        Bodies { setting: self.setting, figures: self.sites, polytopes: &self.polytopes, solids: self.solids }
     }
 
     /// Makes the first polytopes; whether there are such.

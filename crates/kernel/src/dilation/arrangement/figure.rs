@@ -10,6 +10,7 @@ use crate::dilation::tree::Weighted;
 use crate::measure::triangle::closest_on_triangle;
 use crate::solid::box_tree::Box32;
 use std::cmp::Ordering;
+use std::f64::consts::TAU;
 
 /// Sides of a polygon at most by which a polytope begins, which has room for their facets, and corners at most, many of which may turn by little.
 const MOST_SIDES: usize = 12;
@@ -81,9 +82,13 @@ impl Figure {
         }
     }
 
-    /// How far apart the ends of a segment are; 0 of a point.
-    pub(super) fn length(&self) -> f64 {
-        if let Outline::Segment([a, b]) = &self.outline { distance_squared(a, b).sqrt() } else { 0.0 }
+    /// About the area of its dilation by a radius: that of both sides of a polygon, around a segment, or of a ball.
+    pub(super) fn area(&self, radius: f64) -> f64 {
+        match &self.outline {
+            Outline::Point(_) => 2.0 * TAU * radius * radius,
+            Outline::Segment([a, b]) => TAU * radius * distance_squared(a, b).sqrt(),
+            Outline::Polygon(polygon) => polygon.double(),
+        }
     }
 
     /// Its box.

@@ -6,10 +6,13 @@
 
 mod bodies;
 mod covering;
+mod cubes;
+mod ellipsoid;
 mod engine;
 mod facets;
 mod figure;
 mod form;
+mod hidden;
 mod hinges;
 mod hull;
 mod index;
@@ -32,20 +35,18 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 use engine::{Engine, Forms, Run, State, TRIALS};
-use figure::{Figure, Polygon};
+use figure::Figure;
 use form::Kind;
 pub(super) use index::Index;
 use pieces::{Body, Lists};
 use polytopes::MOST_POLYTOPES;
-use std::f64::consts::TAU;
 
-/// The mean square of the number of neighbours, and the mean number of sets of up to four figures that are near to each other, at most: lines are cut by all neighbours, and `nerve` looks at such
-/// sets as far as all their parts meet. Where figures have more of them, most of their polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less.
-const MOST_NEAR: [usize; 2] = [5_000, 250];
-/// So many sets take as long as the lattice at one of its cubes along a polygon, or around a tube: where these are large there may be more of them.
-const SETS_PER_CUBE: f64 = 100.0;
-/// Of tubes so many sets at most: many of them are hidden where that many are near to each other.
-const MOST_OF_TUBES: f64 = 1_000.0;
+/// The mean square of the number of neighbours at most: lines are cut by all of them.
+const MOST_NEAR: usize = 40_000;
+/// Neighbours of all sites at most, for each cube of the lattice that their dilations would meet if they were alone, and in any case. Where there are more, most of the polytopes' facets are hidden, and the lattice, which does not tell sites apart, costs less: a
+/// tenth where there are ten times as many, two and a half to four times as much where there are a tenth.
+const NEAR_PER_CUBE: f64 = 9.0;
+const FEW_NEAR: f64 = 10_000.0;
 /// How far corners may be off the plane of a union, and off a side that goes straight on, as a share of the slack that all bounds leave: in all rounds together polygons are off by a little more than half of it.
 const FLATNESS: f64 = 1.0 / 128.0;
 
@@ -64,8 +65,6 @@ pub(super) struct Arrangement<'a> {
     forms: Forms,
     /// The surfaces of solids, whose triangles are among the sites.
     solids: Vec<TriMesh>,
-    /// Cubes of the lattice that the faces of polygons would meet, about.
-    cubes: f64,
     /// About how many triangles will be made.
     pub(super) triangles: f64,
 }
@@ -115,20 +114,16 @@ impl<'a> Arrangement<'a> {
         let bodies = sites.list.iter().zip(&beyond);
         let bodies: Vec<Body<'_>> =
             bodies.map(|(figure, beyond)| Body { figure, reach: reach(figure), cuts: joints::planes(figure, beyond) }).collect();
-        // Both sides of all polygons.
-        let areas = sites.list.iter().filter_map(Figure::polygon).map(Polygon::double);
-        let cubes = areas.sum::<f64>() / setting.lattice.pitch.powi(2);
-        // The sides of tubes.
-        let lengths = sites.list.iter().filter(|figure| figure.polygon().is_none()).map(Figure::length);
-        let around = TAU * setting.reach * lengths.sum::<f64>() / setting.lattice.pitch.powi(2);
-        let per_body = |cubes: f64| SETS_PER_CUBE * cubes / sites.list.len() as f64;
-        let sets = (per_body(cubes) + per_body(around).min(MOST_OF_TUBES)) as usize;
-        let Some(near) = pieces::near(&bodies, [MOST_NEAR[0], MOST_NEAR[1].max(sets)], budget)? else { return Ok(None) };
+        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
         drop(bodies);
+        let cubes = sites.list.iter().map(|figure| figure.area(setting.reach)).sum::<f64>() / setting.lattice.pitch.powi(2);
+        if near.total() as f64 > FEW_NEAR + NEAR_PER_CUBE * cubes {
+            return Ok(None);
+        }
         let solids = rule.attractor().surfaces();
         // About half of what is around the faces of solids is inside of these.
         let inside = 0.5 * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
-        let mut arrangement = Self { setting, sites, beyond, near, forms, solids, cubes, triangles: 0.0 };
+        let mut arrangement = Self { setting, sites, beyond, near, forms, solids, triangles: 0.0 };
         arrangement.triangles = (1.0 - inside) * arrangement.expected_triangles(budget)?;
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))

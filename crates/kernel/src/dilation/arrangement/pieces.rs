@@ -56,9 +56,9 @@ impl Lists {
         &self.0[index as usize]
     }
 
-    /// Which polytopes are some of them, or near to one.
-    pub(super) fn around(&self, some: &[bool]) -> Vec<bool> {
-        self.0.iter().zip(some).map(|(near, &own)| own || near.iter().any(|&other| some[other as usize])).collect()
+    /// How long all are together.
+    pub(super) fn total(&self) -> usize {
+        self.0.iter().map(Vec::len).sum()
     }
 }
 
@@ -69,16 +69,15 @@ pub(super) struct Body<'a> {
     pub(super) cuts: Box<[Plane]>,
 }
 
-/// Of every figure, those whose dilations may meet its own. `None` where that is too much for an arrangement: the squares of the numbers of neighbours, or the sets of up to four sites
-/// that are near to each other, are more than `most` on average. Where there are few sites, more are allowed.
+/// Of every figure, those whose dilations may meet its own. `None` where that is too much for an arrangement: the squares of the numbers of neighbours are more than `most` on average. Where there are few sites, more are allowed.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn near(bodies: &[Body<'_>], most: [usize; 2], budget: &Budget) -> Result<Option<Lists>, Stopped> {
+pub(super) fn near(bodies: &[Body<'_>], most: usize, budget: &Budget) -> Result<Option<Lists>, Stopped> {
     let boxes: Vec<Box32> = bodies.iter().map(|body| body.figure.box_within(body.reach)).collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
-    let [squares, sets] = most.map(|most| most.saturating_mul(bodies.len() + FEW));
+    let squares = most.saturating_mul(bodies.len() + FEW);
     let total = AtomicUsize::new(0);
     let of = |index: u32| {
         budget.cancel.check()?;
@@ -101,30 +100,7 @@ pub(super) fn near(bodies: &[Body<'_>], most: [usize; 2], budget: &Budget) -> Re
         Ok(found)
     };
     let lists = Lists((0..boxes.len() as u32).into_par_iter().map(of).collect::<Result<_, Stopped>>()?);
-    if total.into_inner() > squares {
-        return Ok(None);
-    }
-    let total = AtomicUsize::new(0);
-    (0..boxes.len() as u32).into_par_iter().try_for_each(|index| {
-        budget.cancel.check()?;
-        let later: Vec<u32> = lists.of(index).iter().copied().filter(|&other| other > index).collect();
-        let mut count = 0;
-        for &second in &later {
-            let common =
-                |of: &[u32]| of.iter().copied().filter(|other| *other > second && lists.of(second).binary_search(other).is_ok()).collect();
-            let thirds: Vec<u32> = common(&later);
-            count += 1 + thirds.len();
-            for (place, &third) in thirds.iter().enumerate() {
-                count += thirds[place + 1..].iter().filter(|fourth| lists.of(third).binary_search(fourth).is_ok()).count();
-            }
-            if total.load(Ordering::Relaxed) + count > sets {
-                break;
-            }
-        }
-        total.fetch_add(count, Ordering::Relaxed);
-        Ok(())
-    })?;
-    Ok((total.into_inner() <= sets).then_some(lists))
+    Ok((total.into_inner() <= squares).then_some(lists))
 }
 
 impl Body<'_> {
@@ -169,12 +145,14 @@ const FEW: usize = 40;
 /// [`Stopped`].
 pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Result<Vec<Pieces>, Stopped> {
     let indices = || (0..polytopes.count()).into_par_iter();
-    let met = indices().map(|index| {
+    let beside = indices().map_init(Beyond::default, |beyond, index| {
         budget.cancel.check()?;
-        Ok(met(polytopes, near, index))
+        Ok(beside(polytopes, near.of(index), index, beyond))
     });
-    let met: Vec<Vec<u32>> = met.collect::<Result<_, Stopped>>()?;
-    let hidden: Vec<Mask> = indices().map(|index| hidden(polytopes, index, &met[index as usize])).collect();
+    let (mut met, hidden): (Vec<Vec<u32>>, Vec<Mask>) = beside.collect::<Result<Vec<_>, Stopped>>()?.into_iter().unzip();
+    // No facet of either parts them.
+    let is_beside = |index: u32, other: u32| met[other as usize].binary_search(&index).is_ok();
+    met = indices().map(|index| met[index as usize].iter().copied().filter(|&other| is_beside(index, other)).collect()).collect();
     let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden };
     let pieces = indices().map_init(Scratch::default, |scratch, index| {
         budget.cancel.check()?;
@@ -184,20 +162,35 @@ pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Resu
     pieces.collect()
 }
 
-/// The polytopes that meet a polytope: no facet parts them.
-fn met(polytopes: &Polytopes, near: &Lists, index: u32) -> Vec<u32> {
-    near.of(index).iter().copied().filter(|&other| meet(polytopes.of(index), polytopes.of(other))).collect()
+/// Those of some polytopes of which no facet parts a polytope from them, and its facets that lie within one of these.
+fn beside(polytopes: &Polytopes, near: &[u32], index: u32, beyond: &mut Beyond) -> (Vec<u32>, Mask) {
+    let (structure, polytope) = (polytopes.structure(index), polytopes.of(index));
+    let (mut beside, mut hidden) = (Vec::new(), Mask::default());
+    for &other in near {
+        if !beyond.fill(&polytope.corners, polytopes.of(other)) {
+            continue;
+        }
+        beside.push(other);
+        let mut seen = Mask::default();
+        for edge in structure.edges.iter().filter(|edge| edge.corners.iter().any(|&corner| !beyond.is_inside(usize::from(corner)))) {
+            edge.facets.iter().for_each(|&facet| seen.add(usize::from(facet)));
+        }
+        (0..structure.facets).filter(|&facet| !seen.has(facet)).for_each(|facet| hidden.add(facet));
+    }
+    (beside, hidden)
 }
 
 /// How many triangles of the union some polytopes, in ascending order, have, about: a facet with k edges has k - 2, and each edge is on two.
 pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let total = polytopes.all.len();
     let (mut lists, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
+    let mut beyond = Beyond::default();
     for &index in of.iter().chain(of.iter().flat_map(|&index| near.of(index))) {
         let slot = &mut lists[index as usize];
         if slot.is_none() {
-            let own = met(polytopes, near, index);
-            masks[index as usize] = hidden(polytopes, index, &own);
+            let (mut own, hidden) = beside(polytopes, near.of(index), index, &mut beyond);
+            own.retain(|&other| beyond.fill(&polytopes.of(other).corners, polytopes.of(index)));
+            masks[index as usize] = hidden;
             *slot = Some(own);
         }
     }
@@ -212,25 +205,73 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     scratch.out.pieces.len().saturating_sub(2 * facets.len())
 }
 
-/// Whether no facet of either polytope parts it from the other.
-fn meet(one: &Polytope, other: &Polytope) -> bool {
-    let is_beyond = |planes: &[Plane], points: &[Point]| planes.iter().any(|plane| points.iter().all(|point| height(plane, point) > 0.0));
-    !is_beyond(&one.planes, &other.corners) && !is_beyond(&other.planes, &one.corners)
+/// The facets of a polytope that the corners of another are beyond.
+#[derive(Default)]
+struct Beyond {
+    /// The corners, coordinate by coordinate.
+    places: [Vec<f64>; 3],
+    /// Of every 64 facets, one after the other, a mask for each corner.
+    masks: Vec<u64>,
 }
 
-/// The facets of a polytope that lie within another.
-fn hidden(polytopes: &Polytopes, index: u32, met: &[u32]) -> Mask {
-    let (structure, corners) = (polytopes.structure(index), &polytopes.of(index).corners);
-    let mut hidden = Mask::default();
-    for &other in met {
-        let (mut seen, other) = (Mask::default(), polytopes.of(other));
-        let is_out: Vec<bool> = corners.iter().map(|corner| !other.contains(corner)).collect();
-        for edge in structure.edges.iter().filter(|edge| edge.corners.iter().any(|&corner| is_out[usize::from(corner)])) {
-            edge.facets.iter().for_each(|&facet| seen.add(usize::from(facet)));
+impl Beyond {
+    /// Looks at all corners; false where all are beyond one facet.
+    fn fill(&mut self, corners: &[Point], of: &Polytope) -> bool {
+        let number = corners.len();
+        for (axis, places) in self.places.iter_mut().enumerate() {
+            places.clear();
+            places.extend(corners.iter().map(|corner| corner[axis]));
         }
-        (0..structure.facets).filter(|&facet| !seen.has(facet)).for_each(|facet| hidden.add(facet));
+        let [x, y, z] = self.places.each_ref().map(|places| &places[..number]);
+        self.masks.clear();
+        self.masks.resize(number * of.planes.len().div_ceil(64), 0);
+        for (word, planes) in of.planes.chunks(64).enumerate() {
+            let masks = &mut self.masks[word * number..][..number];
+            for (bit, plane) in planes.iter().enumerate() {
+                let mut all = u64::MAX;
+                for corner in 0..number {
+                    let height = height(plane, &[x[corner], y[corner], z[corner]]);
+                    let is_beyond = if height > 0.0 { u64::MAX } else { 0 };
+                    masks[corner] |= is_beyond & 1 << bit;
+                    all &= is_beyond;
+                }
+                if all != 0 {
+                    return false;
+                }
+            }
+        }
+        true
     }
-    hidden
+
+    fn words(&self, corner: usize) -> impl Iterator<Item = u64> {
+        self.masks.iter().skip(corner).step_by(self.places[0].len()).copied()
+    }
+
+    /// Whether a corner is beyond no facet.
+    #[inline]
+    fn is_inside(&self, corner: usize) -> bool {
+        self.words(corner).all(|word| word == 0)
+    }
+
+    /// Whether two corners are beyond the same facet.
+    #[inline]
+    fn are_apart(&self, [p, q]: [usize; 2]) -> bool {
+        self.words(p).zip(self.words(q)).any(|(p, q)| p & q != 0)
+    }
+
+    /// The facets that one of two corners is beyond, in their order.
+    fn of_either(&self, [p, q]: [usize; 2]) -> impl Iterator<Item = usize> {
+        let words = self.words(p).zip(self.words(q)).map(|(p, q)| p | q);
+        words.enumerate().flat_map(|(word, mut rest)| {
+            std::iter::from_fn(move || {
+                let bit = rest.trailing_zeros() as usize;
+                (rest != 0).then(|| {
+                    rest &= rest - 1;
+                    64 * word + bit
+                })
+            })
+        })
+    }
 }
 
 /// An end of what a polytope covers of a line: where that is, and the facet that is pierced there, unless it is the line's own end.
@@ -240,22 +281,52 @@ struct Cut {
     facet: Option<u32>,
 }
 
-/// What a polytope covers of the way from p to q, given the facets that they are beyond: none where the same facet parts both.
-fn covered(polytopes: &Polytopes, index: u32, [p, q]: [&Point; 2], beyond: [&Mask; 2]) -> Option<[Cut; 2]> {
-    let planes = &polytopes.of(index).planes;
-    let mut cuts = [Cut { at: 0.0, facet: None }, Cut { at: 1.0, facet: None }];
-    for facet in beyond[0].either(beyond[1]) {
-        let (from, to) = (height(&planes[facet], p), height(&planes[facet], q));
-        let at = from / (from - to);
-        let cut = Cut { at, facet: Some(facet_number(index, facet)) };
-        if from > 0.0 {
-            if at > cuts[0].at {
-                cuts[0] = cut;
-            }
-        } else if at < cuts[1].at {
-            cuts[1] = cut;
+/// All of a line.
+const WHOLE: [Cut; 2] = [Cut { at: 0.0, facet: None }, Cut { at: 1.0, facet: None }];
+
+/// Takes away what is beyond a facet, given how high above it a line begins and ends: not both are beyond. Whether something is left.
+#[inline]
+fn cut(cuts: &mut [Cut; 2], [from, to]: [f64; 2], facet: u32) -> bool {
+    let at = from / (from - to);
+    let cut = Cut { at, facet: Some(facet) };
+    if from > 0.0 {
+        if at > cuts[0].at {
+            cuts[0] = cut;
         }
-        if cuts[0].at >= cuts[1].at {
+    } else if at < cuts[1].at {
+        cuts[1] = cut;
+    }
+    cuts[0].at < cuts[1].at
+}
+
+/// What a polytope covers of the way from p to q, given the facets that one of them is beyond; no facet parts both.
+fn covered(polytopes: &Polytopes, index: u32, [p, q]: [&Point; 2], facets: impl Iterator<Item = usize>) -> Option<[Cut; 2]> {
+    let planes = &polytopes.of(index).planes;
+    let mut cuts = WHOLE;
+    for facet in facets {
+        if !cut(&mut cuts, [p, q].map(|x| height(&planes[facet], x)), facet_number(index, facet)) {
+            return None;
+        }
+    }
+    Some(cuts)
+}
+
+/// The same where nothing is known of its facets, but one that may part both from it: others are likely to be parted by the same one.
+fn covered_of_line(polytopes: &Polytopes, index: u32, [p, q]: [&Point; 2], parting: &mut u16) -> Option<[Cut; 2]> {
+    let planes = &polytopes.of(index).planes;
+    let heights = |facet: usize| [p, q].map(|x| height(&planes[facet], x));
+    let are_beyond = |heights: [f64; 2]| heights[0] > 0.0 && heights[1] > 0.0;
+    if are_beyond(heights(usize::from(*parting))) {
+        return None;
+    }
+    let mut cuts = WHOLE;
+    for facet in 0..planes.len() {
+        let heights = heights(facet);
+        if are_beyond(heights) {
+            *parting = facet as u16;
+            return None;
+        }
+        if (heights[0] > 0.0 || heights[1] > 0.0) && !cut(&mut cuts, heights, facet_number(index, facet)) {
             return None;
         }
     }
@@ -291,15 +362,23 @@ struct Pierced {
 /// Working memory.
 #[derive(Default)]
 struct Scratch {
-    beyond: Vec<Mask>,
+    beyond: Beyond,
     /// Of every edge of a polytope, what others cover, and whether one covers all of it.
     cuts: Vec<Vec<[Cut; 2]>>,
     is_gone: Vec<bool>,
     found: Vec<Pierced>,
     line: Vec<[Cut; 2]>,
     /// The polytopes that a polytope meets, those first that covered a whole line last.
-    recent: Vec<u32>,
+    recent: Vec<Third>,
     out: Pieces,
+}
+
+/// A polytope that may cover lines of two others.
+#[derive(Clone, Copy)]
+struct Third {
+    index: u32,
+    /// A facet that parted it from a line.
+    parting: u16,
 }
 
 /// What is needed to find pieces.
@@ -319,12 +398,15 @@ impl Arrangement<'_> {
     /// Pieces of a polytope's edges, and of the lines where it meets later ones.
     fn of(&self, index: u32, scratch: &mut Scratch) {
         let edges = &self.polytopes.structure(index).edges;
+        if !edges.iter().any(|edge| edge.facets.iter().any(|&facet| self.is_seen(index, facet))) {
+            return;
+        }
         scratch.cuts.resize_with(edges.len().max(scratch.cuts.len()), Vec::new);
         scratch.cuts.iter_mut().for_each(Vec::clear);
         scratch.is_gone.clear();
         scratch.is_gone.extend(edges.iter().map(|edge| !edge.facets.iter().any(|&facet| self.is_seen(index, facet))));
         scratch.recent.clear();
-        scratch.recent.extend_from_slice(&self.met[index as usize]);
+        scratch.recent.extend(self.met[index as usize].iter().map(|&index| Third { index, parting: 0 }));
         for &other in &self.met[index as usize] {
             scratch.found.clear();
             self.pierce(index, other, true, other > index, scratch);
@@ -340,15 +422,13 @@ impl Arrangement<'_> {
     fn pierce(&self, index: u32, other: u32, is_first: bool, with_lines: bool, scratch: &mut Scratch) {
         let (structure, corners) = (self.polytopes.structure(index), &self.polytopes.of(index).corners);
         let by = self.polytopes.of(other);
-        scratch.beyond.clear();
-        scratch.beyond.extend(corners.iter().map(|corner| by.beyond(corner)));
+        scratch.beyond.fill(corners, by);
         for (number, edge) in structure.edges.iter().enumerate() {
             let [p, q] = edge.corners.map(usize::from);
-            let beyond = [&scratch.beyond[p], &scratch.beyond[q]];
-            if beyond[0].meets(beyond[1]) || !edge.facets.iter().any(|&facet| self.is_seen(index, facet)) {
+            if scratch.beyond.are_apart([p, q]) || !edge.facets.iter().any(|&facet| self.is_seen(index, facet)) {
                 continue;
             }
-            let Some(cuts) = covered(self.polytopes, other, [&corners[p], &corners[q]], beyond) else { continue };
+            let Some(cuts) = covered(self.polytopes, other, [&corners[p], &corners[q]], scratch.beyond.of_either([p, q])) else { continue };
             if is_first {
                 scratch.is_gone[number] |= cuts.iter().all(|cut| cut.facet.is_none());
                 scratch.cuts[number].push(cuts);
@@ -398,20 +478,17 @@ impl Arrangement<'_> {
             line.clear();
             let mut is_gone = false;
             for place in 0..recent.len() {
-                let third = recent[place];
+                let Third { index: third, ref mut parting } = recent[place];
                 if third == other || !self.polytopes.of(third).may_meet(&p.at, &q.at) {
                     continue;
                 }
-                let beyond = [&p.at, &q.at].map(|x| self.polytopes.of(third).beyond(x));
-                if beyond[0].meets(&beyond[1]) {
-                    continue;
-                }
-                if beyond.iter().all(Mask::is_empty) {
+                let Some(cuts) = covered_of_line(self.polytopes, third, [&p.at, &q.at], parting) else { continue };
+                if cuts.iter().all(|cut| cut.facet.is_none()) {
                     is_gone = true;
                     recent[..=place].rotate_right(1);
                     break;
                 }
-                line.extend(covered(self.polytopes, third, [&p.at, &q.at], [&beyond[0], &beyond[1]]));
+                line.push(cuts);
             }
             if !is_gone {
                 let name = |facet| meeting([facets[0], facets[1], facet]);

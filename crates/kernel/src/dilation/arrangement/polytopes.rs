@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Facets at most.
 pub(super) const MOST_FACETS: usize = 1024;
 
-/// A set of a polytope's facets: those that a point is beyond.
+/// A set of a polytope's facets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Mask([u64; WORDS]);
 
@@ -27,32 +27,6 @@ impl Mask {
     #[inline]
     pub(super) fn has(&self, facet: usize) -> bool {
         self.0[facet / 64] >> (facet % 64) & 1 == 1
-    }
-
-    #[inline]
-    pub(super) fn is_empty(&self) -> bool {
-        self.0 == [0; WORDS]
-    }
-
-    #[inline]
-    pub(super) fn meets(&self, other: &Self) -> bool {
-        (0..WORDS).any(|word| self.0[word] & other.0[word] != 0)
-    }
-
-    /// The facets of either, in their order.
-    #[inline]
-    pub(super) fn either(&self, other: &Self) -> impl Iterator<Item = usize> + use<> {
-        let words: [u64; WORDS] = std::array::from_fn(|word| self.0[word] | other.0[word]);
-        (0..WORDS).flat_map(move |word| {
-            let mut rest = words[word];
-            std::iter::from_fn(move || {
-                let bit = rest.trailing_zeros() as usize;
-                (rest != 0).then(|| {
-                    rest &= rest - 1;
-                    64 * word + bit
-                })
-            })
-        })
     }
 }
 
@@ -278,23 +252,6 @@ impl Polytope {
     pub(super) fn may_meet(&self, p: &Point, q: &Point) -> bool {
         (0..3).all(|axis| p[axis].max(q[axis]) >= self.low[axis] && p[axis].min(q[axis]) <= self.high[axis])
     }
-
-    /// The facets that a point is beyond.
-    #[inline]
-    pub(super) fn beyond(&self, x: &Point) -> Mask {
-        let mut mask = Mask::default();
-        for (facet, plane) in self.planes.iter().enumerate() {
-            if height(plane, x) > 0.0 {
-                mask.add(facet);
-            }
-        }
-        mask
-    }
-
-    #[inline]
-    pub(super) fn contains(&self, x: &Point) -> bool {
-        self.planes.iter().all(|plane| height(plane, x) <= 0.0)
-    }
 }
 
 impl Polytopes {
@@ -380,7 +337,11 @@ mod tests {
                     let on: Point = std::array::from_fn(|axis| from[axis] + along * way[axis]);
                     let direction = unit(&std::array::from_fn(|_| 2.0 * random.share() - 1.0));
                     let x: Point = std::array::from_fn(|axis| on[axis] + shell.inner * direction[axis]);
-                    assert!(polytope.contains(&x) || polytope.cuts.iter().any(|cut| height(cut, &x) > 0.0), "{round}: {x:?}");
+                    assert!(
+                        polytope.planes.iter().all(|plane| height(plane, &x) <= 0.0)
+                            || polytope.cuts.iter().any(|cut| height(cut, &x) > 0.0),
+                        "{round}: {x:?}"
+                    );
                 }
             }
         }

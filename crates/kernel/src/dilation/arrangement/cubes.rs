@@ -1,0 +1,380 @@
+//! Cubes of space, as small as it takes, in which it is told what bodies do: see `nerve`.
+//!
+//! That is up to the bodies that reach a cube. Of most cubes one body holds it all, or a place, a *hub*, is inside of all bodies: both settle a cube as a whole, with all sets of bodies there.
+
+use super::bodies::{AXES, Bodies, Common, Kind, Near};
+use super::ellipsoid::Place;
+use super::figure::Figure;
+use crate::attractor::cell::{Point, between, subtract};
+use crate::budget::{Budget, Stopped};
+use crate::dilation::surface::NameMap;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Bodies of a set at most.
+pub(super) const MOST_BODIES: usize = 4;
+/// So many bodies are few: all sets of them are looked at, however wide the cube is.
+const FEW: usize = 8;
+/// Of more bodies one hub for all is not sought. In cubes as wide as this, in units of the radius, that many are few: they are long, and stay beside each other.
+const MANY: usize = 64;
+const WIDE: f64 = 32.0;
+/// Cubes of one part that are looked at, and sets that are asked for there, at most.
+const MOST_CUBES: usize = 50_000;
+const MOST_ASKED: usize = 200_000;
+/// Space is parted until no more than [`MANY`] bodies reach a part, or it is no wider than this in units of the radius.
+const PART: f64 = 4.0;
+
+/// A cube along the axes of coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cube {
+    pub(super) centre: Point,
+    /// Half of its side.
+    pub(super) half: f64,
+}
+
+impl Cube {
+    /// Around all dilations of figures by a distance.
+    fn around(bodies: &Bodies<'_>, distance: f64) -> Self {
+        let boxes = bodies.figures.iter().map(Figure::bounds);
+        let [low, high] = boxes
+            .reduce(|[low, high], [a, b]| {
+                [std::array::from_fn(|axis| low[axis].min(a[axis])), std::array::from_fn(|axis| high[axis].max(b[axis]))]
+            })
+            .unwrap_or_default();
+        let side = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        Self { centre: between(&low, &high, 0.5), half: 0.5 * side + distance }
+    }
+
+    /// One of eight.
+    fn part(&self, number: usize) -> Self {
+        let half = 0.5 * self.half;
+        Self { centre: self.at(number, half), half }
+    }
+
+    /// One of eight places that are as far from its centre along all axes.
+    fn at(&self, number: usize, half: f64) -> Point {
+        std::array::from_fn(|axis| self.centre[axis] + if number >> axis & 1 == 1 { half } else { -half })
+    }
+
+    /// Its lowest and its highest corner.
+    fn ends(&self) -> [Point; 2] {
+        [self.at(0, self.half), self.at(7, self.half)]
+    }
+
+    /// Its eight corners.
+    pub(super) fn corners(&self) -> impl Iterator<Item = Point> {
+        (0..8).map(|number| self.at(number, self.half))
+    }
+
+    /// How far its places are from its centre along a direction at most: the half times the sum of the direction's parts.
+    pub(super) fn half_along(&self, direction: &Point) -> f64 {
+        self.half * direction.iter().map(|part| part.abs()).sum::<f64>()
+    }
+}
+
+/// A set of two to [`MOST_BODIES`] sites, by their numbers, as a number: that of a set with more sites is larger.
+pub(super) type Set = u128;
+
+/// The name of a set in ascending order.
+pub(super) fn name(sites: &[u32]) -> Set {
+    sites.iter().fold(0, |name, &site| name << 32 | (Set::from(site) + 1))
+}
+
+/// The sites of a set.
+pub(super) fn sites(set: Set) -> impl Iterator<Item = u32> {
+    (0..MOST_BODIES).rev().map(move |place| (set >> (32 * place)) as u32).filter(|&site| site > 0).map(|site| site - 1)
+}
+
+/// A cube, and the bodies that reach it, in ascending order.
+pub(super) type Listed = (Cube, Box<[u32]>);
+
+/// What bodies are taken for.
+#[derive(Debug)]
+pub(super) struct Stage {
+    /// What is inside of all of these is inside of a body all the time.
+    inside: &'static [Kind],
+    /// At any time a body is within one of these.
+    outside: &'static [Kind],
+    /// Cubes that are halved no more, however many bodies reach them, in units of the radius.
+    small: f64,
+    /// Whether what is not settled is in doubt.
+    is_last: bool,
+}
+
+/// Whatever their polytopes are like.
+pub(super) const ANY: Stage = Stage { inside: &[Kind::Inner], outside: &[Kind::Outer], small: 0.2, is_last: false };
+/// Dilations that become the polytopes as they are.
+pub(super) const PRESENT: Stage =
+    Stage { inside: &[Kind::Dilation, Kind::Polytope], outside: &[Kind::Dilation, Kind::Polytope], small: 0.05, is_last: true };
+
+/// Parts of space with all places that more than one body reaches.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn parts(bodies: &Bodies<'_>, budget: &Budget) -> Result<Vec<Listed>, Stopped> {
+    let setting = bodies.setting;
+    let mut halved = vec![(Cube::around(bodies, setting.outer + setting.slack), (0..bodies.polytopes.count()).collect())];
+    let mut parts = Vec::new();
+    while !halved.is_empty() {
+        let halve = |(cube, list): &Listed| {
+            let reaches = |part: &Cube, body: u32| bodies.reaches(ANY.outside, body, part, &bodies.near(body, &part.centre));
+            let part = |number: usize| {
+                let part = cube.part(number);
+                (part, list.iter().copied().filter(|&body| reaches(&part, body)).collect())
+            };
+            (0..8).map(part).collect::<Vec<Listed>>()
+        };
+        budget.cancel.check()?;
+        let next: Vec<Vec<Listed>> = halved.par_iter().map(halve).collect();
+        let all = next.into_iter().flatten().filter(|(_, list)| list.len() > 1);
+        let small: Vec<Listed>;
+        (small, halved) = all.partition(|(cube, list)| list.len() <= MANY || cube.half <= PART * setting.reach);
+        parts.extend(small);
+    }
+    Ok(parts)
+}
+
+/// What is known of a set, wherever it is.
+#[derive(Clone, Copy, Debug)]
+enum Known {
+    /// All are around a place.
+    Meet(Point),
+    /// No such place was found; whether the dilations have a common point.
+    Doubtful(Common),
+}
+
+/// A search in a part of space.
+pub(super) struct Search<'a> {
+    bodies: &'a Bodies<'a>,
+    stage: &'static Stage,
+    known: NameMap<Set, Known>,
+    /// Those that reach the cubes from the part to the one that is looked at, cube after cube, and where its centre is from them.
+    listed: Vec<u32>,
+    near: Vec<Near>,
+    /// Of every body of a cube the hubs in it, bit by bit, and how many hubs there are.
+    hubs: Vec<u64>,
+    count: u32,
+    /// Cubes that were looked at in the part.
+    cubes: usize,
+    found: Found,
+}
+
+/// What a search found in a part of space.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    /// The cubes that are not settled whatever the polytopes are like.
+    pub(super) open: Vec<Listed>,
+    /// The sets in doubt, as the polytopes are, and whether their dilations have a common point.
+    pub(super) doubts: Vec<(Set, Common)>,
+    /// Sets that were asked for.
+    pub(super) asked: usize,
+    /// Whether there was too much to look at, and this is not all.
+    pub(super) is_cut_short: bool,
+}
+
+/// What came of a set in a cube.
+enum Of {
+    Meet,
+    /// They do nothing there, and no set that holds them does.
+    Apart,
+    Doubtful(Common),
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(bodies: &'a Bodies<'a>, stage: &'static Stage) -> Self {
+        let (known, listed, near, hubs) = (NameMap::default(), Vec::new(), Vec::new(), Vec::new());
+        Self { bodies, stage, known, listed, near, hubs, count: 0, cubes: 0, found: Found::default() }
+    }
+
+    /// Looks at a part of space.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn run(&mut self, (cube, list): &Listed, budget: &Budget) -> Result<Found, Stopped> {
+        self.cubes = 0;
+        self.listed.clear();
+        self.listed.extend_from_slice(list);
+        // Of the list as a whole no place is asked for.
+        self.near.clear();
+        self.near.resize(list.len(), Near::default());
+        self.look(cube, 0, budget)?;
+        Ok(std::mem::take(&mut self.found))
+    }
+
+    /// Looks at a cube within one that the bodies reach whose list begins at a place.
+    fn look(&mut self, cube: &Cube, from: usize, budget: &Budget) -> Result<(), Stopped> {
+        budget.cancel.check()?;
+        let (bodies, to) = (self.bodies, self.listed.len());
+        self.cubes += 1;
+        for place in from..to {
+            let body = self.listed[place];
+            let near = bodies.near(body, &cube.centre);
+            if bodies.reaches(self.stage.outside, body, cube, &near) {
+                self.listed.push(body);
+                self.near.push(near);
+            }
+        }
+        if !self.is_settled(cube, to) {
+            for number in 0..8 {
+                self.look(&cube.part(number), to, budget)?;
+            }
+        }
+        self.listed.truncate(to);
+        self.near.truncate(to);
+        Ok(())
+    }
+
+    /// Whether nothing more is to be told of a cube: nothing happens there, or what does was found.
+    fn is_settled(&mut self, cube: &Cube, from: usize) -> bool {
+        let (bodies, inside, reach) = (self.bodies, self.stage.inside, self.bodies.setting.reach);
+        let (list, near) = (&self.listed[from..], &self.near[from..]);
+        if list.len() < 2 || self.found.is_cut_short {
+            return true;
+        }
+        if cube.half <= reach {
+            if list.iter().zip(near).any(|(&body, near)| bodies.covers(inside, body, cube, near)) {
+                return true;
+            }
+            let sum = near.iter().fold([0.0; 3], |sum: Point, near| std::array::from_fn(|axis| sum[axis] + near.way[axis]));
+            let middle = subtract(&cube.centre, &sum.map(|part| part / list.len() as f64));
+            if list.len() <= MANY && bodies.hub(inside, list, middle).is_some() || is_in_a_solid(bodies, cube) {
+                return true;
+            }
+        }
+        let is_wide = list.len() <= MANY && cube.half > WIDE * reach;
+        let is_few = list.len() <= FEW || is_wide;
+        // What is left in doubt of long bodies is parted sooner than cubes along them would tell.
+        let is_small = cube.half <= reach * self.stage.small || is_wide || self.cubes > MOST_CUBES;
+        if !is_few && !is_small {
+            return false;
+        }
+        let list: Box<[u32]> = list.into();
+        if self.are_settled(cube, &list, is_small) {
+            return true;
+        }
+        if !self.stage.is_last {
+            self.found.open.push((*cube, list));
+            return true;
+        }
+        false
+    }
+
+    /// Whether all sets of some bodies do nothing in a cube; where that is told no better in smaller ones, those that do are in doubt.
+    fn are_settled(&mut self, cube: &Cube, list: &[u32], is_small: bool) -> bool {
+        let number = list.len();
+        self.count = 0;
+        self.hubs.clear();
+        self.hubs.resize(number, 0);
+        let mut meet = vec![false; number * number];
+        for second in 0..number {
+            for first in 0..second {
+                let Some(own) = self.may_meet(cube, list, &[first, second], is_small) else { return false };
+                meet[first * number + second] = own;
+            }
+        }
+        for third in 0..number {
+            for second in (0..third).filter(|&second| meet[second * number + third]) {
+                for first in (0..second).filter(|&first| meet[first * number + second] && meet[first * number + third]) {
+                    match self.may_meet(cube, list, &[first, second, third], is_small) {
+                        None => return false,
+                        Some(false) => continue,
+                        Some(true) => {}
+                    }
+                    let is_near = |&fourth: &usize| [first, second, third].iter().all(|&place| meet[place * number + fourth]);
+                    for fourth in (third + 1..number).filter(is_near) {
+                        if self.may_meet(cube, list, &[first, second, third, fourth], is_small).is_none() {
+                            return false;
+                        }
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Whether some of the bodies of a cube, by their places in its list, may have a common place there that is not hidden; none where smaller cubes may tell that they do nothing.
+    fn may_meet(&mut self, cube: &Cube, list: &[u32], places: &[usize], is_small: bool) -> Option<bool> {
+        let common = match self.of(cube, list, places) {
+            Of::Meet => return Some(true),
+            Of::Apart => return Some(false),
+            Of::Doubtful(_) if !self.stage.is_last => return None,
+            Of::Doubtful(common) => common,
+        };
+        // There may be others that hide them, or they may do nothing but elsewhere. Solids hide what is flat, and where cubes would be many.
+        let may_be_settled = !is_small && list.len() > places.len();
+        if may_be_settled && self.bodies.solids.is_empty() {
+            return None;
+        }
+        let set: Vec<u32> = places.iter().map(|&place| list[place]).collect();
+        if self.bodies.is_hidden(&set, common, cube, list) {
+            return Some(false);
+        }
+        if may_be_settled {
+            return None;
+        }
+        self.found.doubts.push((name(&set), common));
+        Some(common != Common::None)
+    }
+
+    /// What some of the bodies of a cube do there.
+    fn of(&mut self, cube: &Cube, list: &[u32], places: &[usize]) -> Of {
+        if places.iter().fold(u64::MAX, |common, &place| common & self.hubs[place]) != 0 || self.found.is_cut_short {
+            return Of::Meet;
+        }
+        let (bodies, stage) = (self.bodies, self.stage);
+        let mut set = [0; MOST_BODIES];
+        set.iter_mut().zip(places).for_each(|(slot, &place)| *slot = list[place]);
+        let set = &set[..places.len()];
+        self.found.asked += 1;
+        self.found.is_cut_short = self.found.asked > MOST_ASKED;
+        let (name, slack) = (name(set), bodies.setting.slack);
+        let mut known = self.known.get(&name).copied();
+        if !matches!(known, Some(Known::Meet(_))) {
+            let within = common_box(cube.ends(), bodies.within(set));
+            if stage.outside.iter().all(|&kind| bodies.common(&[kind], set, within, slack) == Place::Nowhere) {
+                return Of::Apart;
+            }
+        }
+        match *known.get_or_insert_with(|| *self.known.entry(name).or_insert(stage.known(bodies, set))) {
+            Known::Meet(x) => {
+                self.add_hub(list, &x);
+                Of::Meet
+            }
+            Known::Doubtful(common) => Of::Doubtful(common),
+        }
+    }
+
+    /// Adds a hub, if there is room for one.
+    fn add_hub(&mut self, list: &[u32], x: &Point) {
+        if self.count < u64::BITS {
+            for (&body, hubs) in list.iter().zip(&mut self.hubs) {
+                *hubs |= u64::from(self.bodies.is_inside(self.stage.inside, body, x)) << self.count;
+            }
+            self.count += 1;
+        }
+    }
+}
+
+impl Stage {
+    /// What is known of a set wherever it is.
+    fn known(&self, bodies: &Bodies<'_>, set: &[u32]) -> Known {
+        match bodies.common(self.inside, set, bodies.within(set), -bodies.setting.slack) {
+            Place::At(x) => Known::Meet(x),
+            _ => Known::Doubtful(if self.is_last { bodies.common_of_dilations(set) } else { Common::Unknown }),
+        }
+    }
+}
+
+/// Whether all of a cube is inside of a solid.
+fn is_in_a_solid(bodies: &Bodies<'_>, cube: &Cube) -> bool {
+    let [low, high] = cube.ends().map(DVec3::from_array);
+    let is_around = |solid: &crate::solid::Inside<'_>| {
+        solid.across(&AXES.map(DVec3::from_array), low, high).is_none() && solid.winding(DVec3::from_array(cube.centre)) > 0
+    };
+    bodies.solids.iter().any(is_around)
+}
+
+/// What two boxes have in common.
+fn common_box([low, high]: [Point; 2], [from, to]: [Point; 2]) -> [Point; 2] {
+    [std::array::from_fn(|axis| low[axis].max(from[axis])), std::array::from_fn(|axis| high[axis].min(to[axis]))]
+}
