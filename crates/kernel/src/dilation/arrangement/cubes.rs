@@ -1,6 +1,7 @@
 //! Cubes of space, as small as it takes, in which it is told what bodies do: see `nerve`.
 //!
 //! That is up to the bodies that reach a cube. Of most cubes one body holds it all, or a place, a *hub*, is inside of all bodies: both settle a cube as a whole, with all sets of bodies there.
+//! Rounding may leave a crack between cubes; it is narrower than the slack that is asked to spare wherever something is told of a cube, so that places in it are told of, too.
 
 use super::bodies::{AXES, Bodies, Common, Kind, Near};
 use super::ellipsoid::Place;
@@ -8,6 +9,7 @@ use super::figure::Figure;
 use crate::attractor::cell::{Point, between, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
+use crate::solid::Inside;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -18,9 +20,9 @@ const FEW: usize = 8;
 /// Of more bodies one hub for all is not sought. In cubes as wide as this, in units of the radius, that many are few: they are long, and stay beside each other.
 const MANY: usize = 64;
 const WIDE: f64 = 32.0;
-/// Cubes of one part that are looked at, and sets that are asked for there, at most.
-const MOST_CUBES: usize = 50_000;
-const MOST_ASKED: usize = 200_000;
+/// Of one part: cubes that are looked at before those that are left are halved no more, and sets that are asked for at most.
+const CUBES_OF_A_PART: usize = 50_000;
+const ASKED_OF_A_PART: usize = 200_000;
 /// Space is parted until no more than [`MANY`] bodies reach a part, or it is no wider than this in units of the radius.
 const PART: f64 = 4.0;
 
@@ -107,11 +109,11 @@ pub(super) const ANY: Stage = Stage { inside: &[Kind::Inner], outside: &[Kind::O
 pub(super) const PRESENT: Stage =
     Stage { inside: &[Kind::Dilation, Kind::Polytope], outside: &[Kind::Dilation, Kind::Polytope], small: 0.05, is_last: true };
 
-/// Parts of space with all places that more than one body reaches.
+/// Parts of space with all places that more than one body reaches; none where these are more than `most`.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn parts(bodies: &Bodies<'_>, budget: &Budget) -> Result<Vec<Listed>, Stopped> {
+pub(super) fn parts(bodies: &Bodies<'_>, most: usize, budget: &Budget) -> Result<Option<Vec<Listed>>, Stopped> {
     let setting = bodies.setting;
     let mut halved = vec![(Cube::around(bodies, setting.outer + setting.slack), (0..bodies.polytopes.count()).collect())];
     let mut parts = Vec::new();
@@ -130,8 +132,11 @@ pub(super) fn parts(bodies: &Bodies<'_>, budget: &Budget) -> Result<Vec<Listed>,
         let small: Vec<Listed>;
         (small, halved) = all.partition(|(cube, list)| list.len() <= MANY || cube.half <= PART * setting.reach);
         parts.extend(small);
+        if parts.len() + halved.len() > most {
+            return Ok(None);
+        }
     }
-    Ok(parts)
+    Ok(Some(parts))
 }
 
 /// What is known of a set, wherever it is.
@@ -198,7 +203,10 @@ impl<'a> Search<'a> {
         self.near.clear();
         self.near.resize(list.len(), Near::default());
         self.look(cube, 0, budget)?;
-        Ok(std::mem::take(&mut self.found))
+        let mut found = std::mem::take(&mut self.found);
+        found.doubts.sort_unstable_by_key(|&(set, _)| set);
+        found.doubts.dedup_by_key(|&mut (set, _)| set);
+        Ok(found)
     }
 
     /// Looks at a cube within one that the bodies reach whose list begins at a place.
@@ -237,14 +245,14 @@ impl<'a> Search<'a> {
             }
             let sum = near.iter().fold([0.0; 3], |sum: Point, near| std::array::from_fn(|axis| sum[axis] + near.way[axis]));
             let middle = subtract(&cube.centre, &sum.map(|part| part / list.len() as f64));
-            if list.len() <= MANY && bodies.hub(inside, list, middle).is_some() || is_in_a_solid(bodies, cube) {
+            if (list.len() <= MANY && bodies.hub(inside, list, middle).is_some()) || is_in_a_solid(bodies, cube) {
                 return true;
             }
         }
         let is_wide = list.len() <= MANY && cube.half > WIDE * reach;
         let is_few = list.len() <= FEW || is_wide;
         // What is left in doubt of long bodies is parted sooner than cubes along them would tell.
-        let is_small = cube.half <= reach * self.stage.small || is_wide || self.cubes > MOST_CUBES;
+        let is_small = cube.half <= reach * self.stage.small || is_wide || self.cubes > CUBES_OF_A_PART;
         if !is_few && !is_small {
             return false;
         }
@@ -271,6 +279,9 @@ impl<'a> Search<'a> {
                 let Some(own) = self.may_meet(cube, list, &[first, second], is_small) else { return false };
                 meet[first * number + second] = own;
             }
+            if self.is_one_in_all() {
+                return true;
+            }
         }
         for third in 0..number {
             for second in (0..third).filter(|&second| meet[second * number + third]) {
@@ -279,6 +290,10 @@ impl<'a> Search<'a> {
                         None => return false,
                         Some(false) => continue,
                         Some(true) => {}
+                    }
+                    let own = self.hubs[first] & self.hubs[second] & self.hubs[third];
+                    if self.hubs[third + 1..].iter().fold(own, |own, hubs| own & hubs) != 0 {
+                        continue;
                     }
                     let is_near = |&fourth: &usize| [first, second, third].iter().all(|&place| meet[place * number + fourth]);
                     for fourth in (third + 1..number).filter(is_near) {
@@ -326,11 +341,11 @@ impl<'a> Search<'a> {
         set.iter_mut().zip(places).for_each(|(slot, &place)| *slot = list[place]);
         let set = &set[..places.len()];
         self.found.asked += 1;
-        self.found.is_cut_short = self.found.asked > MOST_ASKED;
+        self.found.is_cut_short = self.found.asked > ASKED_OF_A_PART;
         let (name, slack) = (name(set), bodies.setting.slack);
         let mut known = self.known.get(&name).copied();
         if !matches!(known, Some(Known::Meet(_))) {
-            let within = common_box(cube.ends(), bodies.within(set));
+            let within = overlap(cube.ends(), bodies.within(set));
             if stage.outside.iter().all(|&kind| bodies.common(&[kind], set, within, slack) == Place::Nowhere) {
                 return Of::Apart;
             }
@@ -342,6 +357,11 @@ impl<'a> Search<'a> {
             }
             Known::Doubtful(common) => Of::Doubtful(common),
         }
+    }
+
+    /// Whether one hub is in all bodies of the list.
+    fn is_one_in_all(&self) -> bool {
+        self.hubs.iter().fold(u64::MAX, |common, hubs| common & hubs) != 0
     }
 
     /// Adds a hub, if there is room for one.
@@ -368,13 +388,13 @@ impl Stage {
 /// Whether all of a cube is inside of a solid.
 fn is_in_a_solid(bodies: &Bodies<'_>, cube: &Cube) -> bool {
     let [low, high] = cube.ends().map(DVec3::from_array);
-    let is_around = |solid: &crate::solid::Inside<'_>| {
+    let is_around = |solid: &Inside<'_>| {
         solid.across(&AXES.map(DVec3::from_array), low, high).is_none() && solid.winding(DVec3::from_array(cube.centre)) > 0
     };
     bodies.solids.iter().any(is_around)
 }
 
 /// What two boxes have in common.
-fn common_box([low, high]: [Point; 2], [from, to]: [Point; 2]) -> [Point; 2] {
+fn overlap([low, high]: [Point; 2], [from, to]: [Point; 2]) -> [Point; 2] {
     [std::array::from_fn(|axis| low[axis].max(from[axis])), std::array::from_fn(|axis| high[axis].min(to[axis]))]
 }

@@ -1,7 +1,7 @@
 //! What polytopes stand around: points, segments, which collinear ones are joined to, and convex polygons, which coplanar triangles are joined to where they can be.
 //!
 //! The dilation of a union is the union of the dilations, and that of a convex polygon is convex as that of a triangle: so a polygon stands for its triangles, and a segment for its parts, and no bound, nor what is known of the
-//! topology, changes. What changes is that there are fewer bodies: the sets of them that `nerve` looks at grow with the fourth power of how many are near to each other.
+//! topology, changes. What changes is that there are fewer bodies, and fewer of them near to each other.
 
 use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 
 /// Cubes one after the other, and parts of space, or cubes, that are looked at before what was found is counted.
 const IN_A_ROW: usize = 64;
-const AT_A_TIME: usize = 1_024;
+const AT_A_TIME: usize = 512;
 /// Cubes that are up to the polytopes at most, as a mean over the sites, and in any case: they take as much memory as a site's triangles.
 const MOST_CUBES: usize = 100;
 const FEW_CUBES: usize = 100_000;
@@ -43,7 +43,7 @@ pub(super) struct Doubt {
 type Doubts = Vec<(Set, Common)>;
 
 /// What is known of the sets of sites, while polytopes change.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Sets {
     /// The cubes that are up to the polytopes.
     cubes: Vec<Listed>,
@@ -59,7 +59,8 @@ impl Sets {
     pub(super) fn new(bodies: &Bodies<'_>, budget: &Budget) -> Result<Option<Self>, Stopped> {
         let most = MOST_CUBES * bodies.figures.len() + FEW_CUBES;
         let (mut cubes, mut left) = (Vec::new(), most_asked(bodies));
-        for parts in cubes::parts(bodies, budget)?.chunks(AT_A_TIME) {
+        let Some(parts) = cubes::parts(bodies, most, budget)? else { return Ok(None) };
+        for parts in parts.chunks(AT_A_TIME) {
             let look = |part: &Listed| Search::new(bodies, &ANY).run(part, budget);
             for Found { open, asked, is_cut_short, .. } in parts.par_iter().map(look).collect::<Result<Vec<_>, Stopped>>()? {
                 cubes.extend(open);
@@ -91,7 +92,10 @@ impl Sets {
                     if listed.1.iter().any(|&body| changed[body as usize]) {
                         let Found { doubts: found, asked, is_cut_short, .. } = search.run(listed, budget)?;
                         *doubts = found;
-                        all = if is_cut_short { usize::MAX } else { asked.saturating_add(all) };
+                        all += asked;
+                        if is_cut_short {
+                            return Ok(usize::MAX);
+                        }
                     }
                 }
                 Ok(all)
