@@ -113,10 +113,9 @@ impl Bodies<'_> {
 
     /// Whether all of a cube is inside of all kinds of a body.
     pub(super) fn covers(&self, kinds: &[Kind], body: u32, cube: &Cube, near: &Near) -> bool {
-        let slack = self.setting.slack;
-        let is_inside = |x: &Point| kinds.iter().all(|&kind| self.above(kind, body, x).0 < -slack);
+        let is_centre_inside = kinds.iter().all(|&kind| self.above_centre(kind, body, cube, near).0 < -self.setting.slack);
         // What is convex and holds the corners holds all.
-        kinds.iter().all(|&kind| self.above_centre(kind, body, cube, near).0 < -slack) && cube.corners().all(|corner| is_inside(&corner))
+        is_centre_inside && cube.corners().all(|corner| self.is_inside(kinds, body, &corner))
     }
 
     /// Whether a place is surely inside of all kinds of a body.
@@ -124,15 +123,17 @@ impl Bodies<'_> {
         kinds.iter().all(|&kind| self.above(kind, body, x).0 < -self.setting.slack)
     }
 
+    /// How far a place is beyond the one of some bodies that it is farthest from, as [`Bodies::above`] tells.
+    fn farthest(&self, kind: Kind, set: &[u32], x: &Point) -> Option<(f64, Point)> {
+        set.iter().map(|&body| self.above(kind, body, x)).reduce(higher)
+    }
+
     /// A place inside of all kinds of some bodies, if one is met on the way from x, step by step to where the one that it is farthest from is.
     pub(super) fn hub(&self, kinds: &[Kind], set: &[u32], mut x: Point) -> Option<Point> {
         let Setting { reach, slack, .. } = *self.setting;
         let mut depth = DEPTHS[0] * reach;
         for _ in 0..STEPS {
-            let beyond = |&kind: &Kind| {
-                let farthest = set.iter().map(|&body| self.above(kind, body, &x)).reduce(higher);
-                farthest.filter(|&(above, _)| above >= -slack)
-            };
+            let beyond = |&kind: &Kind| self.farthest(kind, set, &x).filter(|&(above, _)| above >= -slack);
             let Some((above, away)) = kinds.iter().find_map(beyond) else { return Some(x) };
             x = std::array::from_fn(|axis| x[axis] - (above + depth) * away[axis]);
             depth = (0.5 * depth).max(DEPTHS[1] * reach);
@@ -143,11 +144,8 @@ impl Bodies<'_> {
     /// Where in a box all kinds of some bodies have a common point: with some room around it, or with some to spare.
     pub(super) fn common(&self, kinds: &[Kind], set: &[u32], within: [Point; 2], spare: f64) -> Place {
         common_point(within, |x| {
-            let beyond = |&kind: &Kind| {
-                let farthest = set.iter().map(|&body| self.above(kind, body, x)).reduce(higher);
-                farthest.filter(|&(above, _)| above > spare).map(|(above, away)| (above - spare, away))
-            };
-            kinds.iter().find_map(beyond)
+            let beyond = |&kind: &Kind| self.farthest(kind, set, x).filter(|&(above, _)| above > spare);
+            kinds.iter().find_map(beyond).map(|(above, away)| (above - spare, away))
         })
     }
 
@@ -171,8 +169,7 @@ impl Bodies<'_> {
         if part(known) {
             return Vec::new();
         }
-        let beyond = |x: &Point| set.iter().map(|&body| self.above(Kind::Dilation, body, x)).reduce(higher);
-        let lowest = lowest(within, |x| beyond(x).unwrap_or((0.0, [0.0; 3])));
+        let lowest = lowest(within, |x| self.farthest(Kind::Dilation, set, x).unwrap_or((0.0, [0.0; 3])));
         let Some((x, gap)) = lowest.filter(|&(_, gap)| gap > LEAST_GAP * slack) else { return Vec::new() };
         let plane = |(place, &body): (usize, &u32)| {
             let figure = &self.figures[body as usize];

@@ -131,7 +131,7 @@ impl Ellipsoid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attractor::cell::subtract;
+    use crate::attractor::cell::{closest_on_segment, cross, subtract, unit};
     use crate::dilation::arrangement::bodies::highest;
     use crate::dilation::arrangement::polytopes::Plane;
     use crate::split_mix::Random;
@@ -199,15 +199,15 @@ mod tests {
         let spare = 2e-11;
         for round in 0..600 {
             let gap = [0.0, -1e-9, -1e-7, 1e-9, 1e-7][round % 5];
-            let mut way = || -> Point { crate::attractor::cell::unit(&std::array::from_fn(|_| 2.0 * random.share() - 1.0)) };
+            let mut way = || -> Point { unit(&std::array::from_fn(|_| 2.0 * random.share() - 1.0)) };
             let (first, second) = (way(), way());
-            let across = crate::attractor::cell::unit(&crate::attractor::cell::cross(&first, &second));
+            let across = unit(&cross(&first, &second));
             let length = [100.0, 1e4][round / 5 % 2];
             let end = |way: &Point, off: f64, along: f64| -> Point { std::array::from_fn(|axis| along * way[axis] + off * across[axis]) };
             let tubes = [(first, 0.0), (second, 2.0 + gap)].map(|(way, off)| [end(&way, off, -0.4 * length), end(&way, off, 0.6 * length)]);
             let above = |x: &Point, spare: f64| {
                 let of = |[a, b]: &[Point; 2]| {
-                    let way = subtract(x, &crate::attractor::cell::closest_on_segment(x, a, b));
+                    let way = subtract(x, &closest_on_segment(x, a, b));
                     let distance = dot(&way, &way).sqrt();
                     (distance - 1.0 - spare, way.map(|part| part / distance))
                 };

@@ -398,13 +398,13 @@ impl Arrangement<'_> {
     /// Pieces of a polytope's edges, and of the lines where it meets later ones.
     fn of(&self, index: u32, scratch: &mut Scratch) {
         let edges = &self.polytopes.structure(index).edges;
-        if !edges.iter().any(|edge| edge.facets.iter().any(|&facet| self.is_seen(index, facet))) {
+        scratch.is_gone.clear();
+        scratch.is_gone.extend(edges.iter().map(|edge| !edge.facets.iter().any(|&facet| self.is_seen(index, facet))));
+        if !scratch.is_gone.contains(&false) {
             return;
         }
         scratch.cuts.resize_with(edges.len().max(scratch.cuts.len()), Vec::new);
         scratch.cuts.iter_mut().for_each(Vec::clear);
-        scratch.is_gone.clear();
-        scratch.is_gone.extend(edges.iter().map(|edge| !edge.facets.iter().any(|&facet| self.is_seen(index, facet))));
         scratch.recent.clear();
         scratch.recent.extend(self.met[index as usize].iter().map(|&index| Third { index, parting: 0 }));
         for &other in &self.met[index as usize] {
