@@ -4,7 +4,7 @@
 //! the dilations, without a common point: polytopes that are cut by these have none either, however coarse they are, and still are around the dilations if they were. So polytopes only become finer where rounding does not let the planes be told apart.
 
 use super::bodies::{Bodies, Common};
-use super::figure::Figure;
+use super::figure::{Figure, Outline};
 use super::form::{Form, Kind};
 use super::nerve::{Doubt, Sets};
 use super::pieces::{self, Lists};
@@ -169,9 +169,12 @@ impl<'a> Engine<'a> {
         let (figure, beyond) = (&self.sites[index], &self.beyond[index]);
         let shell = self.setting.shell(figure, state);
         let seed = (self.trial << 8 | state.number()) << 32 | index as u64;
-        if figure.polygon().is_some() {
-            // Planes may meet in a point by chance, not again and again.
-            return (0..TRIALS).find_map(|trial| Polytope::around(figure, beyond, shell, seed ^ trial << 48));
+        // Planes may meet in a point by chance, not again and again.
+        let mut seeds = (0..TRIALS).map(|trial| seed ^ trial << 48);
+        match &figure.outline {
+            Outline::Polygon(_) => return seeds.find_map(|seed| Polytope::around(figure, beyond, shell, seed)),
+            Outline::Polyhedron(polyhedron) => return seeds.find_map(|seed| Polytope::enclosing(polyhedron, shell, seed)),
+            Outline::Point(_) | Outline::Segment(_) => {}
         }
         let most = self.setting.shell(figure, State::default()).outer;
         let cut = Cut { beyond: [beyond[0], beyond[1]], most };

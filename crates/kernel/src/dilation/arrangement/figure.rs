@@ -1,8 +1,9 @@
-//! What polytopes stand around: points, segments, which collinear ones are joined to, and convex polygons, which coplanar triangles are joined to where they can be.
+//! What polytopes stand around: points, segments, which collinear ones are joined to, convex polygons, which coplanar triangles are joined to where they can be, and convex polyhedra (see `polyhedron`).
 //!
 //! The dilation of a union is the union of the dilations, and that of a convex polygon is convex as that of a triangle: so a polygon stands for its triangles, and a segment for its parts, and no bound, nor what is known of the
 //! topology, changes. What changes is that there are fewer bodies, and fewer of them near to each other.
 
+use super::polyhedron::Polyhedron;
 use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -35,6 +36,7 @@ pub(super) enum Outline {
     Point(Point),
     Segment([Point; 2]),
     Polygon(Polygon),
+    Polyhedron(Polyhedron),
 }
 
 /// A convex polygon.
@@ -50,10 +52,12 @@ pub(super) struct Polygon {
 
 impl From<Weighted> for Figure {
     fn from(Weighted { site, deficit }: Weighted) -> Self {
+        // Zeros have two signs: places that are the same have the same bits.
+        let place = |at: Point| at.map(|x| x + 0.0);
         let outline = match site {
-            Site::Point(at) => Outline::Point(at),
-            Site::Segment(ends) => Outline::Segment(ends),
-            Site::Triangle(corners) => Outline::Polygon(Polygon::new(Box::new(corners))),
+            Site::Point(at) => Outline::Point(place(at)),
+            Site::Segment(ends) => Outline::Segment(ends.map(place)),
+            Site::Triangle(corners) => Outline::Polygon(Polygon::new(Box::new(corners.map(place)))),
         };
         Self { outline, deficit }
     }
@@ -66,6 +70,7 @@ impl Figure {
             Outline::Point(at) => std::slice::from_ref(at),
             Outline::Segment(ends) => ends,
             Outline::Polygon(polygon) => &polygon.corners,
+            Outline::Polyhedron(polyhedron) => &polyhedron.corners,
         }
     }
 
@@ -82,12 +87,13 @@ impl Figure {
         }
     }
 
-    /// About the area of its dilation by a radius: that of both sides of a polygon, around a segment, or of a ball.
+    /// About the area of its dilation by a radius: that of a polyhedron, or of both sides of a polygon, around a segment, or of a ball.
     pub(super) fn area(&self, radius: f64) -> f64 {
         match &self.outline {
             Outline::Point(_) => 2.0 * TAU * radius * radius,
             Outline::Segment([a, b]) => TAU * radius * distance_squared(a, b).sqrt(),
             Outline::Polygon(polygon) => polygon.double(),
+            Outline::Polyhedron(polyhedron) => polyhedron.area(),
         }
     }
 
@@ -118,6 +124,7 @@ impl Convex for Figure {
             Outline::Point(at) => *at,
             Outline::Segment([a, b]) => closest_on_segment(x, a, b),
             Outline::Polygon(polygon) => polygon.closest(x),
+            Outline::Polyhedron(polyhedron) => polyhedron.closest(x),
         }
     }
 
@@ -250,12 +257,33 @@ fn turn(up: &Point, before: &Point, corner: &Point, after: &Point, flatness: f64
 }
 
 /// A side of a polygon, or an end of a segment as one of no length.
-struct Side {
+pub(super) struct Side {
     /// In single precision: sides that are as long but for rounding are taken in the order of their places, by which polygons grow side by side.
     length: f32,
     /// In ascending order, whichever way the polygon goes.
-    ends: [Point; 2],
-    figure: u32,
+    pub(super) ends: [Point; 2],
+    pub(super) figure: u32,
+}
+
+impl Side {
+    /// Those of some figures, the longest first, and those between the same ends one after the other.
+    pub(super) fn of_all(figures: &[Figure]) -> Vec<Self> {
+        let mut sides = Vec::new();
+        for (index, figure) in (0..).zip(figures) {
+            let mut add = |[from, to]: [Point; 2]| {
+                let ends = if order(&from, &to).is_lt() { [from, to] } else { [to, from] };
+                sides.push(Self { length: distance_squared(&from, &to).sqrt() as f32, ends, figure: index });
+            };
+            match &figure.outline {
+                Outline::Point(_) | Outline::Polyhedron(_) => {}
+                Outline::Segment(ends) => ends.iter().for_each(|end| add([*end; 2])),
+                Outline::Polygon(polygon) => polygon.sides().for_each(add),
+            }
+        }
+        let place = |a: &Self, b: &Self| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
+        sides.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then_with(|| place(a, b)).then(a.figure.cmp(&b.figure)));
+        sides
+    }
 }
 
 /// The order of places: along the first axis, then the others.
@@ -269,34 +297,12 @@ pub(super) fn order(a: &Point, b: &Point) -> Ordering {
 /// # Errors
 /// [`Stopped`].
 pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, within: f64, budget: &Budget) -> Result<Vec<Figure>, Stopped> {
-    for figure in &mut figures {
-        let corners: &mut [Point] = match &mut figure.outline {
-            Outline::Point(at) => std::slice::from_mut(at),
-            Outline::Segment(ends) => ends,
-            Outline::Polygon(polygon) => &mut polygon.corners,
-        };
-        // Zeros have two signs.
-        corners.iter_mut().flatten().for_each(|x| *x += 0.0);
-    }
     for _ in 0..ROUNDS {
         budget.cancel.check()?;
-        let mut sides = Vec::new();
-        for (index, figure) in (0..).zip(&figures) {
-            let mut add = |[from, to]: [Point; 2]| {
-                let ends = if order(&from, &to).is_lt() { [from, to] } else { [to, from] };
-                sides.push(Side { length: distance_squared(&from, &to).sqrt() as f32, ends, figure: index });
-            };
-            match &figure.outline {
-                Outline::Point(_) => {}
-                Outline::Segment(ends) => ends.iter().for_each(|end| add([*end; 2])),
-                Outline::Polygon(polygon) => polygon.sides().for_each(add),
-            }
-        }
-        let same = |a: &Side, b: &Side| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
-        sides.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then_with(|| same(a, b)).then(a.figure.cmp(&b.figure)));
+        let sides = Side::of_all(&figures);
         let mut is_taken = vec![false; figures.len()];
         let mut gone = vec![false; figures.len()];
-        for around in sides.chunk_by(|a, b| same(a, b).is_eq()).filter(|around| around.len() <= MOST_AT_A_SIDE) {
+        for around in sides.chunk_by(|a, b| a.ends == b.ends).filter(|around| around.len() <= MOST_AT_A_SIDE) {
             for (place, one) in around.iter().enumerate() {
                 for other in &around[place + 1..] {
                     let [own, theirs] = [one, other].map(|side| side.figure as usize);

@@ -1,7 +1,8 @@
-//! The polytope of a convex polygon.
+//! The polytopes of convex polygons and polyhedra.
 
 use super::figure::{Figure, Polygon};
 use super::joints;
+use super::polyhedron::Polyhedron;
 use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, frame, height, meeting, normal, share};
 use super::structure::Structure;
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
@@ -16,6 +17,10 @@ pub(super) const CORNER_SHARE: f64 = 0.25;
 const LEAST_COSINE: f64 = 0.7;
 /// Corners nearer to a plane than this, in units of the radius, are not told apart from it.
 pub(super) const NOISE: f64 = 1e-9;
+/// Faces of a polyhedron have one facet where the cosine of the angle between them is more than this.
+const SAME_FACE: f64 = 0.999_999;
+/// How far facets along a polyhedron's faces are lifted, in units of the band: where none are, there are up to a fifth more triangles, where they are as much as those along polygons, up to a third.
+const FACE_LIFT: f64 = 0.1;
 /// The facets along the polygon come first.
 const FACES: usize = 2;
 
@@ -23,6 +28,8 @@ const FACES: usize = 2;
 struct Hull {
     planes: Vec<Plane>,
     corners: Vec<(Point, [u16; 3])>,
+    /// The squares of how far corners are from the figure, as far as that was asked: those of the last ones are missing.
+    squares: Vec<f64>,
 }
 
 impl Polytope {
@@ -57,17 +64,34 @@ impl Polytope {
                 hull.cut(&direction, dot(&direction, corner) + offset(hull.planes.len()), noise)?;
             }
         }
-        loop {
-            let far = hull.corners.iter().map(|(corner, _)| (distance_squared(corner, &polygon.closest(corner)), corner));
-            let (square, corner) = far.max_by(|p, q| p.0.total_cmp(&q.0))?;
-            if square < shell.outer * shell.outer {
-                break;
-            }
-            let (corner, touched) = (*corner, polygon.closest(corner));
-            let direction = subtract(&corner, &touched).map(|part| part / square.sqrt());
-            hull.cut(&direction, dot(&direction, &touched) + offset(hull.planes.len()), noise)?;
-        }
+        hull.cut_corners(|x| polygon.closest(x), shell.outer, offset, noise)?;
         hull.finish(&origin, joints::planes(figure, beyond), noise)
+    }
+
+    /// The polytope of a polyhedron in its shell, likewise: it begins with a cuboid, and has facets along the faces, a little farther out than they must be.
+    pub(super) fn enclosing(polyhedron: &Polyhedron, shell: Shell, seed: u64) -> Option<Self> {
+        let origin = polyhedron.corners[0];
+        let polyhedron = polyhedron.from(&origin);
+        let room = SHIFT * (shell.outer - shell.inner);
+        let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
+        let offset = |facet: usize| all + OWN_SHIFT * room * share(seed, 1 + facet as u64);
+        let noise = NOISE * shell.outer;
+        let mut normals: Vec<Point> = Vec::new();
+        for up in polyhedron.normals() {
+            if normals.iter().all(|other| dot(other, &up) < SAME_FACE) {
+                normals.push(up);
+            }
+        }
+        let [x, y, up] = frame(normals.first()?);
+        let lift = FACE_LIFT * (shell.outer - shell.inner);
+        let of_cuboid = |facet: usize| offset(facet) + if facet == 0 { lift } else { 0.0 };
+        let mut hull = Hull::upright(&polyhedron.corners, &up, &[x, y, x.map(|part| -part), y.map(|part| -part)], of_cuboid)?;
+        for up in &normals[1..] {
+            let support = polyhedron.corners.iter().map(|corner| dot(up, corner)).fold(f64::NEG_INFINITY, f64::max);
+            hull.cut(up, support + offset(hull.planes.len()) + lift, noise)?;
+        }
+        hull.cut_corners(|x| polyhedron.closest(x), shell.outer, offset, noise)?;
+        hull.finish(&origin, Box::default(), noise)
     }
 }
 
@@ -119,7 +143,7 @@ impl Hull {
     /// Both faces, and a facet across the polygon at some of its sides.
     fn prism(polygon: &Polygon, sides: &[usize], offset: impl Fn(usize) -> f64) -> Option<Self> {
         let out: Vec<Point> = sides.iter().map(|&side| polygon.outward[side]).collect();
-        Self::upright(polygon, &polygon.up, &out, offset)
+        Self::upright(&polygon.corners, &polygon.up, &out, offset)
     }
 
     /// A cuboid around a polygon, along its longest way from corner to corner.
@@ -132,17 +156,17 @@ impl Hull {
         let length = right.hypot(up);
         let up = if length > 0.0 { std::array::from_fn(|axis| (right * x[axis] + up * y[axis]) / length) } else { y };
         let across = cross(&up, &along);
-        Self::upright(polygon, &up, &[along, across, along.map(|x| -x), across.map(|x| -x)], offset)
+        Self::upright(&polygon.corners, &up, &[along, across, along.map(|x| -x), across.map(|x| -x)], offset)
     }
 
-    /// Two faces, across a direction, and facets beside them, across others, all around the polygon, in their order.
-    fn upright(polygon: &Polygon, up: &Point, out: &[Point], offset: impl Fn(usize) -> f64) -> Option<Self> {
+    /// Two faces, across a direction, and facets beside them, across others, all around some corners, in their order.
+    fn upright(corners: &[Point], up: &Point, out: &[Point], offset: impl Fn(usize) -> f64) -> Option<Self> {
         let (count, mut planes) = (out.len(), Vec::<Plane>::new());
         for direction in [*up, up.map(|part| -part)].iter().chain(out) {
-            let support = polygon.corners.iter().map(|corner| dot(direction, corner)).fold(f64::NEG_INFINITY, f64::max);
+            let support = corners.iter().map(|corner| dot(direction, corner)).fold(f64::NEG_INFINITY, f64::max);
             planes.push([direction[0], direction[1], direction[2], support + offset(planes.len())]);
         }
-        let mut hull = Self { planes, corners: Vec::new() };
+        let mut hull = Self { planes, corners: Vec::new(), squares: Vec::new() };
         for face in 0..FACES {
             for side in 0..count {
                 let facets = [face, FACES + side, FACES + (side + 1) % count].map(|facet| facet as u16);
@@ -156,6 +180,22 @@ impl Hull {
         let planes = facets.map(|facet| &self.planes[usize::from(facet)]);
         let normals = planes.map(normal);
         meeting([&normals[0], &normals[1], &normals[2]], planes.map(|plane| plane[3]))
+    }
+
+    /// Cuts off what is farther than `outer` from a figure, by planes across the ways to the corners that are farthest from it, until nothing is.
+    fn cut_corners(&mut self, closest: impl Fn(&Point) -> Point, outer: f64, offset: impl Fn(usize) -> f64, noise: f64) -> Option<()> {
+        loop {
+            let known = self.squares.len();
+            self.squares.extend(self.corners[known..].iter().map(|(corner, _)| distance_squared(corner, &closest(corner))));
+            let (place, &square) = self.squares.iter().enumerate().max_by(|p, q| p.1.total_cmp(q.1))?;
+            if square < outer * outer {
+                return Some(());
+            }
+            let corner = self.corners[place].0;
+            let touched = closest(&corner);
+            let direction = subtract(&corner, &touched).map(|part| part / square.sqrt());
+            self.cut(&direction, dot(&direction, &touched) + offset(self.planes.len()), noise)?;
+        }
     }
 
     /// Cuts off what is beyond a plane. Corners of a simple polytope are neighbours if they have two facets in common.
@@ -179,6 +219,8 @@ impl Hull {
                 }
             }
         }
+        let mut height = heights.iter();
+        self.squares.retain(|_| height.next().is_some_and(|height| *height < 0.0));
         let mut height = heights.iter();
         self.corners.retain(|_| height.next().is_some_and(|height| *height < 0.0));
         self.corners.extend(made);

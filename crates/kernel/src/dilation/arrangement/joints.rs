@@ -48,9 +48,8 @@ pub(super) fn cuts(
     budget: &Budget,
 ) -> Result<Vec<[Option<f64>; 2]>, Stopped> {
     let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
-    for (site, figure) in (0..).zip(sites).filter(|(_, figure)| !matches!(figure.outline, Outline::Polygon(_))) {
-        // Zeros have two signs.
-        let [first, second] = ordered(figure).map(|at| at.map(|x| x + 0.0));
+    for (site, figure) in (0..).zip(sites).filter(|(_, figure)| matches!(figure.outline, Outline::Point(_) | Outline::Segment(_))) {
+        let [first, second] = ordered(figure);
         if first == second {
             ends.push(End { at: first, site, end: None });
         } else {

@@ -19,6 +19,7 @@ mod index;
 mod joints;
 mod nerve;
 mod pieces;
+mod polyhedron;
 mod polytopes;
 mod solids;
 mod structure;
@@ -35,7 +36,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 use engine::{Engine, Forms, Run, State, TRIALS};
-use figure::Figure;
+use figure::{Figure, Outline};
 use form::Kind;
 pub(super) use index::Index;
 use pieces::{Body, Lists};
@@ -94,15 +95,18 @@ impl<'a> Arrangement<'a> {
         let Some(mut sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
         let shell = |figure: &Figure| setting.shell(figure, State::default());
         let band = sites.list.iter().map(shell).map(|shell| shell.outer - shell.inner).fold(f64::INFINITY, f64::min);
+        let least = |figure: &Figure| figure.in_space(setting.least);
+        sites.list = polyhedron::closed(sites.list, least, FLATNESS * setting.slack, budget)?;
         sites.list = figure::joined(sites.list, FLATNESS * setting.slack, hull::CORNER_SHARE * band, budget)?;
         let forms = Forms::default();
         let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
-        let scales = if sites.list.iter().any(|figure| figure.polygon().is_none() && polytopes::kind(figure) == Kind::Rod) {
-            let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
-            [form.covering.reach, form.covering.girth]
-        } else {
-            [1.0; 2]
-        };
+        let scales =
+            if sites.list.iter().any(|figure| matches!(figure.outline, Outline::Segment(_)) && polytopes::kind(figure) == Kind::Rod) {
+                let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
+                [form.covering.reach, form.covering.girth]
+            } else {
+                [1.0; 2]
+            };
         for (beyond, cut) in beyond
             .iter_mut()
             .zip(joints::cuts(&sites.list, FLATNESS * setting.slack, scales, shell, budget)?)

@@ -435,6 +435,36 @@ fn panels_keep_their_bounds_and_agree_with_the_lattice() {
     assert!(compared > 18 && left < 4, "{compared} compared, {left} left to the lattice");
 }
 
+/// The faces of tetrahedra, which what is thickened fills: each is one body, and bounds and topology are those of faces.
+#[test]
+fn tetrahedra_are_one_body_each() {
+    let mut random = Random(71);
+    for round in 0..8_u32 {
+        let (count, mut vertices, mut faces) = (10 + 6 * round, Vec::new(), Vec::new());
+        for k in 0..count {
+            let at = place(&mut random, 8.0);
+            vertices.extend([at; 4].map(|at| at + place(&mut random, 2.2)));
+            faces.extend([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(|face| face.map(|corner| 4 * k + corner).to_vec()));
+        }
+        let (radius, tolerance) = (0.6, [0.06, 0.02][round as usize % 2]);
+        let shape = lowered(&vertices, faces.clone());
+        let bodies = with_arrangement(&shape, radius, tolerance, |arrangement| arrangement.sites.list.len());
+        assert_eq!(bodies, count as usize, "{round}");
+        let dilation = arranged(&shape, radius, tolerance);
+        assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
+        let inside = Inside::new(dilation.solid.mesh());
+        for _ in 0..300 {
+            let x = place(&mut random, 11.5) - DVec3::splat(0.7);
+            assert_bounds(round, &inside, &dilation, radius, x, distance_of_triangles(x, &vertices, &faces));
+        }
+        let other = on_lattice(&shape, radius, tolerance);
+        assert!(dilation.topology_exact && other.topology_exact, "{round}");
+        assert_eq!(topology(&dilation), topology(&other), "{round}");
+        let triangles = [&dilation, &other].map(|made| made.solid.mesh().triangles.len());
+        assert!(triangles[0] < triangles[1], "{round}: {triangles:?}");
+    }
+}
+
 /// The six faces of a block between two corners, outwards, with its corners from a number on.
 fn block(first: u32, low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<Vec<u32>>) {
     let corner = |k: u32| low + (high - low) * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
