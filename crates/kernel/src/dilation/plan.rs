@@ -446,7 +446,7 @@ impl<'a> Plan<'a> {
 
     /// The dilation by the union of polytopes around points, segments and polygons, where that serves better than a lattice.
     pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
-        let Some(arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
+        let Some(mut arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
         let allowed = budget.limits.triangles;
         let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed };
         if arrangement.leaves() > budget.limits.cells {

@@ -118,8 +118,12 @@ impl<'a> Engine<'a> {
         }
     }
 
+    /// What comes of the polytopes that there are, or of the first ones.
+    ///
+    /// # Errors
+    /// [`Stopped`].
     pub(super) fn run(&mut self, budget: &Budget) -> Result<Run, Stopped> {
-        if !self.begin(budget)? {
+        if self.polytopes.all.is_empty() && !self.begin(budget)? {
             return Ok(Run::Open);
         }
         let Some(mut sets) = Sets::new(&self.bodies(), budget)? else { return Ok(Run::Doubtful) };

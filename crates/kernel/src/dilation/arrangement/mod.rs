@@ -40,7 +40,7 @@ use figure::{Figure, Outline};
 use form::Kind;
 pub(super) use index::Index;
 use pieces::{Body, Lists};
-use polytopes::MOST_POLYTOPES;
+use polytopes::{MOST_POLYTOPES, Polytopes};
 
 /// The mean square of the number of neighbours at most: lines are cut by all of them.
 const MOST_NEAR: usize = 40_000;
@@ -64,6 +64,8 @@ pub(super) struct Arrangement<'a> {
     beyond: Vec<Box<[Option<f64>]>>,
     near: Lists,
     forms: Forms,
+    /// Those that a first trial begins with.
+    polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites.
     solids: Vec<TriMesh>,
     /// About how many triangles will be made.
@@ -127,8 +129,11 @@ impl<'a> Arrangement<'a> {
         let solids = rule.attractor().surfaces();
         // About half of what is around the faces of solids is inside of these.
         let inside = 0.5 * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
-        let mut arrangement = Self { setting, sites, beyond, near, forms, solids, triangles: 0.0 };
-        arrangement.triangles = (1.0 - inside) * arrangement.expected_triangles(budget)?;
+        let mut arrangement = Self { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), solids, triangles: 0.0 };
+        let mut engine = Engine::new(&arrangement, 0, &[]);
+        let Engine { polytopes, .. } = if engine.begin(budget)? { engine } else { return Ok(None) };
+        arrangement.polytopes = polytopes;
+        arrangement.triangles = (1.0 - inside) * arrangement.expected_triangles();
         let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
         Ok(fits.then_some(arrangement))
     }
@@ -138,30 +143,26 @@ impl<'a> Arrangement<'a> {
         self.sites.leaves
     }
 
-    /// About how many triangles will be made, from a sample of the polytopes; infinitely many where there is no polytope.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    fn expected_triangles(&self, budget: &Budget) -> Result<f64, Stopped> {
-        let mut engine = Engine::new(self, 0, &[]);
-        if !engine.begin(budget)? {
-            return Ok(f64::INFINITY);
-        }
+    /// About how many triangles will be made, from a sample of the polytopes.
+    fn expected_triangles(&self) -> f64 {
         let count = self.sites.list.len();
         let step = count.div_ceil(SAMPLE).max(1);
         let sample: Vec<u32> = (0..count as u32).step_by(step).collect();
-        let triangles = pieces::count(&engine.polytopes, &self.near, &sample);
-        Ok(triangles as f64 * count as f64 / sample.len() as f64)
+        let triangles = pieces::count(&self.polytopes, &self.near, &sample);
+        triangles as f64 * count as f64 / sample.len() as f64
     }
 
     /// The boundary of the union of polytopes; `None` where none could be found.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn run(&self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+    pub(super) fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+        let mut first = std::mem::take(&mut self.polytopes);
         let solids: Vec<Inside<'_>> = self.solids.iter().map(Inside::new).collect();
         for trial in 0..TRIALS {
-            match Engine::new(self, trial, &solids).run(budget)? {
+            let mut engine = Engine::new(self, trial, &solids);
+            engine.polytopes = std::mem::take(&mut first);
+            match engine.run(budget)? {
                 Run::Done(mut arranged) => {
                     if !solids::leave_out(&solids, &mut arranged.surface) {
                         break;
