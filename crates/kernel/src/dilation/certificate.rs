@@ -182,8 +182,9 @@ pub(super) struct Nearby {
     /// Corners of the star with the sites within reach.
     marked: Vec<Marked>,
     pieces: Vec<[Marked; 4]>,
-    /// Sites that a triangle is clear of.
-    cleared: Vec<SiteId>,
+    /// Which triangle a site was told last to be clear of, by the number of it, and how many were asked for.
+    cleared: Vec<u32>,
+    asked: u32,
     /// Directions that showed it.
     directions: Vec<Direction>,
 }
@@ -203,6 +204,8 @@ impl Nearby {
         (self.reach, self.square, self.first_square) = (reach, reach * reach, first_square.max(reach * reach));
         self.bits.clear();
         self.star = 0;
+        self.cleared.clear();
+        self.asked = 0;
     }
 
     /// The number of the place that is tried.
@@ -295,10 +298,7 @@ impl Nearby {
             if view.square > self.square {
                 break;
             }
-            let key = match view.site {
-                SiteId::Point(index) => 2 * index as usize,
-                SiteId::Listed(index) => 2 * index as usize + 1,
-            };
+            let key = key(view.site);
             if key >= self.bits.len() {
                 self.bits.resize(key + 1, (0, 0));
             }
@@ -459,7 +459,7 @@ impl Nearby {
         for (&corner, point) in corners.iter().zip(triangle) {
             self.see(search, places, corner, point, enough);
         }
-        let Self { ranges, views, cleared, directions, .. } = self;
+        let Self { ranges, views, cleared, asked, directions, .. } = self;
         let views = |corner: u32| {
             let range = ranges[corner as usize];
             &views[range.first as usize..(range.first + range.count) as usize]
@@ -467,11 +467,18 @@ impl Nearby {
         if corners.iter().all(|&corner| views(corner).first().is_none_or(|view| view.square >= enough)) {
             return true;
         }
-        cleared.clear();
+        *asked += 1;
         directions.clear();
         for corner in corners {
             for view in views(corner) {
-                if view.square >= enough || view.parts(triangle, least) || cleared.contains(&view.site) {
+                if view.square >= enough || view.parts(triangle, least) {
+                    continue;
+                }
+                let key = key(view.site);
+                if key >= cleared.len() {
+                    cleared.resize(key + 1, 0);
+                }
+                if cleared[key] == *asked {
                     continue;
                 }
                 let site = search.site(view.site);
@@ -486,10 +493,18 @@ impl Nearby {
                     let Some(direction) = parting(triangle, &site, least) else { return false };
                     directions.push(direction);
                 }
-                cleared.push(view.site);
+                cleared[key] = *asked;
             }
         }
         true
+    }
+}
+
+/// A site's number among all, whatever its kind.
+fn key(site: SiteId) -> usize {
+    match site {
+        SiteId::Point(index) => 2 * index as usize,
+        SiteId::Listed(index) => 2 * index as usize + 1,
     }
 }
 
