@@ -116,10 +116,10 @@ fn around() -> Cube {
 }
 
 /// What is told of a shape's arrangement, which there is.
-fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&Arrangement<'_>) -> T) -> T {
+fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&mut Arrangement<'_>) -> T) -> T {
     let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
     let setting = plan.setting(plan.pitch(), &budget);
-    told(&Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
+    told(&mut Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
 }
 
 /// Whether all places deeper than the bounds are inside and all beyond are not.
