@@ -672,6 +672,37 @@ mod tests {
         (surface, doubtful)
     }
 
+    /// A part of a pot, and the ends of its box: its dilation's surface passes a vertex of the lattice within rounding, where all of some twenty triangles are no more than that.
+    #[test]
+    fn what_passes_a_vertex_within_rounding_crosses_nothing() {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 100.0;
+        let vertices = vec![
+            at(-1.972_710_538_648_750_7, -0.101_647_686_003_419_3, 1.160_540_771_484_375_2),
+            at(-1.966_728_210_449_218_8, 0.0, 1.205_294_036_865_234_3),
+            at(-1.965_082_609_819_543_7, -0.201_960_983_382_444_7, 1.160_540_771_484_375),
+            at(-1.964_169_115_905_860_3, -0.101_207_572_849_470_99, 1.205_294_036_865_234_3),
+            at(-1.957_031_25, 0.0, 1.250_390_625),
+            at(-1.956_574_214_408_087_5, -0.201_086_534_698_123_51, 1.205_294_036_865_234_3),
+            at(-1.954_484_773_081_406_1, -0.100_708_568_550_926_55, 1.250_390_625),
+            at(-1.946_927_318_272_528_9, -0.200_095_076_822_308_12, 1.250_390_625),
+            at(-1.946_235_656_738_281_2, 0.0, 1.295_816_802_978_515_8),
+            at(-1.943_703_226_978_649_6, -0.100_153_028_753_569_85, 1.295_816_802_978_515_8),
+            at(-3.050_000_000_000_000_3, -2.0, 0.0),
+            at(3.172, 2.0, 3.15),
+        ];
+        let triangles = [[9, 5, 7], [9, 7, 10], [10, 7, 8], [5, 2, 4], [5, 4, 7], [7, 4, 6], [7, 6, 8], [2, 1, 4], [4, 1, 3], [4, 3, 6]];
+        let faces = triangles.iter().map(|face| face.iter().map(|corner| corner - 1).collect()).chain([vec![10], vec![11]]).collect();
+        let attractor = Model { name: None, shape: Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Surface }) }
+            .lower()
+            .unwrap()
+            .attractor;
+        let (radius, budget) = (Radius::new(4.823).unwrap().mm(), Budget::default());
+        let plan = Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.4823).unwrap(), true, &budget).unwrap();
+        let setting = plan.setting(plan.pitch, &budget);
+        let made = plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap();
+        assert_eq!((made.crossings, made.uncertain, made.solid.topology().components), (0, 0, 3));
+    }
+
     #[test]
     fn shells_no_larger_than_rounding_go_and_may_be_in_doubt() {
         // Beyond one rod: nothing there could be a void.

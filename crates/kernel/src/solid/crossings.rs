@@ -7,6 +7,7 @@ use super::mend::Facet;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, CancelToken, Stopped};
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// Pairs of triangles that meet elsewhere than in corners and edges they share.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -31,6 +32,11 @@ impl Crossings {
     /// [`Stopped`].
     pub fn of(mesh: &TriMesh, budget: &Budget) -> Result<Self, Stopped> {
         Self::among(mesh, usize::MAX, budget)
+    }
+
+    /// The corners of those that were kept.
+    pub(super) fn corners(&self, triangles: &[[u32; 3]]) -> HashSet<u32> {
+        self.first.iter().flatten().flat_map(|&triangle| triangles[triangle as usize]).collect()
     }
 
     /// As [`Crossings::of`], keeping up to `most` pairs.

@@ -60,11 +60,29 @@ pub(crate) fn mend(mut points: Vec<Point>, mut triangles: Vec<[u32; 3]>, roundin
         renumber(&mut moved, &around.write(&mut points, &mut triangles));
     }
     let mut found = crossings(&mut points, &mut triangles, budget)?;
+    if found.count > 0 {
+        let before = (points.clone(), triangles.clone());
+        let corners = found.corners(&triangles);
+        let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
+        let Around { mesh, numbers, is_whole, .. } = &mut around;
+        mender.start(mesh);
+        let gathered = mender.gather(mesh, is_whole, |vertex| corners.contains(&numbers[vertex as usize]), rounding);
+        let own: Vec<u32> = gathered.iter().map(|&vertex| numbers[vertex as usize]).collect();
+        let numbers = around.write(&mut points, &mut triangles);
+        let after = crossings(&mut points, &mut triangles, budget)?;
+        if after.count < found.count {
+            moved.extend(own);
+            renumber(&mut moved, &numbers);
+            found = after;
+        } else {
+            (points, triangles) = before;
+        }
+    }
     for _ in 0..PART_ROUNDS {
         if found.count == 0 {
             break;
         }
-        let corners: HashSet<u32> = found.first.iter().flatten().flat_map(|&triangle| triangles[triangle as usize]).collect();
+        let corners = found.corners(&triangles);
         let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
         let Around { mesh, numbers, .. } = &mut around;
         mender.start(mesh);
@@ -338,6 +356,35 @@ impl Mender {
             changed = true;
         }
         changed
+    }
+
+    /// Brings corners that are as near to one as rounding moves them to its place, and makes them one: where a surface passes so near to a vertex of the lattice, all that is around it is no more than rounding. Those that were moved.
+    fn gather(&mut self, mesh: &mut HalfEdges, inside: &[bool], is_wanted: impl Fn(u32) -> bool, rounding: f64) -> BTreeSet<u32> {
+        let mut moved = BTreeSet::new();
+        for first in 0..mesh.points.len() as u32 {
+            if !is_wanted(first) || moved.contains(&first) {
+                continue;
+            }
+            let place = mesh.points[first as usize];
+            let (mut open, mut near) = (vec![first], BTreeSet::from([first]));
+            while let Some(vertex) = open.pop() {
+                if !mesh.star(vertex, MOST_AROUND, &mut self.star) {
+                    continue;
+                }
+                for &other in &self.star.ring {
+                    let is_near = distance_squared(&place, &mesh.points[other as usize]) <= (NUDGE * rounding).powi(2);
+                    if is_near && inside[other as usize] && !moved.contains(&other) && near.insert(other) {
+                        open.push(other);
+                    }
+                }
+            }
+            if near.len() > 1 {
+                near.iter().for_each(|&vertex| mesh.points[vertex as usize] = place);
+                moved.append(&mut near);
+            }
+        }
+        self.clean(mesh, inside, &vec![false; mesh.points.len()], rounding);
+        moved
     }
 
     /// Lists the boxes of all triangles for [`Mender::meetings`].
