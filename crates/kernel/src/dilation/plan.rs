@@ -444,7 +444,7 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
-    /// The dilation by the union of polytopes around points, segments and polygons, where that serves better than a lattice.
+    /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, where that serves better than a lattice.
     pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let Some(mut arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
         let allowed = budget.limits.triangles;

@@ -19,6 +19,8 @@ use std::collections::{BTreeSet, HashSet};
 /// How far vertices are moved that leave a triangle without area, or triangles that cross, in units of rounding: [`MOST_STEPS`] of single precision along each axis.
 pub(crate) const NUDGE: f64 = 2.0 * MOST_STEPS as f64;
 const MOST_STEPS: u32 = 4;
+/// How far corners are moved to make them one, which may have been moved by a step before.
+const GATHERED: f64 = NUDGE - 2.0;
 /// Triangles around a vertex that is joined with another, at most.
 pub(crate) const MOST_AROUND: usize = 24;
 /// Triangles around a vertex afterwards.
@@ -44,67 +46,110 @@ pub(crate) struct Mended {
 ///
 /// # Errors
 /// [`Stopped`].
-pub(crate) fn mend(mut points: Vec<Point>, mut triangles: Vec<[u32; 3]>, rounding: f64, budget: &Budget) -> Result<Mended, Stopped> {
+pub(crate) fn mend(points: Vec<Point>, triangles: Vec<[u32; 3]>, rounding: f64, budget: &Budget) -> Result<Mended, Stopped> {
     let mut mender = Mender::default();
-    let mut moved = HashSet::new();
-    let slivers = triangles.iter().filter(|triangle| is_sliver(&triangle.map(|corner| points[corner as usize]), LEAST_HEIGHT * rounding));
-    let corners: HashSet<u32> = slivers.flatten().copied().collect();
-    if !corners.is_empty() {
-        let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
-        let Around { mesh, numbers, is_whole, .. } = &mut around;
+    let mut surface = Surface { points, triangles, moved: HashSet::new() };
+    surface.clean(&mut mender, rounding);
+    let found = surface.crossings(budget)?;
+    let mut crossings = found.count;
+    if crossings > 0 {
+        let before = surface.clone();
+        crossings = surface.part(&mut mender, found.clone(), rounding, budget)?;
+        let mut other = before;
+        if crossings > 0 && other.gather(&mut mender, &found, rounding) {
+            let found = other.crossings(budget)?;
+            let left = other.part(&mut mender, found, rounding, budget)?;
+            if left < crossings {
+                (surface, crossings) = (other, left);
+            }
+        }
+    }
+    let Surface { mut points, mut triangles, .. } = surface;
+    drop_unused(&mut points, &mut triangles);
+    Ok(Mended { points, triangles, crossings })
+}
+
+/// A surface, and its vertices that were moved.
+#[derive(Clone)]
+struct Surface {
+    points: Vec<Point>,
+    triangles: Vec<[u32; 3]>,
+    moved: HashSet<u32>,
+}
+
+impl Surface {
+    /// Makes vertices at one place one, and gives triangles area.
+    fn clean(&mut self, mender: &mut Mender, rounding: f64) {
+        let Self { points, triangles, .. } = self;
+        let slivers =
+            triangles.iter().filter(|triangle| is_sliver(&triangle.map(|corner| points[corner as usize]), LEAST_HEIGHT * rounding));
+        let corners: HashSet<u32> = slivers.flatten().copied().collect();
+        if corners.is_empty() {
+            return;
+        }
+        let mut around = Around::of(points, triangles, &corners, NUDGE * rounding);
+        let Around { mesh, is_whole, .. } = &mut around;
         mender.start(mesh);
         mender.clean(mesh, is_whole, &vec![false; mesh.points.len()], rounding);
         let mut nudged = BTreeSet::new();
         mender.nudge(mesh, &mut nudged);
-        moved.extend(nudged.iter().map(|&vertex| numbers[vertex as usize]));
-        renumber(&mut moved, &around.write(&mut points, &mut triangles));
+        self.write(around, &nudged);
     }
-    let mut found = crossings(&mut points, &mut triangles, budget)?;
-    if found.count > 0 {
-        let before = (points.clone(), triangles.clone());
-        let corners = found.corners(&triangles);
-        let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
+
+    /// Its crossings.
+    fn crossings(&mut self, budget: &Budget) -> Result<Crossings, Stopped> {
+        // The mesh is lent.
+        let vertices = std::mem::take(&mut self.points).into_iter().map(DVec3::from_array).collect();
+        let mesh = TriMesh { vertices, triangles: std::mem::take(&mut self.triangles) };
+        let found = Crossings::among(&mesh, MOST_PARTED, budget);
+        self.points = mesh.vertices.into_iter().map(|vertex| vertex.to_array()).collect();
+        self.triangles = mesh.triangles;
+        found
+    }
+
+    /// Parts triangles that cross, see [`Mender::part`]; how many pairs still do.
+    fn part(&mut self, mender: &mut Mender, mut found: Crossings, rounding: f64, budget: &Budget) -> Result<u64, Stopped> {
+        for _ in 0..PART_ROUNDS {
+            if found.count == 0 {
+                break;
+            }
+            let corners = found.corners(&self.triangles);
+            let mut around = Around::of(&self.points, &self.triangles, &corners, NUDGE * rounding);
+            let Around { mesh, numbers, .. } = &mut around;
+            mender.start(mesh);
+            let those = |wanted: &HashSet<u32>| {
+                (0..).zip(numbers.iter()).filter(|(_, number)| wanted.contains(number)).map(|(vertex, _)| vertex).collect()
+            };
+            let (tried, mut own) = (those(&corners), those(&self.moved));
+            let changed = mender.part(mesh, &tried, rounding, &mut own);
+            self.write(around, &own);
+            if !changed {
+                break;
+            }
+            found = self.crossings(budget)?;
+        }
+        Ok(found.count)
+    }
+
+    /// Makes corners of triangles that cross one with what is near, see [`Mender::gather`]; whether there is such.
+    fn gather(&mut self, mender: &mut Mender, found: &Crossings, rounding: f64) -> bool {
+        let corners = found.corners(&self.triangles);
+        let mut around = Around::of(&self.points, &self.triangles, &corners, NUDGE * rounding);
         let Around { mesh, numbers, is_whole, .. } = &mut around;
         mender.start(mesh);
         let gathered = mender.gather(mesh, is_whole, |vertex| corners.contains(&numbers[vertex as usize]), rounding);
-        let own: Vec<u32> = gathered.iter().map(|&vertex| numbers[vertex as usize]).collect();
-        let numbers = around.write(&mut points, &mut triangles);
-        let after = crossings(&mut points, &mut triangles, budget)?;
-        if after.count < found.count {
-            moved.extend(own);
-            renumber(&mut moved, &numbers);
-            found = after;
-        } else {
-            (points, triangles) = before;
-        }
+        mender.clean(mesh, is_whole, &vec![false; mesh.points.len()], rounding);
+        let is_changed = !gathered.is_empty();
+        self.write(around, &gathered);
+        is_changed
     }
-    for _ in 0..PART_ROUNDS {
-        if found.count == 0 {
-            break;
-        }
-        let corners = found.corners(&triangles);
-        let mut around = Around::of(&points, &triangles, &corners, NUDGE * rounding);
-        let Around { mesh, numbers, .. } = &mut around;
-        mender.start(mesh);
-        let (mut tried, mut own) = (BTreeSet::new(), BTreeSet::new());
-        for (vertex, number) in (0..).zip(numbers.iter()) {
-            if corners.contains(number) {
-                tried.insert(vertex);
-            }
-            if moved.contains(number) {
-                own.insert(vertex);
-            }
-        }
-        let changed = mender.part(mesh, &tried, rounding, &mut own);
-        moved.extend(own.iter().map(|&vertex| numbers[vertex as usize]));
-        renumber(&mut moved, &around.write(&mut points, &mut triangles));
-        if !changed {
-            break;
-        }
-        found = crossings(&mut points, &mut triangles, budget)?;
+
+    /// Puts a part back, of which some vertices were moved.
+    fn write(&mut self, around: Around, moved: &BTreeSet<u32>) {
+        self.moved.extend(moved.iter().map(|&vertex| around.numbers[vertex as usize]));
+        let numbers = around.write(&mut self.points, &mut self.triangles);
+        renumber(&mut self.moved, &numbers);
     }
-    drop_unused(&mut points, &mut triangles);
-    Ok(Mended { points, triangles, crossings: found.count })
 }
 
 /// Gives vertices their new numbers, without those that are gone.
@@ -119,16 +164,6 @@ fn drop_unused(points: &mut Vec<Point>, triangles: &mut [[u32; 3]]) {
     if numbers.contains(&NONE) {
         close_up(points, triangles, &mut numbers);
     }
-}
-
-/// Crossings of a mesh that is lent.
-fn crossings(points: &mut Vec<Point>, triangles: &mut Vec<[u32; 3]>, budget: &Budget) -> Result<Crossings, Stopped> {
-    let vertices = std::mem::take(points).into_iter().map(DVec3::from_array).collect();
-    let mesh = TriMesh { vertices, triangles: std::mem::take(triangles) };
-    let found = Crossings::among(&mesh, MOST_PARTED, budget);
-    *points = mesh.vertices.into_iter().map(|vertex| vertex.to_array()).collect();
-    *triangles = mesh.triangles;
-    found
 }
 
 /// A triangle that is compared with others.
@@ -358,11 +393,11 @@ impl Mender {
         changed
     }
 
-    /// Brings corners that are as near to one as rounding moves them to its place, and makes them one: where a surface passes so near to a vertex of the lattice, all that is around it is no more than rounding. Those that were moved.
+    /// Brings corners to the place of one that they are nearer to than [`NUDGE`] roundings: where a surface passes so near to a vertex of the lattice, all that is around it is no more than that. Those that are no more to be moved: each was moved once at most, besides by [`Mender::nudge`].
     fn gather(&mut self, mesh: &mut HalfEdges, inside: &[bool], is_wanted: impl Fn(u32) -> bool, rounding: f64) -> BTreeSet<u32> {
-        let mut moved = BTreeSet::new();
+        let mut done = BTreeSet::new();
         for first in 0..mesh.points.len() as u32 {
-            if !is_wanted(first) || moved.contains(&first) {
+            if !is_wanted(first) || done.contains(&first) {
                 continue;
             }
             let place = mesh.points[first as usize];
@@ -372,19 +407,18 @@ impl Mender {
                     continue;
                 }
                 for &other in &self.star.ring {
-                    let is_near = distance_squared(&place, &mesh.points[other as usize]) <= (NUDGE * rounding).powi(2);
-                    if is_near && inside[other as usize] && !moved.contains(&other) && near.insert(other) {
+                    let is_near = distance_squared(&place, &mesh.points[other as usize]) <= (GATHERED * rounding).powi(2);
+                    if is_near && inside[other as usize] && !done.contains(&other) && near.insert(other) {
                         open.push(other);
                     }
                 }
             }
             if near.len() > 1 {
                 near.iter().for_each(|&vertex| mesh.points[vertex as usize] = place);
-                moved.append(&mut near);
+                done.append(&mut near);
             }
         }
-        self.clean(mesh, inside, &vec![false; mesh.points.len()], rounding);
-        moved
+        done
     }
 
     /// Lists the boxes of all triangles for [`Mender::meetings`].
@@ -583,6 +617,54 @@ mod tests {
             }
         }
         assert!(folded > 150, "{folded} of the meshes had folds");
+    }
+
+    /// Vertices with so many triangles around them that are no more than rounding that moving corner by corner does not part them: they are made one, and no vertex is farther from where it was than is told.
+    #[test]
+    fn what_is_no_more_than_rounding_is_made_one() {
+        let (around, along) = (24, 12);
+        let budget = Budget::default();
+        let (mut stuck, mut left) = (0, 0);
+        for seed in 0..100_u32 {
+            let (mut points, mut triangles) = torus(around, along);
+            let whole = triangles.len();
+            let mut random = u64::from(seed);
+            let mut below = |most: u64| {
+                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (random >> 33) % most
+            };
+            for k in 0..3 {
+                let middle = (8 * k + below(5) as u32) * along + below(u64::from(along)) as u32;
+                let place = points[middle as usize];
+                let mesh = HalfEdges::new(points.clone(), &triangles);
+                let mut star = Star::default();
+                assert!(mesh.star(middle, usize::MAX, &mut star));
+                let (count, first) = (star.ring.len() as u32, points.len() as u32);
+                triangles.retain(|triangle| !triangle.contains(&middle));
+                // Two more rings, hardly around the vertex.
+                points.extend((0..2 * count).map(|_| stepped(&place, below(27) as usize, 1 + below(2) as u32)));
+                for k in 0..count {
+                    let next = (k + 1) % count;
+                    let [from, to] = [k, next].map(|k| star.ring[k as usize]);
+                    let [[a, b], [c, d]] = [first, first + count].map(|ring| [ring + k, ring + next]);
+                    triangles.extend([[a, from, to], [a, to, b], [c, a, b], [c, b, d], [middle, c, d]]);
+                }
+            }
+            let rounding = super::super::rounding(points.iter().flatten().fold(0.0_f64, |largest, x| largest.max(x.abs())));
+            let mut alone = Surface { points: points.clone(), triangles: triangles.clone(), moved: HashSet::new() };
+            alone.clean(&mut Mender::default(), rounding);
+            let found = alone.crossings(&budget).unwrap();
+            let without = alone.part(&mut Mender::default(), found, rounding, &budget).unwrap();
+            let mended = mend(points.clone(), triangles.clone(), rounding, &budget).unwrap();
+            stuck += usize::from(without > 0);
+            left += usize::from(mended.crossings > 0);
+            assert!(mended.crossings <= without && mended.triangles.len() >= whole, "seed {seed}");
+            for point in &mended.points {
+                let nearest = points.iter().map(|old| distance_squared(old, point)).fold(f64::INFINITY, f64::min).sqrt();
+                assert!(nearest <= NUDGE * rounding, "seed {seed}: {nearest}");
+            }
+        }
+        assert!(stuck > 4 && left == 0, "{stuck} stuck, {left} left");
     }
 
     /// Of moves that are said to keep an embedded surface a graph none makes triangles meet, and most that make none meet are seen to: on thin and on rough tori.

@@ -24,7 +24,7 @@ const FACE_LIFT: f64 = 0.1;
 /// The facets along the polygon come first.
 const FACES: usize = 2;
 
-/// A polytope that is cut facet by facet, all lengths from the polygon's first corner.
+/// A polytope that is cut facet by facet, all places less the figure's first corner.
 struct Hull {
     planes: Vec<Plane>,
     corners: Vec<(Point, [u16; 3])>,
@@ -84,9 +84,11 @@ impl Polytope {
         }
         let [x, y, up] = frame(normals.first()?);
         let lift = FACE_LIFT * (shell.outer - shell.inner);
-        let of_cuboid = |facet: usize| offset(facet) + if facet == 0 { lift } else { 0.0 };
+        let is_opposite = |other: &Point| dot(other, &up) < -SAME_FACE;
+        let is_face = [true, normals.iter().any(is_opposite)];
+        let of_cuboid = |facet: usize| offset(facet) + if is_face.get(facet) == Some(&true) { lift } else { 0.0 };
         let mut hull = Hull::upright(&polyhedron.corners, &up, &[x, y, x.map(|part| -part), y.map(|part| -part)], of_cuboid)?;
-        for up in &normals[1..] {
+        for up in normals[1..].iter().filter(|other| !is_opposite(other)) {
             let support = polyhedron.corners.iter().map(|corner| dot(up, corner)).fold(f64::NEG_INFINITY, f64::max);
             hull.cut(up, support + offset(hull.planes.len()) + lift, noise)?;
         }

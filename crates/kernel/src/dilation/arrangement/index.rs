@@ -11,7 +11,7 @@ use crate::dilation::tree::{NodeId, SiteId};
 pub(in crate::dilation) struct Index {
     figures: Vec<Figure>,
     boxes: Vec<[Point; 2]>,
-    /// How far figures may be from the sites that they stand for.
+    /// How far figures may be from the sites that they stand for, but inside of polyhedra.
     slack: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Thickening of points, segments, polygons and solids by the union of a polytope around each: where few are near to each other, the boundary is found facet by facet, without a lattice.
+//! Thickening of points, segments, polygons, polyhedra and solids by the union of a polytope around each: where few are near to each other, the boundary is found facet by facet, without a lattice.
 //!
 //! With s < r < outer the ends of the band, figure S_i (see `figure`) has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
 //! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
@@ -47,7 +47,8 @@ const MOST_NEAR: usize = 40_000;
 /// Neighbours of all sites at most, for each cube of the lattice that their dilations would meet if they were alone, along polygons and around points and segments; and in any case. Where there are more, most of the polytopes' facets are hidden, and the
 /// lattice, which does not tell sites apart, costs less: a sixth where there are sixteen times as many, three to seven times as much where there are a tenth. Around wires in a plane it costs less by a third already where there are a third as many; but they have a
 /// third fewer triangles without it.
-const NEAR_PER_CUBE: [f64; 2] = [16.0, 9.0];
+const NEAR_ALONG_FACES: f64 = 16.0;
+const NEAR_AROUND_WIRES: f64 = 9.0;
 const FEW_NEAR: f64 = 10_000.0;
 /// How far corners may be off the plane of a union, and off a side that goes straight on, as a share of the slack that all bounds leave: in all rounds together polygons are off by a little more than half of it.
 const FLATNESS: f64 = 1.0 / 128.0;
@@ -99,7 +100,10 @@ impl<'a> Arrangement<'a> {
         let shell = |figure: &Figure| setting.shell(figure, State::default());
         let band = sites.list.iter().map(shell).map(|shell| shell.outer - shell.inner).fold(f64::INFINITY, f64::min);
         let least = |figure: &Figure| figure.in_space(setting.least);
+        let faces = sites.list.len() as f64;
         sites.list = polyhedron::closed(sites.list, least, FLATNESS * setting.slack, budget)?;
+        let is_whole = |figure: &&Figure| matches!(figure.outline, Outline::Polyhedron(_));
+        let left = (sites.list.len() - sites.list.iter().filter(is_whole).count()) as f64 / faces;
         sites.list = figure::joined(sites.list, FLATNESS * setting.slack, hull::CORNER_SHARE * band, budget)?;
         let forms = Forms::default();
         let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
@@ -124,15 +128,18 @@ impl<'a> Arrangement<'a> {
         let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
         drop(bodies);
         let may_be_near = |figure: &Figure| {
-            let is_flat = matches!(figure.outline, Outline::Polygon(_) | Outline::Polyhedron(_));
-            NEAR_PER_CUBE[usize::from(!is_flat)] * figure.area(setting.reach) / setting.lattice.pitch.powi(2)
+            let per_cube = match figure.outline {
+                Outline::Polygon(_) | Outline::Polyhedron(_) => NEAR_ALONG_FACES,
+                Outline::Point(_) | Outline::Segment(_) => NEAR_AROUND_WIRES,
+            };
+            per_cube * figure.area(setting.reach) / setting.lattice.pitch.powi(2)
         };
         if near.total() as f64 > FEW_NEAR + sites.list.iter().map(may_be_near).sum::<f64>() {
             return Ok(None);
         }
         let solids = rule.attractor().surfaces();
-        // About half of what is around the faces of solids is inside of these.
-        let inside = 0.5 * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
+        // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
+        let inside = 0.5 * left * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
         let mut arrangement = Self { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), solids, triangles: 0.0 };
         let mut engine = Engine::new(&arrangement, 0, &[]);
         let Engine { polytopes, .. } = if engine.begin(budget)? { engine } else { return Ok(None) };
