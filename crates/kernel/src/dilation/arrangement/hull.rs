@@ -19,7 +19,7 @@ const LEAST_COSINE: f64 = 0.7;
 pub(super) const NOISE: f64 = 1e-9;
 /// Faces of a polyhedron have one facet where the cosine of the angle between them is more than this.
 const SAME_FACE: f64 = 0.999_999;
-/// How far facets along a polyhedron's faces are lifted, in units of the band: where none are, there are up to a fifth more triangles, where they are as much as those along polygons, up to a third.
+/// How far facets along a polyhedron's faces are lifted, in units of the band: where none are, there are up to a fifth more triangles, where they are as much as those along polygons, up to two fifths.
 const FACE_LIFT: f64 = 0.1;
 /// The facets along the polygon come first.
 const FACES: usize = 2;
