@@ -298,11 +298,7 @@ impl Nearby {
             if view.square > self.square {
                 break;
             }
-            let key = key(view.site);
-            if key >= self.bits.len() {
-                self.bits.resize(key + 1, (0, 0));
-            }
-            let (star, bit) = &mut self.bits[key];
+            let (star, bit) = entry(&mut self.bits, view.site);
             if *star != self.star {
                 if self.sites.len() == MOST_COVERING {
                     continue;
@@ -474,11 +470,8 @@ impl Nearby {
                 if view.square >= enough || view.parts(triangle, least) {
                     continue;
                 }
-                let key = key(view.site);
-                if key >= cleared.len() {
-                    cleared.resize(key + 1, 0);
-                }
-                if cleared[key] == *asked {
+                let last = entry(cleared, view.site);
+                if *last == *asked {
                     continue;
                 }
                 let site = search.site(view.site);
@@ -493,19 +486,24 @@ impl Nearby {
                     let Some(direction) = parting(triangle, &site, least) else { return false };
                     directions.push(direction);
                 }
-                cleared[key] = *asked;
+                *last = *asked;
             }
         }
         true
     }
 }
 
-/// A site's number among all, whatever its kind.
-fn key(site: SiteId) -> usize {
-    match site {
+/// What a table has of a site; it grows as far as it takes.
+#[inline]
+fn entry<T: Clone + Default>(table: &mut Vec<T>, site: SiteId) -> &mut T {
+    let number = match site {
         SiteId::Point(index) => 2 * index as usize,
         SiteId::Listed(index) => 2 * index as usize + 1,
+    };
+    if number >= table.len() {
+        table.resize(number + 1, T::default());
     }
+    &mut table[number]
 }
 
 /// The bits of a mask, the lowest first.

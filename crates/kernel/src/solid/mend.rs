@@ -53,9 +53,8 @@ pub(crate) fn mend(points: Vec<Point>, triangles: Vec<[u32; 3]>, rounding: f64, 
     let found = surface.crossings(budget)?;
     let mut crossings = found.count;
     if crossings > 0 {
-        let before = surface.clone();
+        let mut other = surface.clone();
         crossings = surface.part(&mut mender, found.clone(), rounding, budget)?;
-        let mut other = before;
         if crossings > 0 && other.gather(&mut mender, &found, rounding) {
             let found = other.crossings(budget)?;
             let left = other.part(&mut mender, found, rounding, budget)?;
@@ -80,16 +79,14 @@ struct Surface {
 impl Surface {
     /// Makes vertices at one place one, and gives triangles area.
     fn clean(&mut self, mender: &mut Mender, rounding: f64) {
-        let Self { points, triangles, .. } = self;
-        let slivers =
-            triangles.iter().filter(|triangle| is_sliver(&triangle.map(|corner| points[corner as usize]), LEAST_HEIGHT * rounding));
+        let corners_of = |triangle: &[u32; 3]| triangle.map(|corner| self.points[corner as usize]);
+        let slivers = self.triangles.iter().filter(|triangle| is_sliver(&corners_of(triangle), LEAST_HEIGHT * rounding));
         let corners: HashSet<u32> = slivers.flatten().copied().collect();
         if corners.is_empty() {
             return;
         }
-        let mut around = Around::of(points, triangles, &corners, NUDGE * rounding);
+        let mut around = self.around(mender, &corners, rounding);
         let Around { mesh, is_whole, .. } = &mut around;
-        mender.start(mesh);
         mender.clean(mesh, is_whole, &vec![false; mesh.points.len()], rounding);
         let mut nudged = BTreeSet::new();
         mender.nudge(mesh, &mut nudged);
@@ -114,9 +111,8 @@ impl Surface {
                 break;
             }
             let corners = found.corners(&self.triangles);
-            let mut around = Around::of(&self.points, &self.triangles, &corners, NUDGE * rounding);
+            let mut around = self.around(mender, &corners, rounding);
             let Around { mesh, numbers, .. } = &mut around;
-            mender.start(mesh);
             let those = |wanted: &HashSet<u32>| {
                 (0..).zip(numbers.iter()).filter(|(_, number)| wanted.contains(number)).map(|(vertex, _)| vertex).collect()
             };
@@ -134,14 +130,20 @@ impl Surface {
     /// Makes corners of triangles that cross one with what is near, see [`Mender::gather`]; whether there is such.
     fn gather(&mut self, mender: &mut Mender, found: &Crossings, rounding: f64) -> bool {
         let corners = found.corners(&self.triangles);
-        let mut around = Around::of(&self.points, &self.triangles, &corners, NUDGE * rounding);
+        let mut around = self.around(mender, &corners, rounding);
         let Around { mesh, numbers, is_whole, .. } = &mut around;
-        mender.start(mesh);
         let gathered = mender.gather(mesh, is_whole, |vertex| corners.contains(&numbers[vertex as usize]), rounding);
         mender.clean(mesh, is_whole, &vec![false; mesh.points.len()], rounding);
         let is_changed = !gathered.is_empty();
         self.write(around, &gathered);
         is_changed
+    }
+
+    /// The part around some corners, with which the mender begins.
+    fn around(&self, mender: &mut Mender, corners: &HashSet<u32>, rounding: f64) -> Around {
+        let around = Around::of(&self.points, &self.triangles, corners, NUDGE * rounding);
+        mender.start(&around.mesh);
+        around
     }
 
     /// Puts a part back, of which some vertices were moved.
@@ -393,7 +395,7 @@ impl Mender {
         changed
     }
 
-    /// Brings corners to the place of one that they are nearer to than [`NUDGE`] roundings: where a surface passes so near to a vertex of the lattice, all that is around it is no more than that. Those that are no more to be moved: each was moved once at most, besides by [`Mender::nudge`].
+    /// Brings corners to the place of one that they are within [`GATHERED`] roundings of: where a surface passes so near to a vertex of the lattice, all that is around it is no more than that. Those that are no more to be moved: each was moved once at most, besides by [`Mender::nudge`].
     fn gather(&mut self, mesh: &mut HalfEdges, inside: &[bool], is_wanted: impl Fn(u32) -> bool, rounding: f64) -> BTreeSet<u32> {
         let mut done = BTreeSet::new();
         for first in 0..mesh.points.len() as u32 {

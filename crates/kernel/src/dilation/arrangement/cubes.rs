@@ -5,7 +5,7 @@
 
 use super::bodies::{AXES, Bodies, Common, Kind, Near};
 use super::ellipsoid::Place;
-use super::figure::Figure;
+use super::figure::{Figure, box_of};
 use crate::attractor::cell::{Point, between, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
@@ -37,12 +37,7 @@ pub(super) struct Cube {
 impl Cube {
     /// Around all dilations of figures by a distance.
     fn around(bodies: &Bodies<'_>, distance: f64) -> Self {
-        let boxes = bodies.figures.iter().map(Figure::bounds);
-        let [low, high] = boxes
-            .reduce(|[low, high], [a, b]| {
-                [std::array::from_fn(|axis| low[axis].min(a[axis])), std::array::from_fn(|axis| high[axis].max(b[axis]))]
-            })
-            .unwrap_or_default();
+        let [low, high] = box_of(bodies.figures.iter().flat_map(Figure::corners));
         let side = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         Self { centre: between(&low, &high, 0.5), half: 0.5 * side + distance }
     }

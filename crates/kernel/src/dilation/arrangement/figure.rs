@@ -99,10 +99,7 @@ impl Figure {
 
     /// Its box.
     pub(super) fn bounds(&self) -> [Point; 2] {
-        let extreme = |first: f64, choose: fn(f64, f64) -> f64| -> Point {
-            std::array::from_fn(|axis| self.corners().iter().map(|corner| corner[axis]).fold(first, choose))
-        };
-        [extreme(f64::INFINITY, f64::min), extreme(f64::NEG_INFINITY, f64::max)]
+        box_of(self.corners())
     }
 
     /// A box around all that is no farther from it than a distance.
@@ -130,7 +127,7 @@ impl Convex for Figure {
 
     #[inline]
     fn highest(&self, direction: &Point) -> f64 {
-        self.corners().iter().map(|corner| dot(corner, direction)).fold(f64::NEG_INFINITY, f64::max)
+        highest(self.corners(), direction)
     }
 }
 
@@ -286,6 +283,18 @@ impl Side {
     }
 }
 
+/// The box of some places: its lowest and its highest corner.
+pub(super) fn box_of<'p>(places: impl IntoIterator<Item = &'p Point>) -> [Point; 2] {
+    places.into_iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], at| {
+        [std::array::from_fn(|axis| low[axis].min(at[axis])), std::array::from_fn(|axis| high[axis].max(at[axis]))]
+    })
+}
+
+/// The largest value of some places along a direction.
+pub(super) fn highest(places: &[Point], direction: &Point) -> f64 {
+    places.iter().map(|at| dot(at, direction)).fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// The order of places: along the first axis, then the others.
 pub(super) fn order(a: &Point, b: &Point) -> Ordering {
     (0..3).map(|axis| a[axis].total_cmp(&b[axis])).fold(Ordering::Equal, Ordering::then)
@@ -324,10 +333,15 @@ pub(super) fn joined(mut figures: Vec<Figure>, flatness: f64, within: f64, budge
         if !gone.contains(&true) {
             break;
         }
-        let mut gone = gone.into_iter();
-        figures.retain(|_| !gone.next().unwrap_or_default());
+        leave_out(&mut figures, gone);
     }
     Ok(figures)
+}
+
+/// Leaves out the figures that are gone.
+pub(super) fn leave_out(figures: &mut Vec<Figure>, gone: Vec<bool>) {
+    let mut gone = gone.into_iter();
+    figures.retain(|_| !gone.next().unwrap_or_default());
 }
 
 #[cfg(test)]

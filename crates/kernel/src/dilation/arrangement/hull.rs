@@ -1,6 +1,6 @@
 //! The polytopes of convex polygons and polyhedra.
 
-use super::figure::{Figure, Polygon};
+use super::figure::{Figure, Polygon, highest};
 use super::joints;
 use super::polyhedron::Polyhedron;
 use super::polytopes::{MOST_FACETS, OWN_SHIFT, Plane, Polytope, SHIFT, Shell, frame, height, meeting, normal, share};
@@ -32,6 +32,21 @@ struct Hull {
     squares: Vec<f64>,
 }
 
+/// How far out facets are, which makes no four planes meet in a point but by chance: see `polytopes`.
+struct Shifts<F> {
+    room: f64,
+    /// How far out all of them are, as a whole,
+    all: f64,
+    /// and each by itself.
+    own: F,
+}
+
+fn shifts(shell: Shell, seed: u64) -> Shifts<impl Fn(usize) -> f64> {
+    let room = SHIFT * (shell.outer - shell.inner);
+    let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
+    Shifts { room, all, own: move |facet| OWN_SHIFT * room * share(seed, 1 + facet as u64) }
+}
+
 impl Polytope {
     /// The polytope of a polygon in its shell; none where facets are too many or too small.
     ///
@@ -41,11 +56,10 @@ impl Polytope {
         let polygon = figure.polygon()?;
         let origin = polygon.corners[0];
         let polygon = polygon.from(&origin);
-        let room = SHIFT * (shell.outer - shell.inner);
-        let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
+        let Shifts { room, all, own } = shifts(shell, seed);
         // Faces have nothing beyond them that would make up for what they lack: they are in the band's middle, where panels are as thick as they should be.
         let lift = |facet: usize| if facet < FACES { 0.5 * (shell.outer - shell.inner - room) } else { 0.0 };
-        let offset = |facet: usize| all + lift(facet) + OWN_SHIFT * room * share(seed, 1 + facet as u64);
+        let offset = |facet: usize| all + lift(facet) + own(facet);
         // Sides that hardly turn would meet elsewhere, were they shifted against each other.
         let is_needle = polygon.is_needle();
         let within = CORNER_SHARE * (shell.outer - shell.inner);
@@ -72,9 +86,8 @@ impl Polytope {
     pub(super) fn enclosing(polyhedron: &Polyhedron, shell: Shell, seed: u64) -> Option<Self> {
         let origin = polyhedron.corners[0];
         let polyhedron = polyhedron.from(&origin);
-        let room = SHIFT * (shell.outer - shell.inner);
-        let all = shell.inner + (1.0 - OWN_SHIFT) * room * share(seed, 0);
-        let offset = |facet: usize| all + OWN_SHIFT * room * share(seed, 1 + facet as u64);
+        let Shifts { all, own, .. } = shifts(shell, seed);
+        let offset = |facet: usize| all + own(facet);
         let noise = NOISE * shell.outer;
         let mut normals: Vec<Point> = Vec::new();
         for up in polyhedron.normals() {
@@ -85,12 +98,11 @@ impl Polytope {
         let [x, y, up] = frame(normals.first()?);
         let lift = FACE_LIFT * (shell.outer - shell.inner);
         let is_opposite = |other: &Point| dot(other, &up) < -SAME_FACE;
-        let is_face = [true, normals.iter().any(is_opposite)];
-        let of_cuboid = |facet: usize| offset(facet) + if is_face.get(facet) == Some(&true) { lift } else { 0.0 };
+        let lifts = [lift, if normals.iter().any(is_opposite) { lift } else { 0.0 }];
+        let of_cuboid = |facet: usize| offset(facet) + lifts.get(facet).unwrap_or(&0.0);
         let mut hull = Hull::upright(&polyhedron.corners, &up, &[x, y, x.map(|part| -part), y.map(|part| -part)], of_cuboid)?;
         for up in normals[1..].iter().filter(|other| !is_opposite(other)) {
-            let support = polyhedron.corners.iter().map(|corner| dot(up, corner)).fold(f64::NEG_INFINITY, f64::max);
-            hull.cut(up, support + offset(hull.planes.len()) + lift, noise)?;
+            hull.cut(up, highest(&polyhedron.corners, up) + offset(hull.planes.len()) + lift, noise)?;
         }
         hull.cut_corners(|x| polyhedron.closest(x), shell.outer, offset, noise)?;
         hull.finish(&origin, Box::default(), noise)
@@ -165,8 +177,8 @@ impl Hull {
     fn upright(corners: &[Point], up: &Point, out: &[Point], offset: impl Fn(usize) -> f64) -> Option<Self> {
         let (count, mut planes) = (out.len(), Vec::<Plane>::new());
         for direction in [*up, up.map(|part| -part)].iter().chain(out) {
-            let support = corners.iter().map(|corner| dot(direction, corner)).fold(f64::NEG_INFINITY, f64::max);
-            planes.push([direction[0], direction[1], direction[2], support + offset(planes.len())]);
+            let out = highest(corners, direction) + offset(planes.len());
+            planes.push([direction[0], direction[1], direction[2], out]);
         }
         let mut hull = Self { planes, corners: Vec::new(), squares: Vec::new() };
         for face in 0..FACES {

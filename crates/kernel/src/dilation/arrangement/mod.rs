@@ -97,27 +97,25 @@ impl<'a> Arrangement<'a> {
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let Some(mut sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
+        let flatness = FLATNESS * setting.slack;
         let shell = |figure: &Figure| setting.shell(figure, State::default());
         let band = sites.list.iter().map(shell).map(|shell| shell.outer - shell.inner).fold(f64::INFINITY, f64::min);
         let least = |figure: &Figure| figure.in_space(setting.least);
         let faces = sites.list.len() as f64;
-        sites.list = polyhedron::closed(sites.list, least, FLATNESS * setting.slack, budget)?;
+        sites.list = polyhedron::closed(sites.list, least, flatness, budget)?;
         let is_whole = |figure: &&Figure| matches!(figure.outline, Outline::Polyhedron(_));
         let left = (sites.list.len() - sites.list.iter().filter(is_whole).count()) as f64 / faces;
-        sites.list = figure::joined(sites.list, FLATNESS * setting.slack, hull::CORNER_SHARE * band, budget)?;
+        sites.list = figure::joined(sites.list, flatness, hull::CORNER_SHARE * band, budget)?;
         let forms = Forms::default();
-        let mut beyond = hinges::cuts(&sites.list, FLATNESS * setting.slack, shell, budget)?;
-        let scales =
-            if sites.list.iter().any(|figure| matches!(figure.outline, Outline::Segment(_)) && polytopes::kind(figure) == Kind::Rod) {
-                let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
-                [form.covering.reach, form.covering.girth]
-            } else {
-                [1.0; 2]
-            };
-        for (beyond, cut) in beyond
-            .iter_mut()
-            .zip(joints::cuts(&sites.list, FLATNESS * setting.slack, scales, shell, budget)?)
-            .filter(|(beyond, _)| beyond.is_empty())
+        let mut beyond = hinges::cuts(&sites.list, flatness, shell, budget)?;
+        let scales = if sites.list.iter().any(|figure| polytopes::kind(figure) == Kind::Rod) {
+            let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
+            [form.covering.reach, form.covering.girth]
+        } else {
+            [1.0; 2]
+        };
+        for (beyond, cut) in
+            beyond.iter_mut().zip(joints::cuts(&sites.list, flatness, scales, shell, budget)?).filter(|(beyond, _)| beyond.is_empty())
         {
             *beyond = Box::new(cut);
         }

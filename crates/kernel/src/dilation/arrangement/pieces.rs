@@ -120,8 +120,8 @@ fn are_apart(one: &Figure, other: &Figure, distance: f64) -> bool {
         let y = other.closest(&x);
         x = one.closest(&y);
         let across = subtract(&x, &y);
-        let least = |figure: &Figure, w: &Point| figure.corners().iter().map(|corner| dot(corner, w)).fold(f64::INFINITY, f64::min);
-        let gap = least(one, &across) + least(other, &across.map(|part| -part));
+        // The lowest place of one along the way from the other, which is highest along it.
+        let gap = -one.highest(&across.map(|part| -part)) - other.highest(&across);
         let length = dot(&across, &across).sqrt();
         if gap > distance * length {
             return true;

@@ -3,7 +3,7 @@
 //! Let C be the union of these faces, and H the polyhedron. If no place in H is farther than s from C, D_t(H) = D_t(C) for all t from s on: so what is thickened by more may be taken for solid. With the volume V and the area A of H that is so where 3 V / A <= s: were a ball with a larger radius in it, each of
 //! the pyramids from its centre to the faces would be higher than that, and V, which is a third of all heights times areas, more.
 
-use super::figure::{Figure, Outline, Polygon, Side, order};
+use super::figure::{Figure, Outline, Polygon, Side, box_of, leave_out, order};
 use super::polytopes::{Plane, height, normal};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::budget::{Budget, Stopped};
@@ -61,12 +61,8 @@ impl Polyhedron {
         let is_closed = sides.windows(2).all(|pair| pair[0] != pair[1])
             && sides.iter().all(|&[from, to]| sides.binary_search(&[to, from]).is_ok())
             && count + faces.len() == sides.len() / 2 + 2;
-        let spread = |axis: usize| {
-            let along = corners.iter().map(|corner| corner[axis]);
-            let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
-            (high - low).powi(2)
-        };
-        let depths = [LEAST_DEPTH * (0..3).map(spread).sum::<f64>().sqrt(), least].map(|depth| depth * area);
+        let [low, high] = box_of(&corners);
+        let depths = [LEAST_DEPTH * distance_squared(&low, &high).sqrt(), least].map(|depth| depth * area);
         let has_depth = (depths[0]..=depths[1]).contains(&(3.0 * volume));
         (is_closed && has_depth).then(|| Self { corners: corners.into(), triangles: triangles.into(), tolerance: ON_FACE * flatness })
     }
@@ -103,16 +99,14 @@ impl Polyhedron {
         corners.map(|corner| &self.corners[usize::from(corner)])
     }
 
-    /// Twice the area of a triangle.
-    fn double(&self, corners: &[u8; 3]) -> f64 {
-        let [a, b, c] = self.places(corners);
-        let across = cross(&subtract(b, a), &subtract(c, a));
-        dot(&across, &across).sqrt()
-    }
-
     /// Its area.
     pub(super) fn area(&self) -> f64 {
-        0.5 * self.triangles.iter().map(|(_, corners)| self.double(corners)).sum::<f64>()
+        let double = |(_, corners): &(Plane, [u8; 3])| {
+            let [a, b, c] = self.places(corners);
+            let across = cross(&subtract(b, a), &subtract(c, a));
+            dot(&across, &across).sqrt()
+        };
+        0.5 * self.triangles.iter().map(double).sum::<f64>()
     }
 
     /// The unit normals of its faces, in the order of its triangles.
@@ -157,8 +151,7 @@ pub(super) fn closed(
         figures[first].outline = Outline::Polyhedron(polyhedron);
         group[1..].iter().for_each(|&figure| gone[figure as usize] = true);
     }
-    let mut gone = gone.into_iter();
-    figures.retain(|_| !gone.next().unwrap_or_default());
+    leave_out(&mut figures, gone);
     Ok(figures)
 }
 

@@ -1,6 +1,6 @@
 //! The polytopes of figures: what stands for their dilations by a ball.
 
-use super::figure::{Figure, Outline};
+use super::figure::{Figure, Outline, box_of};
 use super::form::{Form, Kind, Spot};
 use super::structure::{CutOff, Structure};
 use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
@@ -108,7 +108,7 @@ pub(super) struct Cut {
     pub(super) most: f64,
 }
 
-/// What form stands for a point or a segment.
+/// What form stands for a point or a segment; a ball's, which is of no use, for others.
 pub(super) fn kind(figure: &Figure) -> Kind {
     let [first, second] = ordered(figure);
     if first == second { Kind::Ball } else { Kind::Rod }
@@ -227,8 +227,7 @@ impl Polytope {
 
     /// One with these facets and corners.
     pub(super) fn with(structure: Arc<Structure>, planes: Box<[Plane]>, cuts: Box<[Plane]>, corners: Box<[Point]>) -> Self {
-        let low = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::INFINITY, f64::min));
-        let high = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).fold(f64::NEG_INFINITY, f64::max));
+        let [low, high] = box_of(&corners);
         Self { structure, planes, cuts, corners, low, high }
     }
 
