@@ -244,8 +244,10 @@ pub(crate) struct Mender {
     pub(crate) slivers: Vec<u32>,
     stamps: Vec<u32>,
     stamp: u32,
-    /// Triangles of a star, old or new.
+    /// Triangles of a star, old or new, their corners, and the boxes of their normals.
     own: Vec<Facet>,
+    hull: Vec<(u32, Point)>,
+    turned: Vec<Box32>,
 }
 
 impl Mender {
@@ -468,33 +470,34 @@ impl Mender {
     }
 
     /// Whether the star's vertex may move to ring m, or elsewhere, without that anything comes to meet: surely, see `normals`. Where this cannot tell, [`Mender::meetings`] can.
-    pub(crate) fn stays_graph(&self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>) -> bool {
-        let ring = &self.star.ring;
-        let count = ring.len();
+    pub(crate) fn stays_graph(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>) -> bool {
+        let Self { star, turned, .. } = self;
+        let (ring, count) = (&star.ring, star.ring.len());
         let point = |corner: u32| mesh.points[corner as usize];
         let apex = to.unwrap_or_else(|| point(m.map_or(vertex, |m| ring[m])));
-        let mut own = Box32::EMPTY;
-        for k in 0..count {
-            let next = (k + 1) % count;
-            if m.is_none_or(|m| k != m && next != m) {
-                own = own.union(&normal_box(&[apex, point(ring[k]), point(ring[next])]));
-            }
-        }
+        let new = (0..count).filter(|&k| m.is_none_or(|m| k != m && (k + 1) % count != m));
+        turned.clear();
+        turned.extend(new.map(|k| normal_box(&[apex, point(ring[k]), point(ring[(k + 1) % count])])));
         let to = to.map(|to| (NONE, to));
         let hull = ring.iter().chain([&vertex]).map(|&corner| (corner, point(corner))).chain(to);
         let other = |triangle| mesh.triangle(triangle).filter(|corners| !corners.contains(&vertex)).map(|corners| corners.map(point));
         let is_beside = |triangle, points: &[Point; 3]| {
             mesh.triangle(triangle).is_some_and(|corners| Facet::new(corners, *points).has_on_one_side(hull.clone()))
         };
-        self.normals.face_one_way(&self.boxes, hull.clone().map(|(_, point)| point), &own, other, is_beside)
+        self.normals.face_one_way(&self.boxes, hull.clone().map(|(_, point)| point), turned, other, is_beside)
     }
 
     /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
     pub(crate) fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>, most: usize) -> usize {
-        let Self { star, boxes, own, .. } = self;
+        let Self { star, boxes, own, hull, .. } = self;
         let count = star.ring.len();
         let apex = m.map_or(vertex, |m| star.ring[m]);
         let point = |corner: u32| mesh.points[corner as usize];
+        hull.clear();
+        hull.extend(star.ring.iter().map(|&corner| (corner, point(corner))));
+        if m.is_none() {
+            hull.push((vertex, to.unwrap_or_else(|| point(vertex))));
+        }
         own.clear();
         let mut whole = Box32::EMPTY;
         for k in 0..count {
@@ -529,6 +532,10 @@ impl Mender {
                     continue;
                 }
                 let points = corners.map(point);
+                // What lies to one side of its plane meets it in common corners and edges only.
+                if Facet::new(corners, points).has_on_one_side(hull.iter().copied()) {
+                    continue;
+                }
                 let met =
                     |facet: &&Facet| !facet.parts(&corners, &points) && contact::meet([&corners, &facet.corners], [&points, &facet.points]);
                 for _ in near.filter(met) {

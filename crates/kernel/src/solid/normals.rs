@@ -73,18 +73,19 @@ impl Normals {
         }
     }
 
-    /// Whether all triangles of the tree that meet the hull of some points, and a few others whose normals have the box `own`, surely face one direction. `triangle_at` tells where a triangle of
+    /// Whether all triangles of the tree that meet the hull of some points, and a few others whose normals have the boxes `own`, surely face one direction. `triangle_at` tells where a triangle of
     /// the tree is, unless it does not count; `is_beside`, whether it has nothing of the hull but corners or an edge.
     pub(super) fn face_one_way(
         &self,
         tree: &BoxTree,
         points: impl Iterator<Item = Point> + Clone,
-        own: &Box32,
+        own: &[Box32],
         triangle_at: impl Fn(u32) -> Option<[Point; 3]>,
         is_beside: impl Fn(u32, &[Point; 3]) -> bool,
     ) -> bool {
-        let direction = (own.low + own.high).normalize_or_zero();
-        if !faces(own, direction) {
+        let all = own.iter().fold(Box32::EMPTY, |all, one| all.union(one));
+        let direction = (all.low + all.high).normalize_or_zero();
+        if !own.iter().all(|one| faces(one, direction)) {
             return false;
         }
         let exact = direction.to_array().map(f64::from);

@@ -98,7 +98,7 @@ impl Bodies<'_> {
     }
 
     /// The same as [`Bodies::above`] for a cube's centre.
-    fn above_centre(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
+    pub(super) fn above_centre(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
         let of_polytope = || self.above(Kind::Polytope, body, &cube.centre);
         self.radius(kind).map_or_else(of_polytope, |radius| self.above_near(radius, body, &cube.centre, near))
     }
@@ -111,11 +111,25 @@ impl Bodies<'_> {
         })
     }
 
-    /// Whether all of a cube is inside of all kinds of a body.
-    pub(super) fn covers(&self, kinds: &[Kind], body: u32, cube: &Cube, near: &Near) -> bool {
-        let is_centre_inside = kinds.iter().all(|&kind| self.above_centre(kind, body, cube, near).0 < -self.setting.slack);
-        // What is convex and holds the corners holds all.
-        is_centre_inside && cube.corners().all(|corner| self.is_inside(kinds, body, &corner))
+    /// Whether a body may have places in a cube, for all that is known of where another place, `from`, is from it.
+    ///
+    /// The distance is convex: everywhere it is no less than it grows from there along its gradient.
+    #[inline]
+    pub(super) fn may_reach(&self, body: u32, cube: &Cube, from: &Point, Near { way, distance }: &Near) -> bool {
+        let radius = self.figures[body as usize].in_space(self.setting.outer) + 4.0 * self.setting.slack;
+        distance * (distance - radius) + dot(way, &subtract(&cube.centre, from)) <= cube.half_along(way)
+    }
+
+    /// How deep a cube's centre is inside of all kinds of a body, or more, and less than 0 where it is beyond one; nothing exact where that is less than `least`.
+    pub(super) fn depth(&self, kinds: &[Kind], body: u32, cube: &Cube, near: &Near, least: f64) -> f64 {
+        let mut depth = f64::INFINITY;
+        for &kind in kinds {
+            depth = depth.min(-self.above_centre(kind, body, cube, near).0);
+            if depth < least {
+                break;
+            }
+        }
+        depth
     }
 
     /// Whether a place is surely inside of all kinds of a body.

@@ -6,7 +6,8 @@
 use super::bodies::{AXES, Bodies, Common, Kind, Near};
 use super::ellipsoid::Place;
 use super::figure::{Figure, box_of};
-use crate::attractor::cell::{Point, between, subtract};
+use super::nerve::Change;
+use crate::attractor::cell::{Point, between, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
 use crate::solid::Inside;
@@ -23,6 +24,10 @@ const WIDE: f64 = 32.0;
 /// Of one part: cubes that are looked at before those that are left are halved no more, and sets that are asked for at most.
 const CUBES_OF_A_PART: usize = 50_000;
 const ASKED_OF_A_PART: usize = 200_000;
+/// Means of bodies that are tried to show that they are apart.
+const MEANS: u32 = 6;
+/// Rounded up.
+const ROOT_OF_3: f64 = 1.732_050_808;
 /// Space is parted until no more than [`MANY`] bodies reach a part, or it is no wider than this in units of the radius.
 const PART: f64 = 4.0;
 
@@ -91,7 +96,7 @@ pub(super) struct Stage {
     /// What is inside of all of these is inside of a body all the time.
     inside: &'static [Kind],
     /// At any time a body is within one of these.
-    outside: &'static [Kind],
+    outside: [Kind; 2],
     /// Cubes that are halved no more, however many bodies reach them, in units of the radius.
     small: f64,
     /// Whether what is not settled is in doubt.
@@ -99,10 +104,10 @@ pub(super) struct Stage {
 }
 
 /// Whatever their polytopes are like.
-pub(super) const ANY: Stage = Stage { inside: &[Kind::Inner], outside: &[Kind::Outer], small: 0.2, is_last: false };
+pub(super) const ANY: Stage = Stage { inside: &[Kind::Inner], outside: [Kind::Outer; 2], small: 0.2, is_last: false };
 /// Dilations that become the polytopes as they are.
 pub(super) const PRESENT: Stage =
-    Stage { inside: &[Kind::Dilation, Kind::Polytope], outside: &[Kind::Dilation, Kind::Polytope], small: 0.05, is_last: true };
+    Stage { inside: &[Kind::Dilation, Kind::Polytope], outside: [Kind::Dilation, Kind::Polytope], small: 0.05, is_last: true };
 
 /// Parts of space with all places that more than one body reaches; none where these are more than `most`.
 ///
@@ -114,7 +119,7 @@ pub(super) fn parts(bodies: &Bodies<'_>, most: usize, budget: &Budget) -> Result
     let mut parts = Vec::new();
     while !halved.is_empty() {
         let halve = |(cube, list): &Listed| {
-            let reaches = |part: &Cube, body: u32| bodies.reaches(ANY.outside, body, part, &bodies.near(body, &part.centre));
+            let reaches = |part: &Cube, body: u32| bodies.reaches(&ANY.outside, body, part, &bodies.near(body, &part.centre));
             let part = |number: usize| {
                 let part = cube.part(number);
                 (part, list.iter().copied().filter(|&body| reaches(&part, body)).collect())
@@ -147,10 +152,15 @@ enum Known {
 pub(super) struct Search<'a> {
     bodies: &'a Bodies<'a>,
     stage: &'static Stage,
+    /// If given, only sets with a body that is around its dilation now may do something: all others are settled.
+    pub(super) due: Option<&'a [Change]>,
     known: NameMap<Set, Known>,
     /// Those that reach the cubes from the part to the one that is looked at, cube after cube, and where its centre is from them.
     listed: Vec<u32>,
     near: Vec<Near>,
+    /// Of the bodies of a cube how deep its centre is in them, and how high it is above each of what they are within, with a subgradient.
+    depths: Vec<f64>,
+    above: Vec<[(f64, Point); 2]>,
     /// Of every body of a cube the hubs in it, bit by bit, and how many hubs there are.
     hubs: Vec<u64>,
     count: u32,
@@ -183,7 +193,8 @@ enum Of {
 impl<'a> Search<'a> {
     pub(super) fn new(bodies: &'a Bodies<'a>, stage: &'static Stage) -> Self {
         let (known, listed, near, hubs) = (NameMap::default(), Vec::new(), Vec::new(), Vec::new());
-        Self { bodies, stage, known, listed, near, hubs, count: 0, cubes: 0, found: Found::default() }
+        let (depths, above) = (Vec::new(), Vec::new());
+        Self { bodies, stage, due: None, known, listed, near, depths, above, hubs, count: 0, cubes: 0, found: Found::default() }
     }
 
     /// Looks at a part of space.
@@ -197,29 +208,32 @@ impl<'a> Search<'a> {
         // Of the list as a whole no place is asked for.
         self.near.clear();
         self.near.resize(list.len(), Near::default());
-        self.look(cube, 0, budget)?;
+        self.look(cube, 0, &cube.centre, budget)?;
         let mut found = std::mem::take(&mut self.found);
         found.doubts.sort_unstable_by_key(|&(set, _)| set);
         found.doubts.dedup_by_key(|&mut (set, _)| set);
         Ok(found)
     }
 
-    /// Looks at a cube within one that the bodies reach whose list begins at a place.
-    fn look(&mut self, cube: &Cube, from: usize, budget: &Budget) -> Result<(), Stopped> {
+    /// Looks at a cube within one that the bodies reach whose list begins at a place, and whose centre is `around`.
+    fn look(&mut self, cube: &Cube, from: usize, around: &Point, budget: &Budget) -> Result<(), Stopped> {
         budget.cancel.check()?;
         let (bodies, to) = (self.bodies, self.listed.len());
         self.cubes += 1;
         for place in from..to {
             let body = self.listed[place];
+            if !bodies.may_reach(body, cube, around, &self.near[place]) {
+                continue;
+            }
             let near = bodies.near(body, &cube.centre);
-            if bodies.reaches(self.stage.outside, body, cube, &near) {
+            if bodies.reaches(&self.stage.outside, body, cube, &near) {
                 self.listed.push(body);
                 self.near.push(near);
             }
         }
         if !self.is_settled(cube, to) {
             for number in 0..8 {
-                self.look(&cube.part(number), to, budget)?;
+                self.look(&cube.part(number), to, &cube.centre, budget)?;
             }
         }
         self.listed.truncate(to);
@@ -231,11 +245,11 @@ impl<'a> Search<'a> {
     fn is_settled(&mut self, cube: &Cube, from: usize) -> bool {
         let (bodies, inside, reach) = (self.bodies, self.stage.inside, self.bodies.setting.reach);
         let (list, near) = (&self.listed[from..], &self.near[from..]);
-        if list.len() < 2 || self.found.is_cut_short {
+        if list.len() < 2 || self.found.is_cut_short || !self.is_due(list.iter().copied()) {
             return true;
         }
         if cube.half <= reach {
-            if list.iter().zip(near).any(|(&body, near)| bodies.covers(inside, body, cube, near)) {
+            if is_covered(bodies, inside, cube, list, near, &mut self.depths) {
                 return true;
             }
             let sum = near.iter().fold([0.0; 3], |sum: Point, near| std::array::from_fn(|axis| sum[axis] + near.way[axis]));
@@ -251,6 +265,10 @@ impl<'a> Search<'a> {
         if !is_few && !is_small {
             return false;
         }
+        self.above.clear();
+        let outside = self.stage.outside;
+        let above = |(&body, near): (&u32, &Near)| outside.map(|kind| bodies.above_centre(kind, body, cube, near));
+        self.above.extend(list.iter().zip(near).map(above));
         let list: Box<[u32]> = list.into();
         if self.are_settled(cube, &list, is_small) {
             return true;
@@ -304,6 +322,9 @@ impl<'a> Search<'a> {
 
     /// Whether some of the bodies of a cube, by their places in its list, may have a common place there that is not hidden; none where smaller cubes may tell that they do nothing.
     fn may_meet(&mut self, cube: &Cube, list: &[u32], places: &[usize], is_small: bool) -> Option<bool> {
+        if !self.is_due(places.iter().map(|&place| list[place])) {
+            return Some(!self.are_parted(cube, places));
+        }
         let common = match self.of(cube, list, places) {
             Of::Meet => return Some(true),
             Of::Apart => return Some(false),
@@ -331,6 +352,9 @@ impl<'a> Search<'a> {
         if places.iter().fold(u64::MAX, |common, &place| common & self.hubs[place]) != 0 || self.found.is_cut_short {
             return Of::Meet;
         }
+        if self.are_parted(cube, places) {
+            return Of::Apart;
+        }
         let (bodies, stage) = (self.bodies, self.stage);
         let mut set = [0; MOST_BODIES];
         set.iter_mut().zip(places).for_each(|(slot, &place)| *slot = list[place]);
@@ -345,13 +369,49 @@ impl<'a> Search<'a> {
                 return Of::Apart;
             }
         }
-        match *known.get_or_insert_with(|| *self.known.entry(name).or_insert(stage.known(bodies, set))) {
+        match *known.get_or_insert_with(|| *self.known.entry(name).or_insert_with(|| stage.known(bodies, set, &cube.centre))) {
             Known::Meet(x) => {
                 self.add_hub(list, &x);
                 Of::Meet
             }
             Known::Doubtful(common) => Of::Doubtful(common),
         }
+    }
+
+    /// Whether one of some bodies may make a difference to what is settled.
+    fn is_due(&self, mut some: impl Iterator<Item = u32>) -> bool {
+        self.due.is_none_or(|changes| some.any(|body| changes[body as usize] == Change::Around))
+    }
+
+    /// Whether some of the bodies of a cube surely have no common place there, whatever is taken for them.
+    fn are_parted(&self, cube: &Cube, places: &[usize]) -> bool {
+        (0..self.stage.outside.len()).all(|kind| self.is_mean_above(cube, places, kind))
+    }
+
+    /// Whether what is known of a cube's centre shows that some of the bodies have no common place there: a mean of convex functions is above 0 if one of their subgradients is, all over the cube, and then so is the largest of them. Weights that show it are
+    /// sought by steps to the function that is highest where the mean is lowest (Frank and Wolfe, "An algorithm for quadratic programming", 1956).
+    fn is_mean_above(&self, cube: &Cube, places: &[usize], kind: usize) -> bool {
+        let mut weights = [0.0; MOST_BODIES];
+        weights[..places.len()].fill(1.0 / places.len() as f64);
+        for step in 0..MEANS {
+            let (mut mean, mut slope) = (0.0, [0.0; 3]);
+            for (&place, weight) in places.iter().zip(&weights) {
+                let (above, away) = &self.above[place][kind];
+                mean += weight * above;
+                slope = std::array::from_fn(|axis| slope[axis] + weight * away[axis]);
+            }
+            if mean - cube.half_along(&slope) > 4.0 * self.bodies.setting.slack {
+                return true;
+            }
+            let lowest: Point = slope.map(|part| if part > 0.0 { -cube.half } else { cube.half });
+            let heights = places.iter().map(|&place| &self.above[place][kind]).map(|(above, away)| above + dot(away, &lowest));
+            let highest = heights.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((highest, _)) = highest.filter(|&(_, height)| height > 0.0) else { return false };
+            let share = 1.0 / f64::from(step + 2);
+            weights.iter_mut().for_each(|weight| *weight *= 1.0 - share);
+            weights[highest] += share;
+        }
+        false
     }
 
     /// Whether one hub is in all bodies of the list.
@@ -371,13 +431,32 @@ impl<'a> Search<'a> {
 }
 
 impl Stage {
-    /// What is known of a set wherever it is.
-    fn known(&self, bodies: &Bodies<'_>, set: &[u32]) -> Known {
+    /// What is known of a set, of which all are near to a place, wherever it is.
+    fn known(&self, bodies: &Bodies<'_>, set: &[u32], near: &Point) -> Known {
+        if let Some(x) = bodies.hub(self.inside, set, *near) {
+            return Known::Meet(x);
+        }
         match bodies.common(self.inside, set, bodies.within(set), -bodies.setting.slack) {
             Place::At(x) => Known::Meet(x),
             _ => Known::Doubtful(if self.is_last { bodies.common_of_dilations(set) } else { Common::Unknown }),
         }
     }
+}
+
+/// Whether all of a cube is inside of all kinds of one of some bodies.
+fn is_covered(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list: &[u32], near: &[Near], depths: &mut Vec<f64>) -> bool {
+    depths.clear();
+    for (&body, near) in list.iter().zip(near) {
+        // What holds the cube holds the ball in it; and what holds the ball around it holds the cube.
+        let depth = bodies.depth(kinds, body, cube, near, cube.half);
+        if depth > cube.half * ROOT_OF_3 + bodies.setting.slack {
+            return true;
+        }
+        depths.push(depth);
+    }
+    let may_hold = list.iter().zip(depths).filter(|(_, depth)| **depth >= cube.half);
+    // What is convex and holds the corners holds all.
+    may_hold.into_iter().any(|(&body, _)| cube.corners().all(|corner| bodies.is_inside(kinds, body, &corner)))
 }
 
 /// Whether all of a cube is inside of a solid.

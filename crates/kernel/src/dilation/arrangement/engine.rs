@@ -6,7 +6,7 @@
 use super::bodies::{Bodies, Common};
 use super::figure::{Figure, Outline};
 use super::form::{Form, Kind};
-use super::nerve::{Doubt, Sets};
+use super::nerve::{Change, Doubt, Sets};
 use super::pieces::{self, Lists};
 use super::polytopes::{self, Cut, Plane, Polytope, Polytopes, Shell};
 use super::{Arranged, Arrangement};
@@ -127,13 +127,13 @@ impl<'a> Engine<'a> {
             return Ok(Run::Open);
         }
         let Some(mut sets) = Sets::new(&self.bodies(), budget)? else { return Ok(Run::Doubtful) };
-        let mut changed = vec![true; self.sites.len()];
+        let mut changes = vec![Change::Other; self.sites.len()];
         let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
-        while changed.contains(&true) {
-            if !sets.look(&self.bodies(), &changed, most, budget)? {
+        while changes.iter().any(|&change| change != Change::Nothing) {
+            if !sets.look(&self.bodies(), &changes, most, budget)? {
                 return Ok(Run::Doubtful);
             }
-            changed = self.refine(&sets.doubts(), budget)?;
+            changes = self.refine(&sets.doubts(), budget)?;
         }
         // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
         if !self.solids.is_empty() && !sets.doubts().is_empty() {
@@ -187,9 +187,9 @@ impl<'a> Engine<'a> {
         (state.level..LEVELS).find_map(|level| Polytope::new(figure, of_level(level)?, shell, cut, seed))
     }
 
-    /// Changes polytopes of sites in doubt, and returns which ones are others now. Where dilations have no common point, planes between them part the polytopes, too; where they have one, polytopes are around the dilations; and where that was done,
+    /// Changes polytopes of sites in doubt, and returns how. Where dilations have no common point, planes between them part the polytopes, too; where they have one, polytopes are around the dilations; and where that was done,
     /// or it is not known, they become finer as far as there are forms.
-    fn refine(&mut self, doubts: &[Doubt], budget: &Budget) -> Result<Vec<bool>, Stopped> {
+    pub(super) fn refine(&mut self, doubts: &[Doubt], budget: &Budget) -> Result<Vec<Change>, Stopped> {
         let mut is_cut = vec![false; self.sites.len()];
         let mut next = self.states.clone();
         for Doubt { sites, wanted } in doubts {
@@ -231,13 +231,18 @@ impl<'a> Engine<'a> {
             Ok(wanted.find_map(made))
         };
         let made: Vec<Option<(State, Polytope)>> = (0..next.len()).into_par_iter().map(made).collect::<Result<_, Stopped>>()?;
-        let changed = made.iter().map(Option::is_some).collect();
+        let mut changes = vec![Change::Nothing; made.len()];
         for (index, made) in made.into_iter().enumerate() {
             if let Some((state, polytope)) = made {
+                changes[index] = match state {
+                    state if state == self.states[index] => Change::Cut,
+                    State { is_around: true, .. } => Change::Around,
+                    State { is_around: false, .. } => Change::Other,
+                };
                 self.states[index] = state;
                 self.polytopes.all[index] = polytope;
             }
         }
-        Ok(changed)
+        Ok(changes)
     }
 }

@@ -4,7 +4,7 @@
 //! topology, changes. What changes is that there are fewer bodies, and fewer of them near to each other.
 
 use super::polyhedron::Polyhedron;
-use crate::attractor::cell::{Point, Site, closest_on_segment, cross, distance_squared, dot, subtract, unit};
+use crate::attractor::cell::{Point, Site, between, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::dilation::tree::Weighted;
@@ -163,12 +163,19 @@ impl Polygon {
         }
         let mut best: Option<(f64, Point)> = None;
         for (side, (from, out)) in self.corners.iter().zip(&self.outward).enumerate() {
-            // Beyond sides, the closest point is on one of these.
-            if dot(out, &subtract(x, from)) > 0.0 {
-                let on = closest_on_segment(x, from, &self.corners[(side + 1) % self.corners.len()]);
-                let square = distance_squared(x, &on);
+            // Beyond sides, the closest point is on one of these; and where it is between the ends of one, no other is as close.
+            let way = subtract(x, from);
+            if dot(out, &way) > 0.0 {
+                let to = &self.corners[if side + 1 < self.corners.len() { side + 1 } else { 0 }];
+                let along = subtract(to, from);
+                let (part, whole) = (dot(&way, &along), dot(&along, &along));
+                if 0.0 < part && part < whole {
+                    return between(from, to, part / whole);
+                }
+                let end = if part > 0.0 { to } else { from };
+                let square = distance_squared(x, end);
                 if best.is_none_or(|(least, _)| square < least) {
-                    best = Some((square, on));
+                    best = Some((square, *end));
                 }
             }
         }

@@ -83,7 +83,7 @@ impl Bodies<'_> {
             is_centre_hidden |= highest <= 0.0 && own.is_some() && is_centre_inside();
         }
         let corner = |number: usize| boxes.place(&std::array::from_fn(|axis| if number >> axis & 1 == 1 { high[axis] } else { low[axis] }));
-        let mut left = Vec::new();
+        let (mut left, mut deepest) = (Vec::new(), f64::INFINITY);
         for &body in around {
             let [own, of_polytope] = [Kind::Dilation, Kind::Polytope].map(|kind| self.above(kind, body, &centre));
             if own.0 >= half_along(&own.1) || of_polytope.0 >= half_along(&of_polytope.1) {
@@ -97,6 +97,12 @@ impl Bodies<'_> {
                 return true;
             }
             left.push(body);
+            if above < deepest {
+                // Looked at first in the halves: it is likely to hide them.
+                deepest = above;
+                let last = left.len() - 1;
+                left.swap(0, last);
+            }
             is_centre_hidden |= above < -slack;
         }
         let has_none = left.is_empty() && self.solids.is_empty();

@@ -11,7 +11,7 @@
 //! * (hidden) there all common points of the D_i, and all of the P_i, are in the interior of some E_j, or of a solid.
 //!
 //! Sets that hold one which does not meet there, or which is hidden, do nothing either. Space is parted into cubes, each with the bodies that reach it (see `cubes`). At first polytopes are taken for anything between their dilations by the ends of the band:
-//! what is settled so, which is most, stays settled. The cubes that are left are looked at, with the polytopes as they are, whenever one that reaches them is another. Polytopes that are below planes which part dilations, or are around the dilations, settle what is in doubt (see `engine`).
+//! what is settled so, which is most, stays settled. The cubes that are left are looked at, with the polytopes as they are, and again where these are changed in a way that may open what was settled, see [`Change`]. Polytopes that are below planes which part dilations, or are around the dilations, settle what is in doubt (see `engine`).
 //!
 //! If nothing of that kind is anywhere, both unions, with the solids, have as many components, handles and voids.
 
@@ -41,6 +41,18 @@ pub(super) struct Doubt {
 
 /// The sets in doubt in a cube, and whether their dilations have a common point.
 type Doubts = Vec<(Set, Common)>;
+
+/// How a polytope P_i was changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Change {
+    Nothing,
+    /// It lies below planes that the dilation D_i is below, too: it is within what it was, and E_i = D_i n P_i is the same. So nothing that was settled is open again.
+    Cut,
+    /// It is around the dilation: E_i is all of that. Of what was settled, only sets that have the body in them may be open again: where they did not meet, or were hidden.
+    Around,
+    /// Otherwise.
+    Other,
+}
 
 /// What is known of the sets of sites, while polytopes change.
 #[derive(Debug)]
@@ -79,17 +91,20 @@ impl Sets {
         all.into_iter().map(|(set, wanted)| Doubt { sites: cubes::sites(set).collect(), wanted }).collect()
     }
 
-    /// Looks at the cubes that sites reach which are `changed`, at first all of them. False where there was too much to look at, or more sets are in doubt than `most`.
+    /// Looks at the cubes where changes of the sites' polytopes may tell: at first, when they are all other ones, all of them. False where there was too much to look at, or more sets are in doubt than `most`.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn look(&mut self, bodies: &Bodies<'_>, changed: &[bool], most: usize, budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn look(&mut self, bodies: &Bodies<'_>, changes: &[Change], most: usize, budget: &Budget) -> Result<bool, Stopped> {
         let mut left = most_asked(bodies);
         for (cubes, doubts) in self.cubes.chunks(AT_A_TIME).zip(self.doubts.chunks_mut(AT_A_TIME)) {
             let look = |(cubes, doubts): (&[Listed], &mut [Doubts])| {
                 let (mut search, mut all) = (Search::new(bodies, &PRESENT), 0);
                 for (listed, doubts) in cubes.iter().zip(doubts) {
-                    if listed.1.iter().any(|&body| changed[body as usize]) {
+                    let has = |change: Change| listed.1.iter().any(|&body| changes[body as usize] == change);
+                    let is_open = has(Change::Other) || (!doubts.is_empty() && (has(Change::Cut) || has(Change::Around)));
+                    if is_open || has(Change::Around) {
+                        search.due = (!is_open).then_some(changes);
                         let Found { doubts: found, asked, is_cut_short, .. } = search.run(listed, budget)?;
                         *doubts = found;
                         all += asked;

@@ -6,6 +6,7 @@
 
 use super::figure::Figure;
 use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
+use super::structure::Edge;
 use crate::attractor::cell::{Point, between, cross, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -153,7 +154,8 @@ pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Resu
     // No facet of either parts them.
     let is_beside = |index: u32, other: u32| met[other as usize].binary_search(&index).is_ok();
     met = indices().map(|index| met[index as usize].iter().copied().filter(|&other| is_beside(index, other)).collect()).collect();
-    let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden };
+    let seen: Vec<Seen> = indices().map(|index| Seen::of(polytopes.of(index), &hidden[index as usize])).collect();
+    let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden, seen: &seen };
     let pieces = indices().map_init(Scratch::default, |scratch, index| {
         budget.cancel.check()?;
         arrangement.of(index, scratch);
@@ -183,19 +185,20 @@ fn beside(polytopes: &Polytopes, near: &[u32], index: u32, beyond: &mut Beyond) 
 /// How many triangles of the union some polytopes, in ascending order, have, about: a facet with k edges has k - 2, and each edge is on two.
 pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let total = polytopes.all.len();
-    let (mut lists, mut masks): (Vec<Option<Vec<u32>>>, Vec<Mask>) = (vec![None; total], vec![Mask::default(); total]);
+    let (mut met, mut hidden, mut seen) = (vec![Vec::new(); total], vec![Mask::default(); total], Vec::new());
+    seen.resize_with(total, Seen::default);
     let mut beyond = Beyond::default();
-    for &index in of.iter().chain(of.iter().flat_map(|&index| near.of(index))) {
-        let slot = &mut lists[index as usize];
-        if slot.is_none() {
-            let (mut own, hidden) = beside(polytopes, near.of(index), index, &mut beyond);
-            own.retain(|&other| beyond.fill(&polytopes.of(other).corners, polytopes.of(index)));
-            masks[index as usize] = hidden;
-            *slot = Some(own);
-        }
+    // What others hide of the neighbours changes nothing, and takes long to tell.
+    for &index in of {
+        let (mut own, mask) = beside(polytopes, near.of(index), index, &mut beyond);
+        own.retain(|&other| beyond.fill(&polytopes.of(other).corners, polytopes.of(index)));
+        hidden[index as usize] = mask;
+        met[index as usize] = own;
     }
-    let met: Vec<Vec<u32>> = lists.into_iter().map(Option::unwrap_or_default).collect();
-    let arrangement = Arrangement { polytopes, met: &met, hidden: &masks };
+    for &index in of.iter().chain(of.iter().flat_map(|&index| &met[index as usize])) {
+        seen[index as usize] = Seen::of(polytopes.of(index), &hidden[index as usize]);
+    }
+    let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden, seen: &seen };
     let mut scratch = Scratch::default();
     of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
     let mut facets: Vec<u32> =
@@ -215,7 +218,7 @@ struct Beyond {
 }
 
 impl Beyond {
-    /// Looks at all corners; false where all are beyond one facet.
+    /// Looks at some corners; false where all are beyond one facet.
     fn fill(&mut self, corners: &[Point], of: &Polytope) -> bool {
         let number = corners.len();
         for (axis, places) in self.places.iter_mut().enumerate() {
@@ -381,11 +384,34 @@ struct Third {
     parting: u16,
 }
 
+/// What may be seen of a polytope: the edges of facets that no other hides.
+#[derive(Default)]
+struct Seen {
+    /// Their numbers, and the places of their ends among the corners.
+    edges: Vec<(usize, [usize; 2])>,
+    corners: Vec<Point>,
+}
+
+impl Seen {
+    fn of(polytope: &Polytope, hidden: &Mask) -> Self {
+        let structure = &polytope.structure;
+        let is_seen = |edge: &Edge| edge.facets.iter().any(|&facet| !hidden.has(usize::from(facet)));
+        let edges = || structure.edges.iter().enumerate().filter(|(_, edge)| is_seen(edge));
+        let mut corners: Vec<u16> = edges().flat_map(|(_, edge)| edge.corners).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        let place = |corner: u16| corners.binary_search(&corner).unwrap_or_default();
+        let edges = edges().map(|(number, edge)| (number, edge.corners.map(place))).collect();
+        Self { edges, corners: corners.iter().map(|&corner| polytope.corners[usize::from(corner)]).collect() }
+    }
+}
+
 /// What is needed to find pieces.
 struct Arrangement<'a> {
     polytopes: &'a Polytopes,
     met: &'a [Vec<u32>],
     hidden: &'a [Mask],
+    seen: &'a [Seen],
 }
 
 impl Arrangement<'_> {
@@ -397,13 +423,15 @@ impl Arrangement<'_> {
 
     /// Pieces of a polytope's edges, and of the lines where it meets later ones.
     fn of(&self, index: u32, scratch: &mut Scratch) {
-        let edges = &self.polytopes.structure(index).edges;
-        scratch.is_gone.clear();
-        scratch.is_gone.extend(edges.iter().map(|edge| !edge.facets.iter().any(|&facet| self.is_seen(index, facet))));
-        if !scratch.is_gone.contains(&false) {
+        let seen = &self.seen[index as usize];
+        if seen.edges.is_empty() {
             return;
         }
-        scratch.cuts.resize_with(edges.len().max(scratch.cuts.len()), Vec::new);
+        let number = self.polytopes.structure(index).edges.len();
+        scratch.is_gone.clear();
+        scratch.is_gone.resize(number, true);
+        seen.edges.iter().for_each(|&(edge, _)| scratch.is_gone[edge] = false);
+        scratch.cuts.resize_with(number.max(scratch.cuts.len()), Vec::new);
         scratch.cuts.iter_mut().for_each(Vec::clear);
         scratch.recent.clear();
         scratch.recent.extend(self.met[index as usize].iter().map(|&index| Third { index, parting: 0 }));
@@ -420,15 +448,16 @@ impl Arrangement<'_> {
 
     /// Finds where the edges of one polytope pierce the facets of another; its own cuts are kept, and places where lines of both end.
     fn pierce(&self, index: u32, other: u32, is_first: bool, with_lines: bool, scratch: &mut Scratch) {
-        let (structure, corners) = (self.polytopes.structure(index), &self.polytopes.of(index).corners);
-        let by = self.polytopes.of(other);
-        scratch.beyond.fill(corners, by);
-        for (number, edge) in structure.edges.iter().enumerate() {
-            let [p, q] = edge.corners.map(usize::from);
-            if scratch.beyond.are_apart([p, q]) || !edge.facets.iter().any(|&facet| self.is_seen(index, facet)) {
+        let (structure, seen) = (self.polytopes.structure(index), &self.seen[index as usize]);
+        if !scratch.beyond.fill(&seen.corners, self.polytopes.of(other)) {
+            return;
+        }
+        for &(number, ends) in &seen.edges {
+            if scratch.beyond.are_apart(ends) {
                 continue;
             }
-            let Some(cuts) = covered(self.polytopes, other, [&corners[p], &corners[q]], scratch.beyond.of_either([p, q])) else { continue };
+            let (edge, [p, q]) = (&structure.edges[number], ends.map(|end| &seen.corners[end]));
+            let Some(cuts) = covered(self.polytopes, other, [p, q], scratch.beyond.of_either(ends)) else { continue };
             if is_first {
                 scratch.is_gone[number] |= cuts.iter().all(|cut| cut.facet.is_none());
                 scratch.cuts[number].push(cuts);
@@ -441,7 +470,7 @@ impl Arrangement<'_> {
                     continue;
                 }
                 let name = pierced(edge_number(index, number), theirs);
-                let at = between(&corners[p], &corners[q], at);
+                let at = between(p, q, at);
                 for &facet in edge.facets.iter().filter(|&&facet| self.is_seen(index, facet)) {
                     let own = facet_number(index, usize::from(facet));
                     scratch.found.push(Pierced { facets: if is_first { [own, theirs] } else { [theirs, own] }, name, at });

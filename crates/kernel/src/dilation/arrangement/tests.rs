@@ -3,7 +3,7 @@ use super::bodies::{Common, Kind};
 use super::cubes::{Cube, MOST_BODIES};
 use super::ellipsoid::Place;
 use super::engine::Engine;
-use super::nerve::Sets;
+use super::nerve::{Change, Sets};
 use super::polytopes::height;
 use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
@@ -704,7 +704,7 @@ fn hidden_places_are_hidden() {
 #[test]
 fn what_is_not_in_doubt_meets() {
     let mut random = Random(59);
-    let (mut met, mut doubtful, mut exposed, mut all) = (0, 0, 0, 0);
+    let (mut met, mut doubtful, mut exposed, mut all, mut changed) = (0, 0, 0, [0; 3], [0; 4]);
     for round in 0..12_u32 {
         let size = 2.0 + f64::from(round % 4);
         let shape = match round % 3 {
@@ -719,41 +719,52 @@ fn what_is_not_in_doubt_meets() {
             let mut engine = Engine::new(arrangement, 0, &[]);
             let budget = Budget::default();
             assert!(engine.begin(&budget).unwrap());
-            let bodies = engine.bodies();
             let count = arrangement.sites.list.len() as u32;
-            let mut sets = Sets::new(&bodies, &budget).unwrap().expect("there are few");
-            assert!(sets.look(&bodies, &vec![true; count as usize], usize::MAX, &budget).unwrap());
-            let doubts: Vec<Vec<u32>> = sets.doubts().into_iter().map(|doubt| doubt.sites).collect();
-            all += doubts.len();
-            for _ in 0..20_000 {
-                // About as far from some figure as the band is.
-                let corners = arrangement.sites.list[random.next() as usize % count as usize].corners();
-                let from = DVec3::from_array(corners[random.next() as usize % corners.len()]);
-                let x = from + (0.88 + 0.2 * random.share()) * (place(&mut random, 2.0) - DVec3::ONE).normalize();
-                let own: Vec<[bool; 2]> = (0..count).map(|body| is_in(&engine, body, x)).collect();
-                if own.contains(&[true; 2]) {
-                    continue;
-                }
-                exposed += 1;
-                for of_kind in [0, 1].map(|kind| own.iter().map(|own| own[kind]).collect::<Vec<bool>>()) {
-                    let set: Vec<u32> = (0..count).filter(|&body| of_kind[body as usize]).collect();
-                    if set.len() < 2 {
+            let mut sets = Sets::new(&engine.bodies(), &budget).unwrap().expect("there are few");
+            let mut changes = vec![Change::Other; count as usize];
+            // As the polytopes are first, and twice after they were changed.
+            for (step, all) in all.iter_mut().enumerate() {
+                let bodies = engine.bodies();
+                assert!(sets.look(&bodies, &changes, usize::MAX, &budget).unwrap());
+                let doubts: Vec<Vec<u32>> = sets.doubts().into_iter().map(|doubt| doubt.sites).collect();
+                *all += doubts.len();
+                for _ in 0..8_000 {
+                    // About as far from some figure as the band is.
+                    let corners = arrangement.sites.list[random.next() as usize % count as usize].corners();
+                    let from = DVec3::from_array(corners[random.next() as usize % corners.len()]);
+                    let x = from + (0.88 + 0.2 * random.share()) * (place(&mut random, 2.0) - DVec3::ONE).normalize();
+                    let own: Vec<[bool; 2]> = (0..count).map(|body| is_in(&engine, body, x)).collect();
+                    if own.contains(&[true; 2]) {
                         continue;
                     }
-                    let some: Vec<u32> = (0..MOST_BODIES).map(|_| set[(random.next() % set.len() as u64) as usize]).collect();
-                    let set: Vec<u32> = (0..count).filter(|body| some.contains(body)).collect();
-                    if doubts.iter().any(|doubt| doubt.iter().all(|site| set.contains(site))) {
-                        doubtful += 1;
-                    } else {
-                        let place = bodies.common(&[Kind::Dilation, Kind::Polytope], &set, bodies.within(&set), 0.0);
-                        assert!(matches!(place, Place::At(_)), "{round}: {set:?} at {x}, of {count}");
-                        met += usize::from(set.len() > 1);
+                    exposed += 1;
+                    for of_kind in [0, 1].map(|kind| own.iter().map(|own| own[kind]).collect::<Vec<bool>>()) {
+                        let set: Vec<u32> = (0..count).filter(|&body| of_kind[body as usize]).collect();
+                        if set.len() < 2 {
+                            continue;
+                        }
+                        let some: Vec<u32> = (0..MOST_BODIES).map(|_| set[(random.next() % set.len() as u64) as usize]).collect();
+                        let set: Vec<u32> = (0..count).filter(|body| some.contains(body)).collect();
+                        if doubts.iter().any(|doubt| doubt.iter().all(|site| set.contains(site))) {
+                            doubtful += 1;
+                        } else {
+                            let place = bodies.common(&[Kind::Dilation, Kind::Polytope], &set, bodies.within(&set), 0.0);
+                            assert!(matches!(place, Place::At(_)), "{round}, {step}: {set:?} at {x}, of {count}");
+                            met += usize::from(set.len() > 1);
+                        }
                     }
+                }
+                changes = engine.refine(&sets.doubts(), &budget).unwrap();
+                for change in &changes {
+                    changed[*change as usize] += 1;
                 }
             }
         });
     }
-    assert!(met > 300 && all > 3 && exposed > 5_000, "{met} met, {doubtful} in {all} doubts, {exposed} exposed");
+    let [_, cut, around, other] = changed;
+    assert!(cut > 3 && around > 10, "{cut} cut, {around} around, {other} otherwise");
+    assert!(all[0] > 3 && all[2] < all[0], "{all:?} in doubt");
+    assert!(met > 300 && exposed > 5_000, "{met} met, {doubtful} in doubt, {exposed} exposed");
 }
 
 /// Plates side by side with a chamfered corner, so small that rounding turns its side anyhow, far from the origin: they do not meet, and nothing between them is hidden.
