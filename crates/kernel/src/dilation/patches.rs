@@ -10,6 +10,7 @@ use super::surface::BlockSurface;
 use super::tree::NodeId;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
+use crate::solid::half_edges::NONE;
 
 /// Triangles of a part that is not halved, about.
 const MOST_TRIANGLES: usize = 8_192;
@@ -26,7 +27,7 @@ const MOST_SHARED: usize = 3;
 /// [`Stopped`]; the surface is lost then.
 pub(super) fn simplify(setting: &Setting, index: &Index, core: Core, surface: &mut BlockSurface, budget: &Budget) -> Result<(), Stopped> {
     let all = Part { core, triangles: (0..surface.triangles.len() as u32).collect(), halvings: 0 };
-    let patches = Patches { setting, index, surface, simplifiers: Pool::default(), budget };
+    let patches = Patches { setting, index, surface, memories: Pool::default(), budget };
     let Patch { inside, across, .. } = patches.of(all, &index.all())?;
     let across = across.into_iter().map(|triangle| surface.triangles[triangle as usize]);
     surface.triangles = inside.into_iter().chain(across).collect();
@@ -56,11 +57,18 @@ struct Patches<'a> {
     setting: &'a Setting,
     index: &'a Index,
     surface: &'a BlockSurface,
-    simplifiers: Pool<Simplifier<&'a Index>>,
+    memories: Pool<Memory<'a>>,
     budget: &'a Budget,
 }
 
-impl Patches<'_> {
+/// Working memory of a thread.
+struct Memory<'a> {
+    simplifier: Simplifier<&'a Index>,
+    /// Of every vertex of all of the surface, its number in the part that is worked on.
+    numbers: Vec<u32>,
+}
+
+impl<'a> Patches<'a> {
     fn of(&self, part: Part, figures: &[NodeId]) -> Result<Patch, Stopped> {
         self.budget.cancel.check()?;
         // Figures that are farther from all places inside cover none of them.
@@ -98,16 +106,17 @@ impl Patches<'_> {
             let [a, b, c] = self.surface.corners(triangle).map(|corner| corner[axis]);
             choose(choose(a, b), c)
         };
-        let middle = |axis: usize| {
-            let mut begins: Vec<f64> = triangles.iter().map(|&triangle| extreme(triangle, axis, f64::min).max(core.low[axis])).collect();
-            let spread = begins.iter().copied().fold(f64::NEG_INFINITY, f64::max) - begins.iter().copied().fold(f64::INFINITY, f64::min);
+        let begins = |axis: usize| triangles.iter().map(move |&triangle| extreme(triangle, axis, f64::min).max(core.low[axis]));
+        let spread =
+            |axis: usize| begins(axis).fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], begin| [least.min(begin), most.max(begin)]);
+        let mut axes = [2, 1, 0].map(|axis| (axis, spread(axis)));
+        axes.sort_by(|(_, a), (_, b)| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+        let middle = |&(axis, _): &(usize, [f64; 2])| {
+            let mut begins: Vec<f64> = begins(axis).collect();
             let (_, &mut plane, _) = begins.select_nth_unstable_by(triangles.len() / 2, f64::total_cmp);
-            (spread, plane)
+            (core.low[axis] < plane && plane < core.high[axis]).then_some((axis, plane))
         };
-        let middles: [(f64, f64); 3] = std::array::from_fn(middle);
-        let may_part = |axis: &usize| core.low[*axis] < middles[*axis].1 && middles[*axis].1 < core.high[*axis];
-        let Some(axis) = (0..3).filter(may_part).max_by(|&a, &b| middles[a].0.total_cmp(&middles[b].0)) else { return Err(part) };
-        let plane = middles[axis].1;
+        let Some((axis, plane)) = axes.iter().find_map(middle) else { return Err(part) };
         let (mut below, mut above) = (*core, *core);
         (below.high[axis], above.low[axis]) = (plane, plane);
         let lower: Vec<u32> = triangles.iter().copied().filter(|&triangle| extreme(triangle, axis, f64::min) <= plane).collect();
@@ -134,24 +143,35 @@ impl Patches<'_> {
     }
 
     fn simplified(&self, core: &Core, figures: &[NodeId], patch: Patch) -> Result<Patch, Stopped> {
+        let Self { setting, index, surface, .. } = *self;
+        let new = || Memory { simplifier: Simplifier::new(index, setting), numbers: vec![NONE; surface.vertices.len()] };
+        self.memories.with(new, |memory| self.simplified_with(memory, core, figures, patch))
+    }
+
+    fn simplified_with(&self, memory: &mut Memory<'a>, core: &Core, figures: &[NodeId], patch: Patch) -> Result<Patch, Stopped> {
         let Patch { inside, across, settled } = patch;
-        let triangles: Vec<[u32; 3]> =
+        let Memory { simplifier, numbers } = memory;
+        let mut triangles: Vec<[u32; 3]> =
             inside.into_iter().chain(across.iter().map(|&triangle| self.surface.triangles[triangle as usize])).collect();
-        let mut names: Vec<u32> = triangles.iter().flatten().copied().collect();
+        let mut names: Vec<u32> = Vec::new();
+        for &corner in triangles.iter().flatten() {
+            if std::mem::replace(&mut numbers[corner as usize], 0) == NONE {
+                names.push(corner);
+            }
+        }
         names.sort_unstable();
-        names.dedup();
-        let number = |vertex: &u32| names.binary_search(vertex).unwrap_or_default();
+        (0..).zip(&names).for_each(|(number, &name)| numbers[name as usize] = number);
+        triangles.iter_mut().flatten().for_each(|corner| *corner = numbers[*corner as usize]);
         let mut own = BlockSurface {
             vertices: names.iter().map(|&vertex| self.surface.vertices[vertex as usize]).collect(),
-            triangles: triangles.iter().map(|corners| corners.map(|corner| number(&corner) as u32)).collect(),
+            triangles,
             shared: names.iter().zip(0..).map(|(&vertex, number)| (vertex.into(), number)).collect(),
             settled: vec![false; names.len()],
             ..BlockSurface::default()
         };
-        settled.iter().for_each(|vertex| own.settled[number(vertex)] = true);
-        let Self { setting, index, budget, .. } = *self;
-        let run = |simplifier: &mut Simplifier<&Index>| simplifier.run(setting, &OF_POLYTOPES, core, figures, &mut own, budget);
-        self.simplifiers.with(|| Simplifier::new(index, setting), run)?;
+        settled.iter().for_each(|&vertex| own.settled[numbers[vertex as usize] as usize] = true);
+        names.iter().for_each(|&name| numbers[name as usize] = NONE);
+        simplifier.run(self.setting, &OF_POLYTOPES, core, figures, &mut own, self.budget)?;
         own.shared.iter().for_each(|&(name, number)| names[number as usize] = name as u32);
         let inside = (0..own.triangles.len() as u32).filter(|&triangle| own.is_within(triangle, core));
         Ok(Patch {

@@ -57,18 +57,25 @@ pub(crate) struct BoxTree {
     /// The items' boxes along the curve.
     boxes: Vec<Box32>,
     keys: Vec<u64>,
+    /// The boxes by the items' numbers.
+    kept: Vec<Option<Box32>>,
 }
 
 impl BoxTree {
     /// Makes the tree over those of `items` that have a box.
     pub(crate) fn build(&mut self, items: usize, box_of: impl Fn(u32) -> Option<Box32> + Sync, parallel: bool) {
-        // Boxes are asked for again and again: to keep them takes more memory than all the rest.
-        let Self { nodes, leaves, order, places, boxes, keys } = self;
+        let Self { nodes, leaves, order, places, boxes, keys, kept } = self;
         let count = items as u32;
+        kept.clear();
+        // Of many, boxes are asked for again and again: to keep them takes more memory than all the rest.
+        if !parallel {
+            kept.extend((0..count).map(&box_of));
+        }
+        let box_of = |item: u32| kept.get(item as usize).copied().unwrap_or_else(|| box_of(item));
         let all = if parallel {
-            (0..count).into_par_iter().filter_map(&box_of).reduce(|| Box32::EMPTY, |all, own| all.union(&own))
+            (0..count).into_par_iter().filter_map(box_of).reduce(|| Box32::EMPTY, |all, own| all.union(&own))
         } else {
-            (0..count).filter_map(&box_of).fold(Box32::EMPTY, |all, own| all.union(&own))
+            (0..count).filter_map(box_of).fold(Box32::EMPTY, |all, own| all.union(&own))
         };
         let scale: [f32; 3] = std::array::from_fn(|axis| 1023.0 / (all.high[axis] - all.low[axis]).max(f32::MIN_POSITIVE));
         let key = |item: u32| {

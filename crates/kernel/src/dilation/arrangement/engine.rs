@@ -140,7 +140,7 @@ impl<'a> Engine<'a> {
             return Ok(Run::Doubtful);
         }
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
-        let Some(boundary) = facets::boundary(&self.polytopes, &pieces, budget)? else { return Ok(Run::Open) };
+        let Some(boundary) = facets::boundary(&self.polytopes, pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
         Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().len() as u64 })))
     }

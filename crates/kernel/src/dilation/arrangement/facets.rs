@@ -1,6 +1,6 @@
 //! From the edges of a union of polytopes to its boundary: the pieces around every facet are joined to loops, and what these bound is cut into triangles.
 
-use super::pieces::{Name, Piece, Pieces};
+use super::pieces::{Name, Piece};
 use super::polytopes::{Polytopes, frame, normal};
 use super::triangulate::{Planar, triangulate};
 use crate::attractor::cell::{Point, dot};
@@ -26,22 +26,25 @@ struct Edge {
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn boundary(polytopes: &Polytopes, parts: &[Pieces], budget: &Budget) -> Result<Option<Boundary>, Stopped> {
-    let count = parts.iter().map(|part| part.pieces.len()).sum();
+pub(super) fn boundary(polytopes: &Polytopes, parts: Vec<Vec<Piece>>, budget: &Budget) -> Result<Option<Boundary>, Stopped> {
+    let count: usize = parts.iter().map(Vec::len).sum();
     let mut numbers: NameMap<Name, u32> = NameMap::default();
-    let mut points: Vec<Point> = Vec::with_capacity(count / 3);
-    let mut edges: Vec<Edge> = Vec::with_capacity(count);
-    for (index, part) in parts.iter().enumerate() {
+    let mut points: Vec<Point> = Vec::with_capacity(2 * count / 3);
+    let mut edges: Vec<Edge> = Vec::with_capacity(2 * count);
+    for (index, part) in parts.into_iter().enumerate() {
         if index % 1024 == 0 {
             budget.cancel.check()?;
         }
-        for (name, place) in &part.places {
-            numbers.entry(*name).or_insert_with(|| {
-                points.push(*place);
-                points.len() as u32 - 1
-            });
+        for Piece { facets: [left, right], ends, places } in part {
+            let number = |end: usize| {
+                *numbers.entry(ends[end]).or_insert_with(|| {
+                    points.push(places[end]);
+                    points.len() as u32 - 1
+                })
+            };
+            let [from, to] = [0, 1].map(number);
+            edges.extend([Edge { facet: left, ends: [from, to] }, Edge { facet: right, ends: [to, from] }]);
         }
-        edges.extend(part.pieces.iter().map(|&Piece { facet, ends }| Edge { facet, ends: ends.map(|name| numbers[&name]) }));
     }
     drop(numbers);
     edges.par_sort_unstable_by_key(|edge| (edge.facet, edge.ends));

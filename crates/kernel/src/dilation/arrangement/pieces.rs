@@ -33,18 +33,12 @@ fn meeting(mut facets: [u32; 3]) -> Name {
     facets.iter().fold(3, |name, &facet| name << 32 | Name::from(facet))
 }
 
-/// A piece of an edge of the union, with one of its two facets to the left.
+/// A piece of an edge of the union: its two facets, of which the first is to the left, and its ends with where they are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
-    pub(super) facet: u32,
+    pub(super) facets: [u32; 2],
     pub(super) ends: [Name; 2],
-}
-
-/// Pieces, and where their ends are.
-#[derive(Debug, Default)]
-pub(super) struct Pieces {
-    pub(super) pieces: Vec<Piece>,
-    pub(super) places: Vec<(Name, Point)>,
+    pub(super) places: [Point; 2],
 }
 
 /// Lists of polytopes, one for each.
@@ -144,7 +138,7 @@ const FEW: usize = 40;
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Result<Vec<Pieces>, Stopped> {
+pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Result<Vec<Vec<Piece>>, Stopped> {
     let indices = || (0..polytopes.count()).into_par_iter();
     let beside = indices().map_init(Beyond::default, |beyond, index| {
         budget.cancel.check()?;
@@ -202,10 +196,10 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let mut scratch = Scratch::default();
     of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
     let mut facets: Vec<u32> =
-        scratch.out.pieces.iter().map(|piece| piece.facet).filter(|&facet| of.binary_search(&owner(facet).0).is_ok()).collect();
+        scratch.out.iter().flat_map(|piece| piece.facets).filter(|&facet| of.binary_search(&owner(facet).0).is_ok()).collect();
     facets.sort_unstable();
     facets.dedup();
-    scratch.out.pieces.len().saturating_sub(2 * facets.len())
+    2 * scratch.out.len().saturating_sub(facets.len())
 }
 
 /// The facets of a polytope that the corners of another are beyond.
@@ -373,7 +367,7 @@ struct Scratch {
     line: Vec<[Cut; 2]>,
     /// The polytopes that a polytope meets, those first that covered a whole line last.
     recent: Vec<Third>,
-    out: Pieces,
+    out: Vec<Piece>,
 }
 
 /// A polytope that may cover lines of two others.
@@ -488,7 +482,7 @@ impl Arrangement<'_> {
             let name = |facet| pierced(edge_number(index, number), facet);
             let facets = edge.facets.map(|facet| facet_number(index, usize::from(facet)));
             uncovered(&mut cuts[number], edge.corners.map(|at| corner(edge_number(index, usize::from(at)))), name, |ends| {
-                out.add(facets, ends, |at| between(&corners[p], &corners[q], at));
+                out.push(piece(facets, ends, |at| between(&corners[p], &corners[q], at)));
             });
         }
     }
@@ -521,17 +515,15 @@ impl Arrangement<'_> {
             }
             if !is_gone {
                 let name = |facet| meeting([facets[0], facets[1], facet]);
-                uncovered(line, [p.name, q.name], name, |ends| out.add(facets, ends, |at| between(&p.at, &q.at, at)));
+                uncovered(line, [p.name, q.name], name, |ends| {
+                    out.push(piece(facets, ends, |at| between(&p.at, &q.at, at)));
+                });
             }
         }
     }
 }
 
-impl Pieces {
-    /// Adds a piece, with the first facet to its left and the second to its right.
-    fn add(&mut self, facets: [u32; 2], ends: [(f64, Name); 2], place: impl Fn(f64) -> Point) {
-        let [from, to] = ends.map(|(_, name)| name);
-        self.places.extend(ends.map(|(at, name)| (name, place(at))));
-        self.pieces.extend([Piece { facet: facets[0], ends: [from, to] }, Piece { facet: facets[1], ends: [to, from] }]);
-    }
+/// The piece of an edge or a line with two facets, between two places of it.
+fn piece(facets: [u32; 2], ends: [(f64, Name); 2], place: impl Fn(f64) -> Point) -> Piece {
+    Piece { facets, ends: ends.map(|(_, name)| name), places: ends.map(|(at, _)| place(at)) }
 }
