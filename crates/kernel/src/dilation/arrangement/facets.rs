@@ -28,7 +28,7 @@ struct Edge {
 /// [`Stopped`].
 pub(super) fn boundary(polytopes: &Polytopes, parts: Vec<Vec<Piece>>, budget: &Budget) -> Result<Option<Boundary>, Stopped> {
     let count: usize = parts.iter().map(Vec::len).sum();
-    let mut numbers: NameMap<Name, u32> = NameMap::default();
+    let mut numbers: NameMap<Name, u32> = NameMap::with_capacity_and_hasher(2 * count / 3, Default::default());
     let mut points: Vec<Point> = Vec::with_capacity(2 * count / 3);
     let mut edges: Vec<Edge> = Vec::with_capacity(2 * count);
     for (index, part) in parts.into_iter().enumerate() {

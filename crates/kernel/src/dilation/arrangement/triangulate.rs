@@ -109,6 +109,8 @@ fn clip(own: Vec<Vertex>, triangles: &mut Vec<[u32; 3]>) -> bool {
     let count = own.len();
     let (mut before, mut after): (Vec<usize>, Vec<usize>) = (0..count).map(|k| ((k + count - 1) % count, (k + 1) % count)).unzip();
     let mut open: Vec<usize> = (0..count).collect();
+    // No other corner is in an ear of a convex loop.
+    let is_convex = (0..count).all(|k| area(&own[before[k]].1, &own[k].1, &own[after[k]].1) > 0.0);
     let quality = |[a, b, c]: [usize; 3], open: &[usize]| -> Option<f64> {
         let [p, q, r] = [a, b, c].map(|k| &own[k].1);
         let twice = area(p, q, r);
@@ -118,7 +120,7 @@ fn clip(own: Vec<Vertex>, triangles: &mut Vec<[u32; 3]>) -> bool {
             is_corner || area(p, q, &vertex.1) < 0.0 || area(q, r, &vertex.1) < 0.0 || area(r, p, &vertex.1) < 0.0
         };
         let sides = distance_squared(p, q) + distance_squared(q, r) + distance_squared(r, p);
-        (twice > 0.0 && open.iter().all(is_clear)).then(|| twice / sides)
+        (twice > 0.0 && (is_convex || open.iter().all(is_clear))).then(|| twice / sides)
     };
     let mut qualities: Vec<Option<f64>> = (0..count).map(|k| quality([before[k], k, after[k]], &open)).collect();
     while open.len() > 3 {
