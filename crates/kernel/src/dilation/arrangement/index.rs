@@ -36,14 +36,21 @@ impl Index {
         some.iter().copied().filter(is_near).collect()
     }
 
+    /// Whether the box of a figure has a place whose squared distance from x is no more than `limit`.
+    #[inline]
+    fn may_be_near(&self, id: NodeId, x: &Point, limit: f64) -> bool {
+        let [low, high] = &self.boxes[id as usize];
+        let in_box: Point = std::array::from_fn(|axis| x[axis].clamp(low[axis], high[axis]));
+        distance_squared(x, &in_box) + self.figures[id as usize].deficit <= limit
+    }
+
     /// The closest point of a figure to x and its squared distance, if that is no more than `limit`.
     #[inline]
     fn closest(&self, id: NodeId, x: &Point, limit: f64) -> Option<(Point, f64)> {
-        let (figure, [low, high]) = (&self.figures[id as usize], &self.boxes[id as usize]);
-        let in_box: Point = std::array::from_fn(|axis| x[axis].clamp(low[axis], high[axis]));
-        if distance_squared(x, &in_box) + figure.deficit > limit {
+        if !self.may_be_near(id, x, limit) {
             return None;
         }
+        let figure = &self.figures[id as usize];
         let closest = figure.closest(x);
         let square = distance_squared(x, &closest) + figure.deficit;
         (square <= limit).then_some((closest, square))
@@ -84,7 +91,7 @@ impl SiteSearch for &Index {
     fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
         let limit = self.limit(reach);
         found.clear();
-        found.extend(starts.iter().copied().filter(|&id| self.closest(id, x, limit).is_some()));
+        found.extend(starts.iter().copied().filter(|&id| self.may_be_near(id, x, limit)));
     }
 
     fn deviation(&self) -> f64 {
