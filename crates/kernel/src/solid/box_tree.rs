@@ -57,20 +57,15 @@ pub(crate) struct BoxTree {
     /// The items' boxes along the curve.
     boxes: Vec<Box32>,
     keys: Vec<u64>,
-    /// The boxes by the items' numbers.
-    kept: Vec<Option<Box32>>,
 }
 
 impl BoxTree {
     /// Makes the tree over those of `items` that have a box.
     pub(crate) fn build(&mut self, items: usize, box_of: impl Fn(u32) -> Option<Box32> + Sync, parallel: bool) {
-        let Self { nodes, leaves, order, places, boxes, keys, kept } = self;
+        let Self { nodes, leaves, order, places, boxes, keys } = self;
         let count = items as u32;
-        kept.clear();
-        // Of many, boxes are asked for again and again: to keep them takes more memory than all the rest.
-        if !parallel {
-            kept.extend((0..count).map(&box_of));
-        }
+        // Side by side, of many items, boxes are asked for again and again: to keep them takes more memory than all the rest.
+        let kept: Vec<Option<Box32>> = if parallel { Vec::new() } else { (0..count).map(&box_of).collect() };
         let box_of = |item: u32| kept.get(item as usize).copied().unwrap_or_else(|| box_of(item));
         let all = if parallel {
             (0..count).into_par_iter().filter_map(box_of).reduce(|| Box32::EMPTY, |all, own| all.union(&own))

@@ -246,7 +246,7 @@ pub(crate) struct Mender {
     stamp: u32,
     /// Triangles of a star, old or new, their corners, and the boxes of their normals.
     own: Vec<Facet>,
-    hull: Vec<(u32, Point)>,
+    places: Vec<(u32, Point)>,
     turned: Vec<Box32>,
 }
 
@@ -489,14 +489,15 @@ impl Mender {
 
     /// Counts pairs of a triangle of the star, old or after moving to ring m or elsewhere, and another that meet; gives up above `most`.
     pub(crate) fn meetings(&mut self, mesh: &HalfEdges, vertex: u32, m: Option<usize>, to: Option<Point>, most: usize) -> usize {
-        let Self { star, boxes, own, hull, .. } = self;
+        debug_assert!(m.is_none() || to.is_none(), "a vertex moves to one place");
+        let Self { star, boxes, own, places, .. } = self;
         let count = star.ring.len();
         let apex = m.map_or(vertex, |m| star.ring[m]);
         let point = |corner: u32| mesh.points[corner as usize];
-        hull.clear();
-        hull.extend(star.ring.iter().map(|&corner| (corner, point(corner))));
+        places.clear();
+        places.extend(star.ring.iter().map(|&corner| (corner, point(corner))));
         if m.is_none() {
-            hull.push((vertex, to.unwrap_or_else(|| point(vertex))));
+            places.push((vertex, to.unwrap_or_else(|| point(vertex))));
         }
         own.clear();
         let mut whole = Box32::EMPTY;
@@ -533,7 +534,7 @@ impl Mender {
                 }
                 let points = corners.map(point);
                 // What lies to one side of its plane meets it in common corners and edges only.
-                if Facet::new(corners, points).has_on_one_side(hull.iter().copied()) {
+                if Facet::new(corners, points).has_on_one_side(places.iter().copied()) {
                     continue;
                 }
                 let met =

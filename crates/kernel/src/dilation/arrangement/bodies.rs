@@ -120,7 +120,7 @@ impl Bodies<'_> {
         distance * (distance - radius) + dot(way, &subtract(&cube.centre, from)) <= cube.half_along(way)
     }
 
-    /// How deep a cube's centre is inside of all kinds of a body, or more, and less than 0 where it is beyond one; nothing exact where that is less than `least`.
+    /// At least how deep a cube's centre is inside of all kinds of a body, and exactly that but in polyhedra; less than 0 where it is beyond one, and less than `least` where it is less deep, by whatever.
     pub(super) fn depth(&self, kinds: &[Kind], body: u32, cube: &Cube, near: &Near, least: f64) -> f64 {
         let mut depth = f64::INFINITY;
         for &kind in kinds {

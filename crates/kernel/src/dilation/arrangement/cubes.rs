@@ -6,7 +6,6 @@
 use super::bodies::{AXES, Bodies, Common, Kind, Near};
 use super::ellipsoid::Place;
 use super::figure::{Figure, box_of};
-use super::nerve::Change;
 use crate::attractor::cell::{Point, between, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
@@ -94,9 +93,9 @@ pub(super) type Listed = (Cube, Box<[u32]>);
 #[derive(Debug)]
 pub(super) struct Stage {
     /// What is inside of all of these is inside of a body all the time.
-    inside: &'static [Kind],
+    pub(super) inside: &'static [Kind],
     /// At any time a body is within one of these.
-    outside: [Kind; 2],
+    pub(super) outside: &'static [Kind],
     /// Cubes that are halved no more, however many bodies reach them, in units of the radius.
     small: f64,
     /// Whether what is not settled is in doubt.
@@ -104,10 +103,10 @@ pub(super) struct Stage {
 }
 
 /// Whatever their polytopes are like.
-pub(super) const ANY: Stage = Stage { inside: &[Kind::Inner], outside: [Kind::Outer; 2], small: 0.2, is_last: false };
+pub(super) const ANY: Stage = Stage { inside: &[Kind::Inner], outside: &[Kind::Outer], small: 0.2, is_last: false };
 /// Dilations that become the polytopes as they are.
 pub(super) const PRESENT: Stage =
-    Stage { inside: &[Kind::Dilation, Kind::Polytope], outside: [Kind::Dilation, Kind::Polytope], small: 0.05, is_last: true };
+    Stage { inside: &[Kind::Dilation, Kind::Polytope], outside: &[Kind::Dilation, Kind::Polytope], small: 0.05, is_last: true };
 
 /// Parts of space with all places that more than one body reaches; none where these are more than `most`.
 ///
@@ -119,7 +118,7 @@ pub(super) fn parts(bodies: &Bodies<'_>, most: usize, budget: &Budget) -> Result
     let mut parts = Vec::new();
     while !halved.is_empty() {
         let halve = |(cube, list): &Listed| {
-            let reaches = |part: &Cube, body: u32| bodies.reaches(&ANY.outside, body, part, &bodies.near(body, &part.centre));
+            let reaches = |part: &Cube, body: u32| bodies.reaches(ANY.outside, body, part, &bodies.near(body, &part.centre));
             let part = |number: usize| {
                 let part = cube.part(number);
                 (part, list.iter().copied().filter(|&body| reaches(&part, body)).collect())
@@ -152,15 +151,15 @@ enum Known {
 pub(super) struct Search<'a> {
     bodies: &'a Bodies<'a>,
     stage: &'static Stage,
-    /// If given, only sets with a body that is around its dilation now may do something: all others are settled.
-    pub(super) due: Option<&'a [Change]>,
+    /// If given, only sets with one of these bodies may do something: all others are settled.
+    pub(super) due: Option<&'a [bool]>,
     known: NameMap<Set, Known>,
     /// Those that reach the cubes from the part to the one that is looked at, cube after cube, and where its centre is from them.
     listed: Vec<u32>,
     near: Vec<Near>,
     /// Of the bodies of a cube how deep its centre is in them, and how high it is above each of what they are within, with a subgradient.
     depths: Vec<f64>,
-    above: Vec<[(f64, Point); 2]>,
+    above: Vec<(f64, Point)>,
     /// Of every body of a cube the hubs in it, bit by bit, and how many hubs there are.
     hubs: Vec<u64>,
     count: u32,
@@ -226,7 +225,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let near = bodies.near(body, &cube.centre);
-            if bodies.reaches(&self.stage.outside, body, cube, &near) {
+            if bodies.reaches(self.stage.outside, body, cube, &near) {
                 self.listed.push(body);
                 self.near.push(near);
             }
@@ -265,10 +264,7 @@ impl<'a> Search<'a> {
         if !is_few && !is_small {
             return false;
         }
-        self.above.clear();
-        let outside = self.stage.outside;
-        let above = |(&body, near): (&u32, &Near)| outside.map(|kind| bodies.above_centre(kind, body, cube, near));
-        self.above.extend(list.iter().zip(near).map(above));
+        measure(bodies, self.stage.outside, cube, list, near, &mut self.above);
         let list: Box<[u32]> = list.into();
         if self.are_settled(cube, &list, is_small) {
             return true;
@@ -310,7 +306,12 @@ impl<'a> Search<'a> {
                     }
                     let is_near = |&fourth: &usize| [first, second, third].iter().all(|&place| meet[place * number + fourth]);
                     for fourth in (third + 1..number).filter(is_near) {
-                        if self.may_meet(cube, list, &[first, second, third, fourth], is_small).is_none() {
+                        let set = [first, second, third, fourth];
+                        // Nothing is up to what four do that are not due: no larger set is asked for.
+                        if !self.is_due(set.into_iter().map(|place| list[place])) {
+                            continue;
+                        }
+                        if self.may_meet(cube, list, &set, is_small).is_none() {
                             return false;
                         }
                     }
@@ -380,12 +381,23 @@ impl<'a> Search<'a> {
 
     /// Whether one of some bodies may make a difference to what is settled.
     fn is_due(&self, mut some: impl Iterator<Item = u32>) -> bool {
-        self.due.is_none_or(|changes| some.any(|body| changes[body as usize] == Change::Around))
+        self.due.is_none_or(|due| some.any(|body| due[body as usize]))
     }
 
     /// Whether some of the bodies of a cube surely have no common place there, whatever is taken for them.
-    fn are_parted(&self, cube: &Cube, places: &[usize]) -> bool {
+    pub(super) fn are_parted(&self, cube: &Cube, places: &[usize]) -> bool {
         (0..self.stage.outside.len()).all(|kind| self.is_mean_above(cube, places, kind))
+    }
+
+    /// Looks at some bodies from a cube's centre, for [`Search::are_parted`].
+    #[cfg(test)]
+    pub(super) fn see(&mut self, cube: &Cube, list: &[u32], near: &[Near]) {
+        measure(self.bodies, self.stage.outside, cube, list, near, &mut self.above);
+    }
+
+    /// How high the centre of a cube is above one of what a body of its list is within, with a subgradient.
+    fn above_of(&self, place: usize, kind: usize) -> &(f64, Point) {
+        &self.above[place * self.stage.outside.len() + kind]
     }
 
     /// Whether what is known of a cube's centre shows that some of the bodies have no common place there: a mean of convex functions is above 0 if one of their subgradients is, all over the cube, and then so is the largest of them. Weights that show it are
@@ -396,7 +408,7 @@ impl<'a> Search<'a> {
         for step in 0..MEANS {
             let (mut mean, mut slope) = (0.0, [0.0; 3]);
             for (&place, weight) in places.iter().zip(&weights) {
-                let (above, away) = &self.above[place][kind];
+                let (above, away) = self.above_of(place, kind);
                 mean += weight * above;
                 slope = std::array::from_fn(|axis| slope[axis] + weight * away[axis]);
             }
@@ -404,7 +416,7 @@ impl<'a> Search<'a> {
                 return true;
             }
             let lowest: Point = slope.map(|part| if part > 0.0 { -cube.half } else { cube.half });
-            let heights = places.iter().map(|&place| &self.above[place][kind]).map(|(above, away)| above + dot(away, &lowest));
+            let heights = places.iter().map(|&place| self.above_of(place, kind)).map(|(above, away)| above + dot(away, &lowest));
             let highest = heights.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
             let Some((highest, _)) = highest.filter(|&(_, height)| height > 0.0) else { return false };
             let share = 1.0 / f64::from(step + 2);
@@ -443,11 +455,19 @@ impl Stage {
     }
 }
 
+/// How high a cube's centre is above each of some kinds of bodies, with subgradients, body by body.
+fn measure(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list: &[u32], near: &[Near], above: &mut Vec<(f64, Point)>) {
+    above.clear();
+    for (&body, near) in list.iter().zip(near) {
+        above.extend(kinds.iter().map(|&kind| bodies.above_centre(kind, body, cube, near)));
+    }
+}
+
 /// Whether all of a cube is inside of all kinds of one of some bodies.
-fn is_covered(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list: &[u32], near: &[Near], depths: &mut Vec<f64>) -> bool {
+pub(super) fn is_covered(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list: &[u32], near: &[Near], depths: &mut Vec<f64>) -> bool {
     depths.clear();
     for (&body, near) in list.iter().zip(near) {
-        // What holds the cube holds the ball in it; and what holds the ball around it holds the cube.
+        // What holds the cube holds the ball in it, and what holds the ball around it holds the cube. In a polyhedron the centre may be deeper than is told: then smaller cubes tell.
         let depth = bodies.depth(kinds, body, cube, near, cube.half);
         if depth > cube.half * ROOT_OF_3 + bodies.setting.slack {
             return true;

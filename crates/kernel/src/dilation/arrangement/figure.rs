@@ -168,6 +168,9 @@ impl Polygon {
             if dot(out, &way) > 0.0 {
                 let to = &self.corners[if side + 1 < self.corners.len() { side + 1 } else { 0 }];
                 let along = subtract(to, from);
+                // In the plane: short sides may rise out of it as steeply as rounding makes them.
+                let rise = dot(&along, &self.up);
+                let along: Point = std::array::from_fn(|axis| along[axis] - rise * self.up[axis]);
                 let (part, whole) = (dot(&way, &along), dot(&along, &along));
                 if 0.0 < part && part < whole {
                     return between(from, to, part / whole);
@@ -396,6 +399,32 @@ mod tests {
                 assert!((least - joined).abs() < 1e-9, "{round}: {x:?} {least} {joined}");
             }
         }
+    }
+
+    /// Sides so short that rounding tilts them, in polygons whose corners are off their plane by as much: the closest place is no farther than those of all sides.
+    #[test]
+    fn short_sides_hide_no_closer_place() {
+        let mut random = Random(11);
+        let mut beside = 0;
+        for round in 0..4_000 {
+            let size = [1e-13, 1e-12, 1e-10, 1e-8][round % 4];
+            let flatness = 7.8e-14;
+            let mut off = || flatness * (2.0 * random.share() - 1.0);
+            let flat = [[0.0, 0.0], [size, 0.2 * size], [size, 5.0], [-10.0, 5.0], [-10.0, 0.0]];
+            let polygon = Polygon::new(flat.map(|[x, y]| [x, y, off()]).into());
+            // In the slab between the ends of the short side, above the polygon or beyond its side.
+            let [from, to] = [polygon.corners[0], polygon.corners[1]];
+            let along = unit(&subtract(&to, &from));
+            let way: Point = std::array::from_fn(|_| 4.0 * random.share() - 2.0);
+            let (part, share) = (dot(&way, &along), random.share() * size);
+            let x = std::array::from_fn(|axis| from[axis] + way[axis] + (share - part) * along[axis]);
+            let found = distance_squared(&x, &polygon.closest(&x)).sqrt();
+            let of_sides = polygon.sides().map(|[from, to]| distance_squared(&x, &closest_on_segment(&x, &from, &to)));
+            let least = of_sides.fold(f64::INFINITY, f64::min).sqrt();
+            beside += usize::from(found < least - 1e-9);
+            assert!(found <= least + 1e-12, "{round}: {x:?}, {found} and {least}");
+        }
+        assert!(beside > 100, "{beside} above the polygon");
     }
 
     #[test]

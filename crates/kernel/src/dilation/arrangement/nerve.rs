@@ -97,6 +97,7 @@ impl Sets {
     /// [`Stopped`].
     pub(super) fn look(&mut self, bodies: &Bodies<'_>, changes: &[Change], most: usize, budget: &Budget) -> Result<bool, Stopped> {
         let mut left = most_asked(bodies);
+        let around: Vec<bool> = changes.iter().map(|&change| change == Change::Around).collect();
         for (cubes, doubts) in self.cubes.chunks(AT_A_TIME).zip(self.doubts.chunks_mut(AT_A_TIME)) {
             let look = |(cubes, doubts): (&[Listed], &mut [Doubts])| {
                 let (mut search, mut all) = (Search::new(bodies, &PRESENT), 0);
@@ -104,7 +105,7 @@ impl Sets {
                     let has = |change: Change| listed.1.iter().any(|&body| changes[body as usize] == change);
                     let is_open = has(Change::Other) || (!doubts.is_empty() && (has(Change::Cut) || has(Change::Around)));
                     if is_open || has(Change::Around) {
-                        search.due = (!is_open).then_some(changes);
+                        search.due = (!is_open).then_some(&around);
                         let Found { doubts: found, asked, is_cut_short, .. } = search.run(listed, budget)?;
                         *doubts = found;
                         all += asked;

@@ -12,6 +12,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What a vertex of the union is called.
@@ -182,14 +183,15 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     let (mut met, mut hidden, mut seen) = (vec![Vec::new(); total], vec![Mask::default(); total], Vec::new());
     seen.resize_with(total, Seen::default);
     let mut beyond = Beyond::default();
-    // What others hide of the neighbours changes nothing, and takes long to tell.
+    // What others hide of the neighbours they cover as well, and to tell it takes long.
     for &index in of {
         let (mut own, mask) = beside(polytopes, near.of(index), index, &mut beyond);
         own.retain(|&other| beyond.fill(&polytopes.of(other).corners, polytopes.of(index)));
         hidden[index as usize] = mask;
         met[index as usize] = own;
     }
-    for &index in of.iter().chain(of.iter().flat_map(|&index| &met[index as usize])) {
+    let neighbours = of.iter().flat_map(|&index| &met[index as usize]);
+    for &index in of.iter().chain(neighbours).collect::<BTreeSet<_>>() {
         seen[index as usize] = Seen::of(polytopes.of(index), &hidden[index as usize]);
     }
     let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden, seen: &seen };
@@ -382,7 +384,7 @@ struct Third {
 #[derive(Default)]
 struct Seen {
     /// Their numbers, and the places of their ends among the corners.
-    edges: Vec<(usize, [usize; 2])>,
+    edges: Vec<(u16, [u16; 2])>,
     corners: Vec<Point>,
 }
 
@@ -394,8 +396,8 @@ impl Seen {
         let mut corners: Vec<u16> = edges().flat_map(|(_, edge)| edge.corners).collect();
         corners.sort_unstable();
         corners.dedup();
-        let place = |corner: u16| corners.binary_search(&corner).unwrap_or_default();
-        let edges = edges().map(|(number, edge)| (number, edge.corners.map(place))).collect();
+        let place = |corner: u16| corners.binary_search(&corner).unwrap_or_default() as u16;
+        let edges = edges().map(|(number, edge)| (number as u16, edge.corners.map(place))).collect();
         Self { edges, corners: corners.iter().map(|&corner| polytope.corners[usize::from(corner)]).collect() }
     }
 }
@@ -424,7 +426,7 @@ impl Arrangement<'_> {
         let number = self.polytopes.structure(index).edges.len();
         scratch.is_gone.clear();
         scratch.is_gone.resize(number, true);
-        seen.edges.iter().for_each(|&(edge, _)| scratch.is_gone[edge] = false);
+        seen.edges.iter().for_each(|&(edge, _)| scratch.is_gone[usize::from(edge)] = false);
         scratch.cuts.resize_with(number.max(scratch.cuts.len()), Vec::new);
         scratch.cuts.iter_mut().for_each(Vec::clear);
         scratch.recent.clear();
@@ -447,6 +449,7 @@ impl Arrangement<'_> {
             return;
         }
         for &(number, ends) in &seen.edges {
+            let (number, ends) = (usize::from(number), ends.map(usize::from));
             if scratch.beyond.are_apart(ends) {
                 continue;
             }

@@ -1,9 +1,9 @@
 use super::Arrangement;
-use super::bodies::{Common, Kind};
-use super::cubes::{Cube, MOST_BODIES};
+use super::bodies::{Common, Kind, Near};
+use super::cubes::{ANY, Cube, MOST_BODIES, PRESENT, Search, is_covered};
 use super::ellipsoid::Place;
 use super::engine::Engine;
-use super::nerve::{Change, Sets};
+use super::nerve::{Change, Doubt, Sets};
 use super::polytopes::height;
 use crate::attractor::Attractor;
 use crate::budget::{Budget, StopReason};
@@ -704,7 +704,7 @@ fn hidden_places_are_hidden() {
 #[test]
 fn what_is_not_in_doubt_meets() {
     let mut random = Random(59);
-    let (mut met, mut doubtful, mut exposed, mut all, mut changed) = (0, 0, 0, [0; 3], [0; 4]);
+    let (mut met, mut doubtful, mut exposed, mut all, mut changed) = ([0; 3], 0, 0, [0; 3], [0; 4]);
     for round in 0..12_u32 {
         let size = 2.0 + f64::from(round % 4);
         let shape = match round % 3 {
@@ -723,12 +723,12 @@ fn what_is_not_in_doubt_meets() {
             let mut sets = Sets::new(&engine.bodies(), &budget).unwrap().expect("there are few");
             let mut changes = vec![Change::Other; count as usize];
             // As the polytopes are first, and twice after they were changed.
-            for (step, all) in all.iter_mut().enumerate() {
+            for (step, (all, met)) in all.iter_mut().zip(&mut met).enumerate() {
                 let bodies = engine.bodies();
                 assert!(sets.look(&bodies, &changes, usize::MAX, &budget).unwrap());
                 let doubts: Vec<Vec<u32>> = sets.doubts().into_iter().map(|doubt| doubt.sites).collect();
                 *all += doubts.len();
-                for _ in 0..8_000 {
+                for _ in 0..20_000 {
                     // About as far from some figure as the band is.
                     let corners = arrangement.sites.list[random.next() as usize % count as usize].corners();
                     let from = DVec3::from_array(corners[random.next() as usize % corners.len()]);
@@ -750,9 +750,15 @@ fn what_is_not_in_doubt_meets() {
                         } else {
                             let place = bodies.common(&[Kind::Dilation, Kind::Polytope], &set, bodies.within(&set), 0.0);
                             assert!(matches!(place, Place::At(_)), "{round}, {step}: {set:?} at {x}, of {count}");
-                            met += usize::from(set.len() > 1);
+                            *met += usize::from(set.len() > 1);
                         }
                     }
+                }
+                // What was not looked at again is as settled as if it was.
+                let mut anew = Sets::new(&bodies, &budget).unwrap().expect("there are few");
+                assert!(anew.look(&bodies, &vec![Change::Other; count as usize], usize::MAX, &budget).unwrap());
+                for Doubt { sites, .. } in anew.doubts() {
+                    assert!(doubts.iter().any(|own| own.iter().all(|site| sites.contains(site))), "{round}, {step}: {sites:?}");
                 }
                 changes = engine.refine(&sets.doubts(), &budget).unwrap();
                 for change in &changes {
@@ -764,7 +770,66 @@ fn what_is_not_in_doubt_meets() {
     let [_, cut, around, other] = changed;
     assert!(cut > 3 && around > 10, "{cut} cut, {around} around, {other} otherwise");
     assert!(all[0] > 3 && all[2] < all[0], "{all:?} in doubt");
-    assert!(met > 300 && exposed > 5_000, "{met} met, {doubtful} in doubt, {exposed} exposed");
+    assert!(met.iter().all(|&met| met > 300) && exposed > 15_000, "{met:?} met, {doubtful} in doubt, {exposed} exposed");
+}
+
+/// What is told of a body and a cube from another place: bodies that do not reach it, sets that have no common place in it, and bodies that hold all of it, against places in it.
+#[test]
+fn what_is_told_of_cubes_holds_in_them() {
+    let mut random = Random(67);
+    let (mut dropped, mut parted, mut covered) = (0, 0, 0);
+    for round in 0..12 {
+        let size = 3.0;
+        let shape = if round % 2 == 0 {
+            wires(&sticks(&mut random, 16, size, 1.0))
+        } else {
+            let vertices: Vec<DVec3> = (0..30).map(|_| place(&mut random, size)).collect();
+            lowered(&vertices, (0..10).map(|k| vec![3 * k, 3 * k + 1, 3 * k + 2]).collect())
+        };
+        with_arrangement(&shape, 1.0, 0.1, |arrangement| {
+            let mut engine = Engine::new(arrangement, 0, &[]);
+            assert!(engine.begin(&Budget::default()).unwrap());
+            let bodies = engine.bodies();
+            let all: Vec<u32> = (0..arrangement.sites.list.len() as u32).collect();
+            for _ in 0..300 {
+                let cube = Cube { centre: place(&mut random, size).to_array(), half: 0.02 + 0.6 * random.share() };
+                let from =
+                    (DVec3::from_array(cube.centre) + place(&mut random, 4.0 * cube.half) - DVec3::splat(2.0 * cube.half)).to_array();
+                let inside =
+                    |random: &mut Random| (DVec3::from_array(cube.centre) + cube.half * (place(random, 2.0) - DVec3::ONE)).to_array();
+                let places: Vec<[f64; 3]> = (0..60).map(|_| inside(&mut random)).collect();
+                let near: Vec<Near> = all.iter().map(|&body| bodies.near(body, &cube.centre)).collect();
+                for &body in &all {
+                    if !bodies.may_reach(body, &cube, &from, &bodies.near(body, &from)) {
+                        dropped += 1;
+                        assert!(places.iter().all(|x| bodies.above(Kind::Outer, body, x).0 > 0.0), "{round}: {body} reaches {cube:?}");
+                    }
+                }
+                for stage in [&ANY, &PRESENT] {
+                    let mut search = Search::new(&bodies, stage);
+                    search.see(&cube, &all, &near);
+                    for _ in 0..20 {
+                        let mut set: Vec<usize> = (0..2 + random.next() % 3).map(|_| (random.next() % all.len() as u64) as usize).collect();
+                        set.sort_unstable();
+                        set.dedup();
+                        if set.len() > 1 && search.are_parted(&cube, &set) {
+                            parted += 1;
+                            for &kind in stage.outside {
+                                let meets = |x: &[f64; 3]| set.iter().all(|&place| bodies.above(kind, all[place], x).0 <= 0.0);
+                                assert!(!places.iter().any(meets), "{round}: {set:?} meet in {cube:?}");
+                            }
+                        }
+                    }
+                    if is_covered(&bodies, stage.inside, &cube, &all, &near, &mut Vec::new()) {
+                        covered += 1;
+                        let holds = |&body: &u32| places.iter().all(|x| bodies.is_inside(stage.inside, body, x));
+                        assert!(all.iter().any(holds), "{round}: nothing holds {cube:?}");
+                    }
+                }
+            }
+        });
+    }
+    assert!(dropped > 5_000 && parted > 5_000 && covered > 200, "{dropped} dropped, {parted} parted, {covered} covered");
 }
 
 /// Plates side by side with a chamfered corner, so small that rounding turns its side anyhow, far from the origin: they do not meet, and nothing between them is hidden.

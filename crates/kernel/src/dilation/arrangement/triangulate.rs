@@ -109,8 +109,10 @@ fn clip(own: Vec<Vertex>, triangles: &mut Vec<[u32; 3]>) -> bool {
     let count = own.len();
     let (mut before, mut after): (Vec<usize>, Vec<usize>) = (0..count).map(|k| ((k + count - 1) % count, (k + 1) % count)).unzip();
     let mut open: Vec<usize> = (0..count).collect();
-    // No other corner is in an ear of a convex loop.
-    let is_convex = (0..count).all(|k| area(&own[before[k]].1, &own[k].1, &own[after[k]].1) > 0.0);
+    // No other corner is in an ear of a convex loop: one that turns left everywhere, and goes around once.
+    let turns_left = (0..count).all(|k| area(&own[before[k]].1, &own[k].1, &own[after[k]].1) > 0.0);
+    let goes_back = |k: usize| own[after[k]].1[0] < own[k].1[0];
+    let is_convex = turns_left && (0..count).filter(|&k| goes_back(k) && !goes_back(before[k])).count() == 1;
     let quality = |[a, b, c]: [usize; 3], open: &[usize]| -> Option<f64> {
         let [p, q, r] = [a, b, c].map(|k| &own[k].1);
         let twice = area(p, q, r);
@@ -200,5 +202,28 @@ mod tests {
             }
             assert!(fills(&loops), "{round}: {loops:?}");
         }
+    }
+
+    #[test]
+    fn convex_loops_are_filled_and_those_that_wind_twice_are_not_taken_for_such() {
+        for count in [3, 4, 7, 40] {
+            let circle = |k: usize, radius: f64, turns: f64| -> Place {
+                let (sine, cosine) = (turns * std::f64::consts::TAU * (k as f64 + 0.3) / count as f64).sin_cos();
+                [radius * cosine, radius * sine]
+            };
+            assert!(fills(&[(0..count).map(|k| circle(k, 1.0, 1.0)).collect()]), "{count}");
+        }
+        // It turns left everywhere; cut as a convex one, it has triangles that are clockwise.
+        let twice = |k: usize| -> Place {
+            let angle = 2.0 * std::f64::consts::TAU * k as f64 / 24.0;
+            let (sine, cosine) = angle.sin_cos();
+            let radius = 1.0 + 1.6 * (0.5 * angle).cos().powi(2);
+            [radius * cosine, radius * sine]
+        };
+        let own: Vec<Vertex> = (0..24).map(|k| (k, twice(k as usize))).collect();
+        let mut triangles = Vec::new();
+        let is_cut = clip(own, &mut triangles);
+        let turned = |t: &[u32; 3]| area(&twice(t[0] as usize), &twice(t[1] as usize), &twice(t[2] as usize)) <= 0.0;
+        assert!(!is_cut || !triangles.iter().any(turned));
     }
 }
