@@ -797,7 +797,7 @@ fn what_is_told_of_cubes_holds_in_them() {
                     (DVec3::from_array(cube.centre) + place(&mut random, 4.0 * cube.half) - DVec3::splat(2.0 * cube.half)).to_array();
                 let inside =
                     |random: &mut Random| (DVec3::from_array(cube.centre) + cube.half * (place(random, 2.0) - DVec3::ONE)).to_array();
-                let places: Vec<[f64; 3]> = (0..60).map(|_| inside(&mut random)).collect();
+                let places: Vec<[f64; 3]> = cube.corners().chain((0..60).map(|_| inside(&mut random))).collect();
                 let near: Vec<Near> = all.iter().map(|&body| bodies.near(body, &cube.centre)).collect();
                 for &body in &all {
                     if !bodies.may_reach(body, &cube, &from, &bodies.near(body, &from)) {
