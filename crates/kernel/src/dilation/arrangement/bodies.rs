@@ -21,6 +21,10 @@ const LEAST_GAP: f64 = 64.0;
 /// How far from the dilations planes are that part them, as a share of what is between: at least, and how much more at most.
 const PARTING: [f64; 2] = [0.3, 0.4];
 
+/// Ways from a figure that are longer than this, in units of the radius, have a direction: rounding turns it by so little that linear functions along it are right up to a fraction of the slack all over cubes that are no wider than this.
+const STEADY: f64 = 0.25;
+pub(super) const STEADY_CUBE: f64 = 8.0;
+
 /// The axes of coordinates.
 pub(super) const AXES: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
@@ -98,7 +102,7 @@ impl Bodies<'_> {
     }
 
     /// The same as [`Bodies::above`] for a cube's centre.
-    pub(super) fn above_centre(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
+    fn above_centre(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
         let of_polytope = || self.above(Kind::Polytope, body, &cube.centre);
         self.radius(kind).map_or_else(of_polytope, |radius| self.above_near(radius, body, &cube.centre, near))
     }
@@ -111,13 +115,22 @@ impl Bodies<'_> {
         })
     }
 
-    /// Whether a body may have places in a cube, for all that is known of where another place, `from`, is from it.
+    /// Whether a body may have places in one of the parts of a cube, for all that is known of where the cube's centre, `from`, is from it.
     ///
-    /// The distance is convex: everywhere it is no less than it grows from there along its gradient.
+    /// The distance is convex: everywhere it is no less than it grows from there along its gradient. What is dropped is farther from the centre than the radius: so the gradient is known well enough for cubes up to [`STEADY_CUBE`].
     #[inline]
     pub(super) fn may_reach(&self, body: u32, cube: &Cube, from: &Point, Near { way, distance }: &Near) -> bool {
+        if cube.half > STEADY_CUBE * self.setting.reach {
+            return true;
+        }
         let radius = self.figures[body as usize].in_space(self.setting.outer) + 4.0 * self.setting.slack;
         distance * (distance - radius) + dot(way, &subtract(&cube.centre, from)) <= cube.half_along(way)
+    }
+
+    /// How high a cube's centre is above a body, or less, with the slope of a linear function that is below it all over the cube, up to the slack. Near to a figure rounding may turn the way from it, and the body is no lower than its radius anywhere.
+    pub(super) fn below(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
+        let is_steady = near.distance > STEADY * self.setting.reach;
+        self.above_centre(kind, body, cube, if is_steady { near } else { &Near { way: [0.0; 3], distance: 0.0 } })
     }
 
     /// At least how deep a cube's centre is inside of all kinds of a body, and exactly that but in polyhedra; less than 0 where it is beyond one, and less than `least` where it is less deep, by whatever.

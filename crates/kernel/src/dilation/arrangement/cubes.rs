@@ -3,7 +3,7 @@
 //! That is up to the bodies that reach a cube. Of most cubes one body holds it all, or a place, a *hub*, is inside of all bodies: both settle a cube as a whole, with all sets of bodies there.
 //! Rounding may leave a crack between cubes; it is narrower than the slack that is asked to spare wherever something is told of a cube, so that places in it are told of, too.
 
-use super::bodies::{AXES, Bodies, Common, Kind, Near};
+use super::bodies::{AXES, Bodies, Common, Kind, Near, STEADY_CUBE};
 use super::ellipsoid::Place;
 use super::figure::{Figure, box_of};
 use crate::attractor::cell::{Point, between, dot, subtract};
@@ -157,7 +157,7 @@ pub(super) struct Search<'a> {
     /// Those that reach the cubes from the part to the one that is looked at, cube after cube, and where its centre is from them.
     listed: Vec<u32>,
     near: Vec<Near>,
-    /// Of the bodies of a cube how deep its centre is in them, and how high it is above each of what they are within, with a subgradient.
+    /// Of the bodies of a cube how deep its centre is in them, and linear functions below each of what they are within.
     depths: Vec<f64>,
     above: Vec<(f64, Point)>,
     /// Of every body of a cube the hubs in it, bit by bit, and how many hubs there are.
@@ -386,7 +386,8 @@ impl<'a> Search<'a> {
 
     /// Whether some of the bodies of a cube surely have no common place there, whatever is taken for them.
     pub(super) fn are_parted(&self, cube: &Cube, places: &[usize]) -> bool {
-        (0..self.stage.outside.len()).all(|kind| self.is_mean_above(cube, places, kind))
+        let is_steady = cube.half <= STEADY_CUBE * self.bodies.setting.reach;
+        is_steady && (0..self.stage.outside.len()).all(|kind| self.is_mean_above(cube, places, kind))
     }
 
     /// Looks at some bodies from a cube's centre, for [`Search::are_parted`].
@@ -395,12 +396,12 @@ impl<'a> Search<'a> {
         measure(self.bodies, self.stage.outside, cube, list, near, &mut self.above);
     }
 
-    /// How high the centre of a cube is above one of what a body of its list is within, with a subgradient.
+    /// The linear function below one of what a body of the cube's list is within.
     fn above_of(&self, place: usize, kind: usize) -> &(f64, Point) {
         &self.above[place * self.stage.outside.len() + kind]
     }
 
-    /// Whether what is known of a cube's centre shows that some of the bodies have no common place there: a mean of convex functions is above 0 if one of their subgradients is, all over the cube, and then so is the largest of them. Weights that show it are
+    /// Whether some of the bodies surely have no common place in the cube: where a mean of linear functions below them is above 0 all over it, so is the highest of them, everywhere. Weights that show it are
     /// sought by steps to the function that is highest where the mean is lowest (Frank and Wolfe, "An algorithm for quadratic programming", 1956).
     fn is_mean_above(&self, cube: &Cube, places: &[usize], kind: usize) -> bool {
         let mut weights = [0.0; MOST_BODIES];
@@ -455,11 +456,11 @@ impl Stage {
     }
 }
 
-/// How high a cube's centre is above each of some kinds of bodies, with subgradients, body by body.
+/// Linear functions below each of some kinds of bodies, by their values at a cube's centre and their slopes, body by body.
 fn measure(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list: &[u32], near: &[Near], above: &mut Vec<(f64, Point)>) {
     above.clear();
     for (&body, near) in list.iter().zip(near) {
-        above.extend(kinds.iter().map(|&kind| bodies.above_centre(kind, body, cube, near)));
+        above.extend(kinds.iter().map(|&kind| bodies.below(kind, body, cube, near)));
     }
 }
 

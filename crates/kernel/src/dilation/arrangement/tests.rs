@@ -791,8 +791,14 @@ fn what_is_told_of_cubes_holds_in_them() {
             assert!(engine.begin(&Budget::default()).unwrap());
             let bodies = engine.bodies();
             let all: Vec<u32> = (0..arrangement.sites.list.len() as u32).collect();
-            for _ in 0..300 {
-                let cube = Cube { centre: place(&mut random, size).to_array(), half: 0.02 + 0.6 * random.share() };
+            for trial in 0..300 {
+                let mut cube = Cube { centre: place(&mut random, size).to_array(), half: 0.02 + 0.6 * random.share() };
+                if trial % 3 == 0 {
+                    // On a figure, up to rounding, and as wide as some: directions from there are no more than noise.
+                    let corners = arrangement.sites.list[random.next() as usize % all.len()].corners();
+                    let [a, b] = [corners[0], corners[1]].map(DVec3::from_array);
+                    cube = Cube { centre: a.lerp(b, random.share()).to_array(), half: 0.1 + 3.0 * random.share() };
+                }
                 let from =
                     (DVec3::from_array(cube.centre) + place(&mut random, 4.0 * cube.half) - DVec3::splat(2.0 * cube.half)).to_array();
                 let inside =
