@@ -838,6 +838,36 @@ fn what_is_told_of_cubes_holds_in_them() {
     assert!(dropped > 5_000 && parted > 5_000 && covered > 200, "{dropped} dropped, {parted} parted, {covered} covered");
 }
 
+/// Two rods across each other, seen from cubes with their centres on one of them up to rounding, where the way from it is noise: what is told of them there does not part them.
+#[test]
+fn ways_of_rounding_part_nothing() {
+    let mut random = Random(71);
+    let mut noisy = 0;
+    for round in 0..60 {
+        let mut way = || (place(&mut random, 2.0) - DVec3::ONE).normalize();
+        let (along, across, at) = (way(), way(), 10.0 * way());
+        let rods = wires(&[[at - 12.0 * along, at + 7.0 * along], [at - 5.0 * across, at + 4.0 * across]]);
+        with_arrangement(&rods, 1.0, 0.1, |arrangement| {
+            let mut engine = Engine::new(arrangement, 0, &[]);
+            assert!(engine.begin(&Budget::default()).unwrap());
+            let bodies = engine.bodies();
+            for _ in 0..400 {
+                // Both are around the place where they cross, which is in the cube.
+                let far = 1.2 + 2.0 * random.share();
+                let cube = Cube { centre: (at - far * along).to_array(), half: far };
+                let near: Vec<Near> = [0, 1].map(|body| bodies.near(body, &cube.centre)).to_vec();
+                noisy += usize::from(near.iter().any(|near| near.way != [0.0; 3] && near.way.iter().all(|x| x.abs() < 1e-12)));
+                for stage in [&ANY, &PRESENT] {
+                    let mut search = Search::new(&bodies, stage);
+                    search.see(&cube, &[0, 1], &near);
+                    assert!(!search.are_parted(&cube, &[0, 1]), "{round}: {far}");
+                }
+            }
+        });
+    }
+    assert!(noisy > 10_000, "{noisy} ways of rounding");
+}
+
 /// Plates side by side with a chamfered corner, so small that rounding turns its side anyhow, far from the origin: they do not meet, and nothing between them is hidden.
 #[test]
 fn short_sides_turn_no_boxes() {
