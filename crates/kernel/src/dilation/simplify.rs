@@ -23,7 +23,7 @@ use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::budget::{Budget, Stopped};
 use crate::solid::around::Around;
-use crate::solid::half_edges::{HalfEdges, NONE};
+use crate::solid::half_edges::{HalfEdges, NONE, kept};
 use crate::solid::mend::{LEAST_HEIGHT, MOST_AROUND, Mender};
 
 /// Where a node's surface is its own.
@@ -345,7 +345,7 @@ impl<S: SiteSearch> Simplifier<S> {
             let towards = at(m);
             let length = dot(&towards, &towards).sqrt();
             let (mut largest, mut sum) = (0.0_f64, 0.0_f64);
-            for k in kept(m, count) {
+            for k in kept(Some(m), count) {
                 // Below this area a triangle has no plane to speak of.
                 if lengths[k] > setting.rounding * setting.rounding {
                     let height = dot(&normals[k], &towards).abs() / lengths[k];
@@ -374,7 +374,7 @@ impl<S: SiteSearch> Simplifier<S> {
         let count = self.mender.star.ring.len();
         let target = &mesh.points[self.mender.star.ring[m] as usize];
         let least = LEAST_HEIGHT * setting.rounding;
-        kept(m, count).all(|k| {
+        kept(Some(m), count).all(|k| {
             let (a, b) = (&mesh.points[self.mender.star.ring[k] as usize], &mesh.points[self.mender.star.ring[(k + 1) % count] as usize]);
             let normal = cross(&subtract(a, target), &subtract(b, target));
             let square = dot(&normal, &normal);
@@ -396,8 +396,8 @@ impl<S: SiteSearch> Simplifier<S> {
         let Self { search, places, nearby, mender: Mender { star, .. }, .. } = self;
         let count = star.ring.len();
         let least = setting.least - setting.rounding + search.deviation();
-        kept(m, count).all(|k| nearby.cover(search, [m, k, (k + 1) % count, count]))
-            && kept(m, count).all(|k| {
+        kept(Some(m), count).all(|k| nearby.cover(search, [m, k, (k + 1) % count, count]))
+            && kept(Some(m), count).all(|k| {
                 let corners = [star.ring[m], star.ring[k], star.ring[(k + 1) % count]];
                 let triangle = corners.map(|corner| mesh.points[corner as usize]);
                 nearby.is_clear(search, places, corners, &triangle, least)
@@ -418,9 +418,4 @@ impl<S: SiteSearch> Simplifier<S> {
         let before = self.mender.meetings(mesh, vertex, None, None, usize::MAX);
         before > 0 && self.mender.meetings(mesh, vertex, Some(m), None, before) <= before
     }
-}
-
-/// The triangles of a star of `count` that are kept when its vertex moves to ring m.
-fn kept(m: usize, count: usize) -> impl Iterator<Item = usize> {
-    (0..count).filter(move |&k| k != m && (k + 1) % count != m)
 }

@@ -31,6 +31,11 @@ pub(crate) fn previous(half: u32) -> u32 {
     if half.is_multiple_of(3) { half + 2 } else { half - 1 }
 }
 
+/// The triangles of a star of `count` that are kept when its vertex moves to ring m, or elsewhere.
+pub(crate) fn kept(m: Option<usize>, count: usize) -> impl Iterator<Item = usize> {
+    (0..count).filter(move |&k| m.is_none_or(|m| k != m && (k + 1) % count != m))
+}
+
 /// The closed fan of triangles around a vertex v: triangle k is (v, ring k, ring k + 1).
 #[derive(Debug, Default)]
 pub(crate) struct Star {

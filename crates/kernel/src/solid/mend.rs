@@ -7,7 +7,7 @@
 use super::around::{Around, close_up};
 use super::box_tree::{Box32, BoxTree};
 use super::contact;
-use super::half_edges::{HalfEdges, NONE, Star, next};
+use super::half_edges::{HalfEdges, NONE, Star, kept, next};
 use super::normals::{Normals, normal_box};
 use super::topology::has_no_area;
 use super::{Crossings, TriMesh};
@@ -475,9 +475,8 @@ impl Mender {
         let (ring, count) = (&star.ring, star.ring.len());
         let point = |corner: u32| mesh.points[corner as usize];
         let apex = to.unwrap_or_else(|| point(m.map_or(vertex, |m| ring[m])));
-        let new = (0..count).filter(|&k| m.is_none_or(|m| k != m && (k + 1) % count != m));
         turned.clear();
-        turned.extend(new.map(|k| normal_box(&[apex, point(ring[k]), point(ring[(k + 1) % count])])));
+        turned.extend(kept(m, count).map(|k| normal_box(&[apex, point(ring[k]), point(ring[(k + 1) % count])])));
         let to = to.map(|to| (NONE, to));
         let hull = ring.iter().chain([&vertex]).map(|&corner| (corner, point(corner))).chain(to);
         let other = |triangle| mesh.triangle(triangle).filter(|corners| !corners.contains(&vertex)).map(|corners| corners.map(point));
@@ -501,15 +500,13 @@ impl Mender {
         }
         own.clear();
         let mut whole = Box32::EMPTY;
-        for k in 0..count {
-            if m.is_none_or(|m| k != m && (k + 1) % count != m) {
-                let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
-                let mut points = corners.map(point);
-                points[0] = to.unwrap_or(points[0]);
-                let facet = Facet::new(corners, points);
-                whole = whole.union(&facet.bounds);
-                own.push(facet);
-            }
+        for k in kept(m, count) {
+            let corners = [apex, star.ring[k], star.ring[(k + 1) % count]];
+            let mut points = corners.map(point);
+            points[0] = to.unwrap_or(points[0]);
+            let facet = Facet::new(corners, points);
+            whole = whole.union(&facet.bounds);
+            own.push(facet);
         }
         let mut found = 0;
         for (index, facet) in own.iter().enumerate() {

@@ -130,7 +130,8 @@ impl Bodies<'_> {
     /// How high a cube's centre is above a body, or less, with the slope of a linear function that is below it all over the cube, up to the slack. Near to a figure rounding may turn the way from it, and the body is no lower than its radius anywhere.
     pub(super) fn below(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
         let is_steady = near.distance > STEADY * self.setting.reach;
-        self.above_centre(kind, body, cube, if is_steady { near } else { &Near { way: [0.0; 3], distance: 0.0 } })
+        let near = if is_steady { *near } else { Near::default() };
+        self.above_centre(kind, body, cube, &near)
     }
 
     /// At least how deep a cube's centre is inside of all kinds of a body, and exactly that but in polyhedra; less than 0 where it is beyond one, and less than `least` where it is less deep, by whatever.

@@ -425,8 +425,7 @@ impl Arrangement<'_> {
         }
         let number = self.polytopes.structure(index).edges.len();
         scratch.is_gone.clear();
-        scratch.is_gone.resize(number, true);
-        seen.edges.iter().for_each(|&(edge, _)| scratch.is_gone[usize::from(edge)] = false);
+        scratch.is_gone.resize(number, false);
         scratch.cuts.resize_with(number.max(scratch.cuts.len()), Vec::new);
         scratch.cuts.iter_mut().for_each(Vec::clear);
         scratch.recent.clear();
@@ -480,7 +479,9 @@ impl Arrangement<'_> {
     fn edges(&self, index: u32, scratch: &mut Scratch) {
         let (structure, corners) = (self.polytopes.structure(index), &self.polytopes.of(index).corners);
         let Scratch { cuts, is_gone, out, .. } = scratch;
-        for (number, edge) in structure.edges.iter().enumerate().filter(|&(number, _)| !is_gone[number]) {
+        let numbers = self.seen[index as usize].edges.iter().map(|&(number, _)| usize::from(number));
+        for number in numbers.filter(|&number| !is_gone[number]) {
+            let edge = &structure.edges[number];
             let [p, q] = edge.corners.map(usize::from);
             let name = |facet| pierced(edge_number(index, number), facet);
             let facets = edge.facets.map(|facet| facet_number(index, usize::from(facet)));
