@@ -151,6 +151,11 @@ impl Setting {
         }
     }
 
+    /// The same for sites no place of which is farther than `moved` from those that are meant, nor one of these from them, with more slack for rounding. Tetrahedra do not fit it.
+    pub(super) fn narrower(&self, moved: f64, slack: f64) -> Self {
+        Self { least: self.least + moved, outer: self.outer - moved, slack, ..self.clone() }
+    }
+
     /// A squared distance less theta as an integer, never 0.
     #[inline]
     pub(super) fn integer(&self, distance_squared: f64) -> i64 {
@@ -457,7 +462,7 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         let Some(Arranged { mut surface, uncertain }) = arrangement.run(budget)? else { return Ok(None) };
-        let index = arrangement.into_index();
+        let (index, narrower) = arrangement.into_index();
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
@@ -465,7 +470,7 @@ impl<'a> Plan<'a> {
         surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
-        patches::simplify(setting, &index, core, &mut surface, budget)?;
+        patches::simplify(&narrower, &index, core, &mut surface, budget)?;
         drop(index);
         self.finish(setting, space, surface, uncertain, None, budget).map(Some)
     }

@@ -47,7 +47,7 @@ impl Cube {
     }
 
     /// One of eight.
-    fn part(&self, number: usize) -> Self {
+    pub(super) fn part(&self, number: usize) -> Self {
         let half = 0.5 * self.half;
         Self { centre: self.at(number, half), half }
     }
@@ -65,6 +65,11 @@ impl Cube {
     /// Its eight corners.
     pub(super) fn corners(&self) -> impl Iterator<Item = Point> {
         (0..8).map(|number| self.at(number, self.half))
+    }
+
+    /// How far its corners are from its centre.
+    pub(super) fn half_diagonal(&self) -> f64 {
+        ROOT_OF_3 * self.half
     }
 
     /// How far its places are from its centre along a direction at most: the half times the sum of the direction's parts.

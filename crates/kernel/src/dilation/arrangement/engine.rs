@@ -100,7 +100,7 @@ pub(super) struct Engine<'a> {
 }
 
 impl<'a> Engine<'a> {
-    pub(super) fn new(arrangement: &'a Arrangement<'_>, trial: u64, solids: &'a [Inside<'a>]) -> Self {
+    pub(super) fn new(arrangement: &'a Arrangement, trial: u64, solids: &'a [Inside<'a>]) -> Self {
         let Arrangement { setting, sites, beyond, near, forms, .. } = arrangement;
         let sites = &sites.list;
         Self {

@@ -18,6 +18,8 @@ const MOST_SIDES: usize = 12;
 const MOST_CORNERS: usize = 256;
 /// The least sine by which a side of what is joined turns from the one before it, unless it goes straight on.
 const LEAST_TURN: f64 = 1e-6;
+/// The share of a side's length from which on another is about as long: noise makes them differ.
+const AS_LONG: f64 = 0.999;
 /// Rounds of joining, each of which may double a polygon.
 const ROUNDS: usize = 24;
 /// Polygons with a common side, or segments with a common end, that are looked at: of any number of them most lie in planes of their own, or on lines.
@@ -133,7 +135,7 @@ impl Convex for Figure {
 
 impl Polygon {
     /// The polygon with some corners, in their order.
-    fn new(corners: Box<[Point]>) -> Self {
+    pub(super) fn new(corners: Box<[Point]>) -> Self {
         let from = |corner: &Point| subtract(corner, &corners[0]);
         // By the side itself, which loses nothing where it is short.
         let fan = corners.windows(2).map(|pair| cross(&from(&pair[0]), &subtract(&pair[1], &pair[0])));
@@ -265,21 +267,20 @@ fn turn(up: &Point, before: &Point, corner: &Point, after: &Point, flatness: f64
 
 /// A side of a polygon, or an end of a segment as one of no length.
 pub(super) struct Side {
-    /// In single precision: sides that are as long but for rounding are taken in the order of their places, by which polygons grow side by side.
-    length: f32,
+    length: f64,
     /// In ascending order, whichever way the polygon goes.
     pub(super) ends: [Point; 2],
     pub(super) figure: u32,
 }
 
 impl Side {
-    /// Those of some figures, the longest first, and those between the same ends one after the other.
+    /// Those of some figures, the longest first, and those between the same ends one after the other. Sides that are about as long are taken in the order of their places, by which polygons grow side by side.
     pub(super) fn of_all(figures: &[Figure]) -> Vec<Self> {
         let mut sides = Vec::new();
         for (index, figure) in (0..).zip(figures) {
             let mut add = |[from, to]: [Point; 2]| {
                 let ends = if order(&from, &to).is_lt() { [from, to] } else { [to, from] };
-                sides.push(Self { length: distance_squared(&from, &to).sqrt() as f32, ends, figure: index });
+                sides.push(Self { length: distance_squared(&from, &to).sqrt(), ends, figure: index });
             };
             match &figure.outline {
                 Outline::Point(_) | Outline::Polyhedron(_) => {}
@@ -288,6 +289,14 @@ impl Side {
             }
         }
         let place = |a: &Self, b: &Self| order(&a.ends[0], &b.ends[0]).then_with(|| order(&a.ends[1], &b.ends[1]));
+        sides.sort_unstable_by(|a, b| b.length.total_cmp(&a.length));
+        let mut longest = f64::INFINITY;
+        for side in &mut sides {
+            if side.length < AS_LONG * longest {
+                longest = side.length;
+            }
+            side.length = longest;
+        }
         sides.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then_with(|| place(a, b)).then(a.figure.cmp(&b.figure)));
         sides
     }

@@ -18,10 +18,12 @@ mod hull;
 mod index;
 mod joints;
 mod nerve;
+mod noise;
 mod pieces;
 mod polyhedron;
 mod polytopes;
 mod solids;
+mod steady;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -39,8 +41,10 @@ use engine::{Engine, Forms, Run, State, TRIALS};
 use figure::{Figure, Outline};
 use form::Kind;
 pub(super) use index::Index;
+use noise::Cleared;
 use pieces::{Body, Lists};
 use polytopes::{MOST_POLYTOPES, Polytopes};
+use steady::Steady;
 
 /// The mean square of the number of neighbours at most: lines are cut by all of them.
 const MOST_NEAR: usize = 40_000;
@@ -52,6 +56,10 @@ const NEAR_AROUND_WIRES: f64 = 9.0;
 const FEW_NEAR: f64 = 10_000.0;
 /// How far corners may be off the plane of a union, and off a side that goes straight on, as a share of the slack that all bounds leave: in all rounds together polygons are off by a little more than half of it.
 const FLATNESS: f64 = 1.0 / 128.0;
+/// How far places may be off planes and lines that is taken for noise, in units of half the band; how many times more slack is left then, as planes are met up to some roundings only; and what must be left of the sites at most for it to be worth while.
+const NOISE: f64 = 1.0 / 256.0;
+const CLEARED: f64 = 1e3;
+const WORTH: f64 = 0.9;
 
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: usize = 64;
@@ -59,8 +67,9 @@ const SAMPLE: usize = 64;
 pub(super) const BYTES_PER_TRIANGLE: f64 = 600.0;
 
 /// The sites of an attractor, few of them near to each other.
-pub(super) struct Arrangement<'a> {
-    setting: &'a Setting,
+pub(super) struct Arrangement {
+    /// With bounds that are as much narrower as sites were moved.
+    setting: Setting,
     sites: Sites,
     /// How far beyond its ends each of them is cut.
     beyond: Vec<Box<[Option<f64>]>>,
@@ -81,35 +90,46 @@ pub(super) struct Arranged {
     pub(super) uncertain: u64,
 }
 
-impl<'a> Arrangement<'a> {
+impl Arrangement {
     /// The sites of an attractor; `None` where there are so many, or so near to each other, that a lattice serves better.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn new(
-        setting: &'a Setting,
-        rule: &SiteRule<'_>,
-        candidates: &Candidates,
-        budget: &Budget,
-    ) -> Result<Option<Self>, Stopped> {
+    pub(super) fn new(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, budget: &Budget) -> Result<Option<Self>, Stopped> {
         if setting.dense || setting.clean_only {
             return Ok(None);
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
-        let Some(mut sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
+        let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
+        let mut solids = rule.attractor().surfaces();
+        let band = (setting.outer - setting.reach).min(setting.reach - setting.least);
+        let slack = CLEARED * setting.slack;
+        let cleared = noise::cleared(&sites.list, NOISE * band, [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
+        if let Some(Cleared { figures, moved }) = cleared {
+            let narrower = setting.narrower(moved, slack);
+            let (clear, left) = Sites { list: figures, ..sites }.joined(&narrower, budget)?;
+            if (clear.list.len() as f64) < WORTH * sites.list.len() as f64 {
+                let Some(arrangement) = Self::of(clear, left, narrower, solids, budget)? else { return Ok(None) };
+                let inside: Vec<Inside<'_>> = arrangement.solids.iter().map(Inside::new).collect();
+                let figures = &arrangement.sites.list;
+                if (Steady { figures, radius: setting.reach, moved: moved + slack, solids: &inside }).is_shown(budget)? {
+                    return Ok(Some(arrangement));
+                }
+                solids = arrangement.solids;
+            }
+        }
+        let (sites, left) = sites.joined(setting, budget)?;
+        Self::of(sites, left, setting.clone(), solids, budget)
+    }
+
+    /// The arrangement of joined sites, with the share of faces that no polyhedron has, and the surfaces of solids; `None` likewise.
+    fn of(sites: Sites, left: f64, setting: Setting, solids: Vec<TriMesh>, budget: &Budget) -> Result<Option<Self>, Stopped> {
         let flatness = FLATNESS * setting.slack;
         let shell = |figure: &Figure| setting.shell(figure, State::default());
-        let band = sites.list.iter().map(shell).map(|shell| shell.outer - shell.inner).fold(f64::INFINITY, f64::min);
-        let least = |figure: &Figure| figure.in_space(setting.least);
-        let faces = sites.list.len() as f64;
-        sites.list = polyhedron::closed(sites.list, least, flatness, budget)?;
-        let is_whole = |figure: &&Figure| matches!(figure.outline, Outline::Polyhedron(_));
-        let left = (sites.list.len() - sites.list.iter().filter(is_whole).count()) as f64 / faces;
-        sites.list = figure::joined(sites.list, flatness, hull::CORNER_SHARE * band, budget)?;
         let forms = Forms::default();
         let mut beyond = hinges::cuts(&sites.list, flatness, shell, budget)?;
         let scales = if sites.list.iter().any(|figure| polytopes::kind(figure) == Kind::Rod) {
-            let Some(form) = forms.of(setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
+            let Some(form) = forms.of(&setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
             [form.covering.reach, form.covering.girth]
         } else {
             [1.0; 2]
@@ -135,7 +155,6 @@ impl<'a> Arrangement<'a> {
         if near.total() as f64 > FEW_NEAR + sites.list.iter().map(may_be_near).sum::<f64>() {
             return Ok(None);
         }
-        let solids = rule.attractor().surfaces();
         // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
         let inside = 0.5 * left * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
         let mut arrangement = Self { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), solids, triangles: 0.0 };
@@ -187,9 +206,9 @@ impl<'a> Arrangement<'a> {
         Ok(None)
     }
 
-    /// Its figures, for searches.
-    pub(super) fn into_index(self) -> Index {
-        Index::new(self.sites.list, self.setting.slack)
+    /// Its figures, for searches, and its setting.
+    pub(super) fn into_index(self) -> (Index, Setting) {
+        (Index::new(self.sites.list, self.setting.slack), self.setting)
     }
 }
 
@@ -206,6 +225,16 @@ struct Sites {
 }
 
 impl Sites {
+    /// The same, joined to polyhedra, polygons and segments as far as they are convex, with the share of faces that no polyhedron has.
+    fn joined(self, setting: &Setting, budget: &Budget) -> Result<(Self, f64), Stopped> {
+        let (flatness, faces) = (FLATNESS * setting.slack, self.list.len() as f64);
+        let shells = self.list.iter().map(|figure| setting.shell(figure, State::default()));
+        let band = shells.map(|shell| shell.outer - shell.inner).fold(f64::INFINITY, f64::min);
+        let list = polyhedron::closed(self.list, |figure| figure.in_space(setting.least), flatness, budget)?;
+        let left = list.iter().filter(|figure| !matches!(figure.outline, Outline::Polyhedron(_))).count() as f64 / faces;
+        Ok((Self { list: figure::joined(list, flatness, hull::CORNER_SHARE * band, budget)?, ..self }, left))
+    }
+
     /// The sites below some candidates, if there are at least one and at most `most`.
     fn of(rule: &SiteRule<'_>, candidates: &Candidates, most: usize, budget: &Budget) -> Result<Option<Self>, Stopped> {
         let attractor = rule.attractor();

@@ -116,7 +116,7 @@ fn around() -> Cube {
 }
 
 /// What is told of a shape's arrangement, which there is.
-fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&mut Arrangement<'_>) -> T) -> T {
+fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&mut Arrangement) -> T) -> T {
     let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
     let setting = plan.setting(plan.pitch(), &budget);
     told(&mut Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
