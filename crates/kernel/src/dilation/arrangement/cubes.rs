@@ -475,7 +475,7 @@ pub(super) fn is_covered(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list:
     for (&body, near) in list.iter().zip(near) {
         // What holds the cube holds the ball in it, and what holds the ball around it holds the cube. In a polyhedron the centre may be deeper than is told: then smaller cubes tell.
         let depth = bodies.depth(kinds, body, cube, near, cube.half);
-        if depth > cube.half * ROOT_OF_3 + bodies.setting.slack {
+        if depth > cube.half_diagonal() + bodies.setting.slack {
             return true;
         }
         depths.push(depth);

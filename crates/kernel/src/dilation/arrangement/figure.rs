@@ -274,7 +274,7 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// Those of some figures, the longest first, and those between the same ends one after the other. Sides that are about as long are taken in the order of their places, by which polygons grow side by side.
+    /// Those of some figures, the longest first, and those between the same ends one after the other. Sides that are about as long are in the order of their places, by which polygons grow side by side.
     pub(super) fn of_all(figures: &[Figure]) -> Vec<Self> {
         let mut sides = Vec::new();
         for (index, figure) in (0..).zip(figures) {

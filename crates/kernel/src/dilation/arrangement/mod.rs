@@ -56,7 +56,7 @@ const NEAR_AROUND_WIRES: f64 = 9.0;
 const FEW_NEAR: f64 = 10_000.0;
 /// How far corners may be off the plane of a union, and off a side that goes straight on, as a share of the slack that all bounds leave: in all rounds together polygons are off by a little more than half of it.
 const FLATNESS: f64 = 1.0 / 128.0;
-/// How far places may be off planes and lines that is taken for noise, in units of half the band; how many times more slack is left then, as planes are met up to some roundings only; and what must be left of the sites at most for it to be worth while.
+/// How far places may be off planes and lines that is taken for noise, in units of half the band; how many times more slack is left then, as planes are met up to some roundings only; and what must be left of the figures at most for it to be worth while.
 const NOISE: f64 = 1.0 / 256.0;
 const CLEARED: f64 = 1e3;
 const WORTH: f64 = 0.9;
@@ -101,25 +101,26 @@ impl Arrangement {
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
-        let mut solids = rule.attractor().surfaces();
         let band = (setting.outer - setting.reach).min(setting.reach - setting.least);
         let slack = CLEARED * setting.slack;
         let cleared = noise::cleared(&sites.list, NOISE * band, [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
+        let (error, leaves) = (sites.error, sites.leaves);
+        let (plain, left) = sites.joined(setting, budget)?;
+        let surfaces = rule.attractor().surfaces();
         if let Some(Cleared { figures, moved }) = cleared {
             let narrower = setting.narrower(moved, slack);
-            let (clear, left) = Sites { list: figures, ..sites }.joined(&narrower, budget)?;
-            if (clear.list.len() as f64) < WORTH * sites.list.len() as f64 {
-                let Some(arrangement) = Self::of(clear, left, narrower, solids, budget)? else { return Ok(None) };
-                let inside: Vec<Inside<'_>> = arrangement.solids.iter().map(Inside::new).collect();
+            let (clear, left) = Sites { list: figures, error, leaves }.joined(&narrower, budget)?;
+            if (clear.list.len() as f64) < WORTH * plain.list.len() as f64
+                && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), budget)?
+            {
+                let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
                 let figures = &arrangement.sites.list;
-                if (Steady { figures, radius: setting.reach, moved: moved + slack, solids: &inside }).is_shown(budget)? {
+                if (Steady { figures, radius: setting.reach, moved: moved + slack, solids: &solids }).is_shown(budget)? {
                     return Ok(Some(arrangement));
                 }
-                solids = arrangement.solids;
             }
         }
-        let (sites, left) = sites.joined(setting, budget)?;
-        Self::of(sites, left, setting.clone(), solids, budget)
+        Self::of(plain, left, setting.clone(), surfaces, budget)
     }
 
     /// The arrangement of joined sites, with the share of faces that no polyhedron has, and the surfaces of solids; `None` likewise.

@@ -12,13 +12,16 @@ use crate::budget::{Budget, Stopped};
 const GROWING: f64 = 4.0;
 /// Planes through places are off these by some roundings: vertices that move by so many times what is flat had no noise.
 const NOTHING: f64 = 64.0;
+/// Triangles at a vertex, and segments, at most through which regions and wires go on.
+const MOST_TRIANGLES: usize = 64;
+const MOST_SEGMENTS: usize = 16;
 /// How far vertices may be moved, in units of what planes may be off: where planes meet at a small angle, more than these.
 const FARTHEST: f64 = 4.0;
 /// The least sine of the angle between a plane and those that a vertex is on already, by which the vertex can be moved to it, too.
 const LEAST_SINE: f64 = 0.05;
 /// Corrections of a vertex, each of which leaves some roundings.
 const CORRECTIONS: usize = 3;
-/// Times that vertices are placed, after each of which regions that could not have all of theirs are given up.
+/// Times that vertices are placed, after each of which regions that could not have all of theirs are given up: in the second half all that such a vertex is in.
 const ROUNDS: usize = 32;
 /// The least cosine by which a wire goes on, and its parts at most.
 const STRAIGHT: f64 = 0.99;
@@ -42,7 +45,7 @@ pub(super) fn cleared(figures: &[Figure], most: f64, [flatness, exact]: [f64; 2]
     let regions = net.regions(most, budget)?;
     let Some(mut places) = net.placed(regions, most, exact, budget)? else { return Ok(None) };
     let wires = net.wires(most, budget)?;
-    net.place_ends(&wires, &mut places);
+    net.place_between(&wires, &mut places);
     let mut square = places.at.iter().zip(&net.places).map(|(to, from)| distance_squared(to, from)).fold(0.0, f64::max);
     for wire in &wires {
         let [first, last] = wire.ends().map(|end| &places.at[end as usize]);
@@ -164,29 +167,37 @@ impl Net {
         }
         seeds.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut is_taken = vec![false; self.corners.len()];
-        let mut found = Vec::new();
+        let (mut seen, mut found) = (vec![u32::MAX; self.places.len()], Vec::new());
         for &(_, seed) in seeds.iter().filter(|(double, _)| *double > 0.0) {
             if std::mem::replace(&mut is_taken[seed as usize], true) {
                 continue;
             }
             budget.cancel.check()?;
             let mut sum = Sum::default().with(self.triangle(seed));
-            let (mut members, mut next) = (vec![seed], 0);
+            let (mut plane, mut members, mut next) = (sum.plane(), vec![seed], 0);
             while next < members.len() {
                 for &vertex in &self.corners[members[next] as usize] {
+                    // Once for each seed; what goes on around a hub does so from its neighbours.
+                    let is_known = std::mem::replace(&mut seen[vertex as usize], seed) == seed;
+                    if is_known || self.triangles[vertex as usize].len() > MOST_TRIANGLES {
+                        continue;
+                    }
                     for &other in &self.triangles[vertex as usize] {
-                        if !is_taken[other as usize] && !is_off(&sum.plane(), other, GROWING * most) {
+                        if !is_taken[other as usize] && !is_off(&plane, other, GROWING * most) {
                             is_taken[other as usize] = true;
                             sum = sum.with(self.triangle(other));
+                            plane = sum.plane();
                             members.push(other);
                         }
                     }
                 }
                 next += 1;
             }
-            let plane = sum.plane();
             let (kept, lost): (Vec<u32>, Vec<u32>) = members.into_iter().partition(|&figure| !is_off(&plane, figure, most));
-            lost.into_iter().filter(|&figure| figure != seed).for_each(|figure| is_taken[figure as usize] = false);
+            // What is no region's is left to others, unless there is so much that it might be looked at again and again.
+            if lost.len() < kept.len() {
+                lost.into_iter().for_each(|figure| is_taken[figure as usize] = false);
+            }
             if kept.len() > 1 {
                 found.push(Region { plane, members: kept, area: sum.double });
             }
@@ -209,7 +220,7 @@ impl Net {
         let mut places = Places { at: self.places.clone(), is_flat: vec![false; self.places.len()] };
         let mut is_gone = vec![false; regions.len()];
         let mut open: Vec<u32> = (0..self.places.len() as u32).filter(|&vertex| !of_vertex[vertex as usize].is_empty()).collect();
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             budget.cancel.check()?;
             let mut lost: Vec<u32> = Vec::new();
             for &vertex in &open {
@@ -221,8 +232,8 @@ impl Net {
                 places.is_flat[vertex as usize] = !left.is_empty();
                 match placed {
                     Some(to) => places.at[vertex as usize] = to,
-                    // The smallest one.
-                    None => lost.extend(left.last()),
+                    // The smallest one, as long as there is time for that.
+                    None => lost.extend(&left[if round < ROUNDS / 2 { left.len() - 1 } else { 0 }..]),
                 }
             }
             if lost.is_empty() {
@@ -272,22 +283,27 @@ impl Net {
         let [.., before, last] = *vertices else { return None };
         let [from, at] = [before, last].map(|vertex| &self.places[vertex as usize]);
         let way = unit(&subtract(at, from));
-        let cosine = |end: u32| dot(&way, &unit(&subtract(&self.places[end as usize], at)));
-        let others = self.segments[last as usize].iter().filter(|&&segment| !is_taken[segment as usize]);
-        let with_end = |&segment: &u32| (segment, self.corners[segment as usize].iter().copied().find(|&end| end != last).unwrap_or(last));
-        let goes_on = |&(segment, end): &(u32, u32)| end != last && self.deficits[segment as usize].to_bits() == deficit.to_bits();
-        let next = others.map(with_end).filter(goes_on);
-        let (segment, end) = next.max_by(|a, b| cosine(a.1).total_cmp(&cosine(b.1)).then(b.0.cmp(&a.0)))?;
+        let there = &self.segments[last as usize];
+        if there.len() > MOST_SEGMENTS {
+            return None;
+        }
+        let others =
+            there.iter().filter(|&&segment| !is_taken[segment as usize] && self.deficits[segment as usize].to_bits() == deficit.to_bits());
+        let with_end = |&segment: &u32| {
+            let end = self.corners[segment as usize].iter().copied().find(|&end| end != last)?;
+            (end != vertices[0]).then(|| (dot(&way, &unit(&subtract(&self.places[end as usize], at))), segment, end))
+        };
+        let (cosine, segment, end) = others.filter_map(with_end).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
         let [first, to] = [vertices[0], end].map(|vertex| &self.places[vertex as usize]);
         let is_off = |vertex: &u32| {
             let on = &self.places[*vertex as usize];
             distance_squared(on, &closest_on_segment(on, first, to)) > most * most
         };
-        (cosine(end) > STRAIGHT && !vertices[1..].iter().any(is_off)).then_some((segment, end))
+        (cosine > STRAIGHT && !vertices[1..].iter().any(is_off)).then_some((segment, end))
     }
 
     /// Moves what lies between the ends of a wire, and on no plane, to it.
-    fn place_ends(&self, wires: &[Wire], places: &mut Places) {
+    fn place_between(&self, wires: &[Wire], places: &mut Places) {
         let mut is_within = vec![false; self.places.len()];
         for _ in 0..SWEEPS {
             is_within.fill(false);
@@ -358,11 +374,18 @@ fn on_planes(from: &Point, planes: &[&Plane], exact: f64) -> Option<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attractor::Attractor;
     use crate::attractor::cell::{Site, between};
+    use crate::dilation::arrangement::Arrangement;
     use crate::dilation::arrangement::figure::joined;
     use crate::dilation::convex::Convex;
+    use crate::dilation::plan::{Balls, Plan};
     use crate::dilation::tree::Weighted;
+    use crate::model::{Interior, Model, PolygonMesh, Shape};
+    use crate::solid::Inside;
     use crate::split_mix::Random;
+    use crate::tolerance::{Radius, Tolerance};
+    use glam::DVec3;
 
     const FLAT: [f64; 2] = [1e-13, 1e-10];
 
@@ -398,7 +421,8 @@ mod tests {
                         cell[k] + i32::from(k == (axis + 1) % 3 && code & 1 == 1) + i32::from(k == (axis + 2) % 3 && code > 1)
                     })
                 };
-                let [a, b, c, d] = [0, 1, 3, 2].map(|code| place(corner(code)));
+                // Counter-clockwise seen from outside.
+                let [a, b, c, d] = (if is_full(cell) { [0, 2, 3, 1] } else { [0, 1, 3, 2] }).map(|code| place(corner(code)));
                 figures.extend([[a, b, c], [a, c, d]].map(|corners| figure(Site::Triangle(corners))));
             }
         }
@@ -487,5 +511,118 @@ mod tests {
         assert!(cleared_of(&ring, 1e-6).is_none());
         let points: Vec<Figure> = (0..50).map(|k| figure(Site::Point(noisy([f64::from(k); 3], 1e-6, &mut random)))).collect();
         assert!(cleared_of(&points, 1e-3).is_none());
+    }
+
+    /// Flat faces with more noise than is taken for it, cones, and stars of segments, of which everything is beside everything: no more than a look at each of all that are beside it.
+    #[test]
+    fn what_is_beside_much_takes_no_longer() {
+        let mut random = Random(11);
+        let side = 120;
+        let places: Vec<Point> =
+            (0..side * side).map(|k| noisy([f64::from(k % side), f64::from(k / side), 0.0], 2e-3, &mut random)).collect();
+        let squares = (0..side * (side - 1)).filter(|k| k % side + 1 < side).map(|k| k as usize);
+        let [right, up] = [1, side as usize];
+        let grid: Vec<Figure> = squares
+            .flat_map(|k| [[k, k + right, k + right + up], [k, k + right + up, k + up]])
+            .map(|corners| figure(Site::Triangle(corners.map(|k| places[k]))))
+            .collect();
+        let around = |k: u32, count: u32| -> Point {
+            let (sine, cosine) = (std::f64::consts::TAU * f64::from(k) / f64::from(count)).sin_cos();
+            [9.0 * cosine, 9.0 * sine, 0.0]
+        };
+        let top = [0.0, 0.0, 5.0];
+        let count = 20_000;
+        let cone: Vec<Figure> = (0..count).map(|k| figure(Site::Triangle([top, around(k, count), around(k + 1, count)]))).collect();
+        let star: Vec<Figure> = (0..2 * count).map(|k| figure(Site::Segment([top, around(k, 2 * count)]))).collect();
+        let fan: Vec<Figure> = (0..count).map(|k| figure(Site::Triangle([[0.0; 3], around(k, count), around(k + 1, count)]))).collect();
+        assert!(cleared_of(&grid, 1e-3).is_none_or(|cleared| cleared.moved < 4e-3));
+        assert!([cone, star, fan].iter().all(|figures| cleared_of(figures, 1e-6).is_none_or(|cleared| cleared.moved < 4e-6)));
+    }
+
+    /// A mesh with coordinates that are turned, moved and rounded to single precision, or as they are.
+    fn mesh(figures: &[Figure], interior: Interior, is_rounded: bool) -> (Attractor, Vec<Figure>) {
+        let rounded =
+            |at: &Point| -> Point { if is_rounded { noisy(*at, 0.0, &mut Random(1)).map(|x| f64::from((x + 40.0) as f32)) } else { *at } };
+        let places: Vec<Point> = figures.iter().flat_map(Figure::corners).map(rounded).collect();
+        let mut vertices = places.clone();
+        vertices.sort_unstable_by(order);
+        vertices.dedup();
+        let number = |at: &Point| vertices.binary_search_by(|own| order(own, at)).unwrap() as u32;
+        let faces = places.chunks(3).map(|corners| corners.iter().map(number).collect()).collect();
+        let own = places.chunks(3).map(|corners| figure(Site::Triangle([corners[0], corners[1], corners[2]]))).collect();
+        let vertices = vertices.into_iter().map(DVec3::from_array).collect();
+        let shape = Shape::Mesh(PolygonMesh { vertices, faces, interior });
+        (Model { name: None, shape }.lower().unwrap().attractor, own)
+    }
+
+    fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
+        let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
+        Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
+    }
+
+    /// How many figures are left of a shape, and how much narrower its bounds are.
+    fn narrowed(attractor: &Attractor, radius: f64, tolerance: f64) -> (usize, [f64; 2]) {
+        let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
+        let setting = plan.setting(plan.pitch(), &budget);
+        let made = Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
+        (made.sites.list.len(), [made.setting.least - setting.least, setting.outer - made.setting.outer])
+    }
+
+    /// A frame with steps, turned and rounded, its surface alone and filled: few bodies, within the bounds of what was given, with the topology of the exact one.
+    #[test]
+    fn noisy_frames_are_as_exact_ones() {
+        let mut random = Random(13);
+        let is_full = |[x, y, z]: [i32; 3]| z < 1 + x / 2 % 2 && !((1..4).contains(&x) && y == 2);
+        let exact = voxels(5, is_full, &mut |at| at.map(|x| 3.0 * f64::from(x)));
+        for (interior, radius, tolerance) in [(Interior::Surface, 0.5, 0.05), (Interior::Solid, 0.5, 0.005), (Interior::Solid, 0.7, 0.003)]
+        {
+            let (plain, _) = mesh(&exact, interior, false);
+            let (noisy, figures) = mesh(&exact, interior, true);
+            let (count, narrower) = narrowed(&noisy, radius, tolerance);
+            let (least, none) = narrowed(&plain, radius, tolerance);
+            assert!(none == [0.0; 2] && narrower.iter().all(|by| (1e-8..2e-5).contains(by)), "{narrower:?}");
+            assert!(count < 2 * least && 2 * count < figures.len(), "{count} of {}, {least} exact", figures.len());
+            let [made, expected] = [&noisy, &plain].map(|shape| {
+                let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
+                let setting = plan.setting(plan.pitch(), &budget);
+                plan.arranged(&setting, &plan.space(&setting), &budget).unwrap().expect("few are near each other")
+            });
+            assert!(made.topology_exact && made.crossings == 0 && made.inner_mm.max(made.outer_mm) <= tolerance);
+            let topology = |dilation: &crate::dilation::Dilation| {
+                let topology = dilation.solid.topology();
+                (topology.components, topology.cavities, topology.euler)
+            };
+            assert_eq!(topology(&made), topology(&expected));
+            let distance = |x: &Point| figures.iter().map(|figure| figure.distance_squared(x)).fold(f64::INFINITY, f64::min).sqrt();
+            let vertices = &made.solid.mesh().vertices;
+            let ends = vertices.iter().map(|vertex| distance(&vertex.to_array()));
+            let [low, high] = ends.fold([f64::INFINITY, 0.0_f64], |[low, high], d| [low.min(d), high.max(d)]);
+            assert!(low >= radius - made.inner_mm && high <= radius + made.outer_mm, "from {low} to {high}");
+            let inside = Inside::new(made.solid.mesh());
+            for _ in 0..400 {
+                let near = figures[(random.next() % figures.len() as u64) as usize].corners()[0];
+                let x = near.map(|x| x + 1.6 * radius * (2.0 * random.share() - 1.0));
+                let d = distance(&x);
+                let is_in = inside.winding(DVec3::from_array(x)) == 1;
+                assert!(is_in || d > radius - made.inner_mm, "{x:?} is {d} away");
+                let is_filled = interior == Interior::Solid;
+                assert!(!is_in || is_filled || d < radius + made.outer_mm, "{x:?} is {d} away");
+            }
+        }
+    }
+
+    /// Two plates, as far from each other as two radii but for less than noise: the plates as they are. Farther, or nearer, flat ones.
+    #[test]
+    fn noise_stays_where_it_might_matter() {
+        for (gap, is_cleared) in [(2.0, false), (2.000_000_01, false), (2.1, true), (1.9, true)] {
+            let plate = |z: f64| {
+                voxels(6, |[_, _, k]| k == 0, &mut |at| [f64::from(at[0]), f64::from(at[1]), if at[2] == 0 { z } else { f64::from(at[2]) }])
+            };
+            let low = |figure: &Figure| figure.corners().iter().all(|corner| corner[2] < 1.0);
+            let [lower, upper] = [0.0, -gap].map(|z| plate(z).into_iter().filter(low).collect::<Vec<Figure>>());
+            let (shape, figures) = mesh(&[lower, upper].concat(), Interior::Surface, true);
+            let (count, narrower) = narrowed(&shape, 1.0, 0.1);
+            assert_eq!((narrower != [0.0; 2], 2 * count < figures.len()), (is_cleared, is_cleared), "{gap}: {count} of {}", figures.len());
+        }
     }
 }

@@ -24,9 +24,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Halves of the diagonals of cubes in which directions are looked for, and of those that are halved no more, in units of the radius.
 const WIDEST: f64 = 1.0;
 const NARROWEST: f64 = 1.0 / 512.0;
-/// Cubes at most.
-const MOST_CUBES: usize = 1 << 22;
-/// Figures that are few: the cones around all pairs and triples of directions away from them are looked at.
+/// Looks at figures at most: in any case, and for each of them.
+const FEW_LOOKS: usize = 1_000_000;
+const LOOKS: usize = 4_000;
+/// Of more figures pairs are not looked at; of few the cones around all triples of directions away from them are, too.
+const MANY: usize = 64;
 const FEW: usize = 10;
 /// Sums of directions that are longer than this have a direction of their own.
 const LEAST_SUM: f64 = 1e-6;
@@ -60,16 +62,29 @@ impl Steady<'_> {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn is_shown(&self, budget: &Budget) -> Result<bool, Stopped> {
+        // One figure alone must tell, see above.
+        if self.figures.iter().any(|figure| self.aside() + self.moved >= figure.in_space(self.radius - self.moved)) {
+            return Ok(false);
+        }
         let [low, high] = box_of(self.figures.iter().flat_map(Figure::corners));
         let side = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         let cube = Cube { centre: between(&low, &high, 0.5), half: 0.5 * side + self.radius + 2.0 * self.moved };
         let all: Vec<&Figure> = self.figures.iter().collect();
-        self.holds(&cube, &all, &AtomicUsize::new(MOST_CUBES), budget)
+        self.holds(&cube, &all, &AtomicUsize::new(FEW_LOOKS + LOOKS * self.figures.len()), budget)
     }
 
-    /// Whether it is shown in a cube, which some figures may reach; as long as some cubes are `left` to look at.
+    /// s: how far closest places may be off the way from a figure.
+    fn aside(&self) -> f64 {
+        (3.0 * self.moved * (2.0 * self.radius + self.moved)).sqrt()
+    }
+
+    /// Whether it is shown in a cube, which some figures may reach; as long as some looks at figures are `left`.
     fn holds(&self, cube: &Cube, figures: &[&Figure], left: &AtomicUsize, budget: &Budget) -> Result<bool, Stopped> {
         budget.cancel.check()?;
+        if left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(figures.len())).is_err() {
+            left.store(0, Ordering::Relaxed);
+            return Ok(false);
+        }
         let Self { radius, moved, .. } = *self;
         let half = cube.half_diagonal();
         let mut near = Vec::new();
@@ -93,10 +108,12 @@ impl Steady<'_> {
         if !is_in_question || near.len() == 1 {
             return Ok(true);
         }
-        if half <= WIDEST * radius && (self.is_told(cube, &near) || self.is_between(cube, &near) || self.is_filled(cube, &near)) {
+        if half <= WIDEST * radius
+            && (self.is_told(cube, &near) || (near.len() <= MANY && self.is_between(cube, &near)) || self.is_filled(cube, &near))
+        {
             return Ok(true);
         }
-        if half <= NARROWEST * radius || left.fetch_sub(1, Ordering::Relaxed) == 0 {
+        if half <= NARROWEST * radius {
             left.store(0, Ordering::Relaxed);
             return Ok(false);
         }
@@ -108,10 +125,11 @@ impl Steady<'_> {
     fn is_told(&self, cube: &Cube, near: &[Near<'_>]) -> bool {
         let all: Vec<&Near<'_>> = near.iter().collect();
         self.have_direction(cube, &all)
-            || near.iter().all(|own| {
-                let with: Vec<&Near<'_>> = near.iter().filter(|other| !self.are_apart(cube, own, other)).collect();
-                with.len() < all.len() && self.have_direction(cube, &with)
-            })
+            || near.len() <= MANY
+                && near.iter().all(|own| {
+                    let with: Vec<&Near<'_>> = near.iter().filter(|other| !self.are_apart(cube, own, other)).collect();
+                    with.len() < all.len() && self.have_direction(cube, &with)
+                })
     }
 
     /// Whether a direction is found in which all of some figures are left behind: of few, the middle of the narrowest cone around the directions away from them is looked for, on whose rim two or three of these are.
@@ -134,7 +152,7 @@ impl Steady<'_> {
             if dot(&normal, away(p)) < 0.0 { normal.map(|part| -part) } else { normal }
         };
         leads_all(&sum(&(0..count).collect::<Vec<usize>>()))
-            || widest().is_some_and(|(p, q)| leads_all(&sum(&[p, q])))
+            || (count <= MANY && widest().is_some_and(|(p, q)| leads_all(&sum(&[p, q]))))
             || (count <= FEW && pairs().any(|(p, q)| (0..p).any(|r| leads_all(&across(r, p, q)))))
     }
 
@@ -142,11 +160,10 @@ impl Steady<'_> {
     fn leads(&self, near: &Near<'_>, direction: &Point, half: f64) -> bool {
         let Self { radius, moved, .. } = *self;
         let least = near.figure.in_space(radius - moved);
-        let aside = (3.0 * moved * (2.0 * radius + moved)).sqrt();
         let turned = half / near.distance.min(least);
         // The angle by which unit vectors differ that are so far from each other.
         let angle = dot(direction, &near.away).clamp(-1.0, 1.0).acos() + 2.0 * (0.5 * turned).min(1.0).asin();
-        near.away != [0.0; 3] && angle < ((aside + moved) / least).min(1.0).acos()
+        near.away != [0.0; 3] && angle < ((self.aside() + moved) / least).min(1.0).acos()
     }
 
     /// Whether linear functions below both distances show that no place in a cube is so near to two figures that both matter.
@@ -223,8 +240,8 @@ mod tests {
         is_within.then_some(sum)
     }
 
-    /// The critical values of the distance from points: at places that are in the hull of all points that are closest to them.
-    fn critical_values(points: &[(Point, f64)]) -> Vec<f64> {
+    /// The critical values of the distance from points, and how many these are: at places that are in the hull of all points that are closest to them.
+    fn critical_values(points: &[(Point, f64)]) -> Vec<(f64, u32)> {
         let mut found = Vec::new();
         for set in 3..1_u32 << points.len() {
             if !(2..=4).contains(&set.count_ones()) {
@@ -235,7 +252,7 @@ mod tests {
             let square = |(at, deficit): &(Point, f64)| distance_squared(at, &x) + deficit;
             let value = square(&own[0]);
             if points.iter().all(|other| square(other) > value - 1e-12) {
-                found.push(value.sqrt());
+                found.push((value.sqrt(), set.count_ones()));
             }
         }
         found
@@ -257,7 +274,7 @@ mod tests {
             let moved = [1e-6, 1e-4, 1e-3][round % 3];
             // One of the critical values where it is wanted: all lengths, and squares of deficits, in proportion.
             let values = critical_values(&points);
-            if let Some(&value) = values.get((random.next() % 8) as usize)
+            if let Some(&(value, _)) = values.get((random.next() % 8) as usize)
                 && value > 0.3
             {
                 let share = (1.0 + moved * [0.9, -0.9, 3.0, -3.0, 30.0, 0.0][round % 6]) / value;
@@ -265,7 +282,7 @@ mod tests {
             }
             let values = critical_values(&points);
             let figures: Vec<Figure> = points.iter().map(|&(at, deficit)| Weighted { site: Site::Point(at), deficit }.into()).collect();
-            let is_near = |by: f64| values.iter().any(|value| (value - 1.0).abs() <= by);
+            let is_near = |by: f64| values.iter().any(|(value, _)| (value - 1.0).abs() <= by);
             let told = is_shown(&figures, moved, &[]);
             if is_near(moved) {
                 beside += 1;
@@ -276,6 +293,41 @@ mod tests {
             }
         }
         assert!(beside > 600 && clear > 600 && 20 * shown > 19 * clear, "{beside} beside one, {shown} of {clear} shown");
+    }
+
+    /// Points that are moved by no more than is told: where it is shown, the alternating sum of critical points below the radius, the Euler number of the union of balls, stays; and it often does not where it is not shown.
+    #[test]
+    fn what_is_moved_keeps_its_euler_number() {
+        let mut random = Random(19);
+        let euler = |points: &[(Point, f64)]| {
+            let below = critical_values(points).into_iter().filter(|&(value, _)| value < 1.0);
+            let signs = below.map(|(_, count)| if count % 2 == 0 { -1 } else { 1 });
+            points.len() as i64 + signs.sum::<i64>()
+        };
+        let (mut shown, mut differ) = (0, 0);
+        for round in 0..2_000 {
+            let size = 1.0 + random.share();
+            let points: Vec<(Point, f64)> = (0..3 + round % 5).map(|_| (vector(&mut random).map(|x| size * x), 0.0)).collect();
+            let moved = [0.001, 0.01, 0.02][round % 3];
+            let others: Vec<(Point, f64)> = points
+                .iter()
+                .map(|(at, _)| {
+                    let way = unit(&vector(&mut random)).map(|x| moved * x);
+                    (std::array::from_fn(|axis| at[axis] + way[axis]), 0.0)
+                })
+                .collect();
+            let figures: Vec<Figure> = others.iter().map(|&(at, deficit)| Weighted { site: Site::Point(at), deficit }.into()).collect();
+            let is_same = euler(&points) == euler(&others);
+            differ += usize::from(!is_same);
+            if is_shown(&figures, moved, &[]) {
+                shown += 1;
+                assert!(is_same, "{round}: {points:?}, {moved}");
+            }
+        }
+        assert!(shown > 1_000 && differ > 20, "{shown} shown, {differ} differ");
+        // What is moved by as much as the radius, or nearly, tells nothing; nor do balls of no radius.
+        let one = |deficit: f64| -> [Figure; 1] { [Weighted { site: Site::Point([0.0; 3]), deficit }.into()] };
+        assert!(is_shown(&one(0.0), 0.01, &[]) && !is_shown(&one(0.0), 0.5, &[]) && !is_shown(&one(1.0 - 1e-6), 1e-5, &[]));
     }
 
     /// Two plates, wires, or a wire and a plate, as far from each other as nearly two radii: never shown where they may touch, and mostly where they do or do not for sure. Also where they cross, bend, or end.
