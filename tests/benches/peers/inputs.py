@@ -236,14 +236,8 @@ def sierpinski_tetrahedron(depth):
     return cells.reshape(-1, 3), faces.reshape(-1, 3)
 
 
-def menger(depth):
-    """The boundary of the Menger sponge in the unit cube, two triangles for each face of a cube of side 3^-depth."""
-    n = 3**depth
-    solid = np.ones((n, n, n), bool)
-    for level in range(depth):
-        middle = np.arange(n) // 3**level % 3 == 1
-        x, y, z = middle[:, None, None], middle[:, None], middle
-        solid &= ~((x & y) | (y & z) | (z & x))
+def boundary(solid):
+    """The boundary of unit cubes, two triangles for each face; vertices are not welded."""
     quads = []
     for axis in range(3):
         u, v = np.eye(3, dtype=int)[(axis + 1) % 3], np.eye(3, dtype=int)[(axis + 2) % 3]
@@ -254,7 +248,26 @@ def menger(depth):
             quads.append(np.stack([place, place + u, place + u + v, place + v][::-step], axis=1))
     quads = np.concatenate(quads)
     triangles = 4 * np.arange(len(quads))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
-    return weld(quads.reshape(-1, 3) / n, triangles.reshape(-1, 3))
+    return quads.reshape(-1, 3), triangles.reshape(-1, 3)
+
+
+def grating(columns, rows):
+    """The boundary of a plate, two thick, with square holes, two wide and two from each other; two triangles for each unit square."""
+    x, y = (np.arange(4 * count + 2) % 4 > 1 for count in (columns, rows))
+    solid = np.repeat(~(x[:, None] & y)[:, :, None], 2, axis=2)
+    return weld(*boundary(solid))
+
+
+def menger(depth):
+    """The boundary of the Menger sponge in the unit cube, two triangles for each face of a cube of side 3^-depth."""
+    n = 3**depth
+    solid = np.ones((n, n, n), bool)
+    for level in range(depth):
+        middle = np.arange(n) // 3**level % 3 == 1
+        x, y, z = middle[:, None, None], middle[:, None], middle
+        solid &= ~((x & y) | (y & z) | (z & x))
+    vertices, triangles = boundary(solid)
+    return weld(vertices / n, triangles)
 
 
 def cantor_dust(depth):
@@ -270,6 +283,17 @@ def random_points(count, seed=5):
     """Points in the unit cube."""
     random = uniform(seed)
     return np.array([[next(random) for _ in range(3)] for _ in range(count)]), np.arange(count)[:, None]
+
+
+def turned(made):
+    """A shape turned about two axes, moved, and rounded to single precision, as parts in files are."""
+    vertices, cells = made
+    a, b = 0.7, 0.4
+    about_z = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
+    about_x = np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
+    if vertices.shape[1] == 2:
+        vertices = np.column_stack([vertices, np.zeros(len(vertices))])
+    return (vertices @ (about_z @ about_x).T + [13.7, -4.2, 8.8]).astype(np.float32).astype(float), cells
 
 
 # The first eight are those of the project's comparison; the others are more of the same kinds.
@@ -288,6 +312,9 @@ SHAPES = {
     "weierstrass96": lambda: weierstrass(96),
     "cantor4": lambda: cantor_dust(4),
     "points3k": lambda: random_points(3000),
+    "sierp7turned": lambda: turned(sierpinski_wire(7)),
+    "grating": lambda: grating(12, 8),
+    "gratingturned": lambda: turned(grating(12, 8)),
 }
 MAIN = list(SHAPES)[:8]
 
