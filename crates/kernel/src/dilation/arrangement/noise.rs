@@ -434,13 +434,12 @@ mod tests {
     use crate::attractor::cell::{Site, between};
     use crate::dilation::arrangement::Arrangement;
     use crate::dilation::arrangement::figure::joined;
+    use crate::dilation::arrangement::tests::{arranged, lowered_as, plan, topology};
     use crate::dilation::convex::Convex;
-    use crate::dilation::plan::{Balls, Plan};
     use crate::dilation::tree::Weighted;
-    use crate::model::{Interior, Model, PolygonMesh, Shape};
+    use crate::model::Interior;
     use crate::solid::Inside;
     use crate::split_mix::Random;
-    use crate::tolerance::{Radius, Tolerance};
     use glam::DVec3;
 
     const FLAT: [f64; 2] = [1e-13, 1e-10];
@@ -606,14 +605,8 @@ mod tests {
         let number = |at: &Point| vertices.binary_search_by(|own| order(own, at)).unwrap() as u32;
         let faces = places.chunks(3).map(|corners| corners.iter().map(number).collect()).collect();
         let own = places.chunks(3).map(|corners| figure(Site::Triangle([corners[0], corners[1], corners[2]]))).collect();
-        let vertices = vertices.into_iter().map(DVec3::from_array).collect();
-        let shape = Shape::Mesh(PolygonMesh { vertices, faces, interior });
-        (Model { name: None, shape }.lower().unwrap().attractor, own)
-    }
-
-    fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
-        let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
-        Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
+        let vertices: Vec<DVec3> = vertices.into_iter().map(DVec3::from_array).collect();
+        (lowered_as(interior, &vertices, faces).unwrap(), own)
     }
 
     /// How many figures are left of a shape, and how much narrower its bounds are.
@@ -638,16 +631,8 @@ mod tests {
             let (least, none) = narrowed(&plain, radius, tolerance);
             assert!(none == [0.0; 2] && narrower.iter().all(|by| (1e-8..2e-5).contains(by)), "{narrower:?}");
             assert!(count < 2 * least && 2 * count < figures.len(), "{count} of {}, {least} exact", figures.len());
-            let [made, expected] = [&noisy, &plain].map(|shape| {
-                let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
-                let setting = plan.setting(plan.pitch(), &budget);
-                plan.arranged(&setting, &plan.space(&setting), &budget).unwrap().expect("few are near each other")
-            });
+            let [made, expected] = [&noisy, &plain].map(|shape| arranged(shape, radius, tolerance));
             assert!(made.topology_exact && made.crossings == 0 && made.inner_mm.max(made.outer_mm) <= tolerance);
-            let topology = |dilation: &crate::dilation::Dilation| {
-                let topology = dilation.solid.topology();
-                (topology.components, topology.cavities, topology.euler)
-            };
             assert_eq!(topology(&made), topology(&expected));
             let distance = |x: &Point| figures.iter().map(|figure| figure.distance_squared(x)).fold(f64::INFINITY, f64::min).sqrt();
             let vertices = &made.solid.mesh().vertices;

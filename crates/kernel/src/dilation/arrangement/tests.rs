@@ -31,7 +31,7 @@ fn lowered(vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Attractor {
 }
 
 /// None where a solid is asked for and there is none.
-fn lowered_as(interior: Interior, vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Option<Attractor> {
+pub(super) fn lowered_as(interior: Interior, vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Option<Attractor> {
     let shape = Shape::Mesh(PolygonMesh { vertices: vertices.to_vec(), faces, interior });
     Model { name: None, shape }.lower().ok().map(|lowered| lowered.attractor)
 }
@@ -55,7 +55,7 @@ fn sticks(random: &mut Random, count: usize, size: f64, length: f64) -> Vec<[DVe
         .collect()
 }
 
-fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
+pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
     let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
     Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
 }
@@ -66,7 +66,7 @@ fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> O
     plan.arranged(&setting, &plan.space(&setting), &budget).unwrap()
 }
 
-fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
     arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
 }
 
@@ -77,7 +77,7 @@ fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
 }
 
 /// Components, cavities and the Euler number.
-fn topology(dilation: &Dilation) -> (u64, u64, i64) {
+pub(super) fn topology(dilation: &Dilation) -> (u64, u64, i64) {
     let topology = dilation.solid.topology();
     (topology.components, topology.cavities, topology.euler)
 }
