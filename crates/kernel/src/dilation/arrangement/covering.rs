@@ -48,14 +48,17 @@ fn fewest(most: f64) -> f64 {
 }
 
 impl Covering {
-    /// One with few directions, no more than `limit`, whose hull is around the ball with radius 1 / `most`; those of the belt count `belt_weight` times more.
-    pub(super) fn within(most: f64, limit: usize, belt_weight: usize) -> Option<Self> {
+    /// One with few directions, no more than `limit`, whose hull is around the ball with radius 1 / `most`; those of the belt count `belt_weight` times more, and are a multiple of `belt_step`.
+    pub(super) fn within(most: f64, limit: usize, belt_weight: usize, belt_step: usize) -> Option<Self> {
         let least = (PI / (1.0 / most).acos()).ceil().max(4.0) as usize;
         // Also where no number would do.
         if !(most > 1.0 && fewest(most) <= limit as f64 && least <= limit) {
             return None;
         }
-        let mut found: Vec<Rows> = (least..=least + WIDER).filter_map(|belt| Rows::around(belt, most, limit)).collect();
+        let mut found: Vec<Rows> = (least..=least + WIDER)
+            .filter(|belt| belt.is_multiple_of(belt_step))
+            .filter_map(|belt| Rows::around(belt, most, limit))
+            .collect();
         found.sort_by_key(|rows| rows.count + belt_weight * rows.list[0].count);
         // Rows were only held against the next ones.
         found.iter().find_map(|rows| Self::of(rows, most))
@@ -252,7 +255,7 @@ mod tests {
         // Where the one with the fewest directions is no hull.
         let some = [1.4753, 1.48, 1.4848, 1.4882].into_iter().flat_map(|most| [(most, 0), (most, 2)]);
         for (most, weight) in many.chain(some).chain([(1.01, 2), (1.006, 0)]) {
-            let Some(covering) = Covering::within(most, 1000, weight) else { panic!("{most}") };
+            let Some(covering) = Covering::within(most, 1000, weight, 1) else { panic!("{most}") };
             let count = covering.directions.len();
             assert!(covering.reach <= most * (1.0 + 1e-6) && covering.girth <= covering.reach, "{most}");
             assert!((count as f64) < 1.35 * fewest(most) + 4.0, "{most}: {count} directions");
@@ -265,6 +268,6 @@ mod tests {
             }
         }
         // What asks for too many is told at once, also where no number would do.
-        assert!([1.01, 1.0 + 1e-12, 1.0, 0.9, f64::NAN].into_iter().all(|most| Covering::within(most, 100, 0).is_none()));
+        assert!([1.01, 1.0 + 1e-12, 1.0, 0.9, f64::NAN].into_iter().all(|most| Covering::within(most, 100, 0, 1).is_none()));
     }
 }

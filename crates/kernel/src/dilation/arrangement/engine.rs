@@ -9,6 +9,7 @@ use super::form::{Form, Kind};
 use super::nerve::{Change, Doubt, Sets};
 use super::pieces::{self, Lists};
 use super::polytopes::{self, Cut, Plane, Polytope, Polytopes, Shell};
+use super::tubes::{Loose, Tubes};
 use super::{Arranged, Arrangement};
 use super::{facets, hull};
 use crate::budget::{Budget, Stopped};
@@ -65,7 +66,7 @@ impl Setting {
 
 /// The forms of an arrangement by their states, and where there is none: to look for one takes as long as hundreds of polytopes, so it is done once.
 #[derive(Default)]
-pub(super) struct Forms([[[OnceLock<Option<Form>>; 2]; 2]; LEVELS as usize]);
+pub(super) struct Forms([[[OnceLock<Option<Form>>; 3]; 2]; LEVELS as usize]);
 
 impl Forms {
     /// The form for a state below [`LEVELS`].
@@ -78,6 +79,8 @@ impl Forms {
 /// What a trial came to.
 pub(super) enum Run {
     Done(Box<Arranged>),
+    /// Where bends are in doubt: without them bodies can be changed.
+    Bent(Loose),
     /// The boundary is not closed.
     Open,
     /// The topology is in doubt at too many places.
@@ -90,6 +93,7 @@ pub(super) struct Engine<'a> {
     beyond: &'a [Box<[Option<f64>]>],
     near: &'a Lists,
     forms: &'a Forms,
+    tubes: &'a Tubes,
     solids: &'a [Inside<'a>],
     pub(super) polytopes: Polytopes,
     states: Vec<State>,
@@ -101,7 +105,7 @@ pub(super) struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     pub(super) fn new(arrangement: &'a Arrangement, trial: u64, solids: &'a [Inside<'a>]) -> Self {
-        let Arrangement { setting, sites, beyond, near, forms, .. } = arrangement;
+        let Arrangement { setting, sites, beyond, near, forms, tubes, .. } = arrangement;
         let sites = &sites.list;
         Self {
             setting,
@@ -109,6 +113,7 @@ impl<'a> Engine<'a> {
             beyond,
             near,
             forms,
+            tubes,
             solids,
             polytopes: Polytopes::default(),
             states: vec![State::default(); sites.len()],
@@ -118,11 +123,11 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// What comes of the polytopes that there are, or of the first ones.
+    /// What comes of the polytopes that there are, or of the first ones. The boundary is made of the cells, instead of the bodies with their numbers.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn run(&mut self, budget: &Budget) -> Result<Run, Stopped> {
+    pub(super) fn run(&mut self, cells: &mut [(u32, Polytope)], budget: &Budget) -> Result<Run, Stopped> {
         if self.polytopes.all.is_empty() && !self.begin(budget)? {
             return Ok(Run::Open);
         }
@@ -133,12 +138,19 @@ impl<'a> Engine<'a> {
             if !sets.look(&self.bodies(), &changes, most, budget)? {
                 return Ok(Run::Doubtful);
             }
-            changes = self.refine(&sets.doubts(), budget)?;
+            let doubts = sets.doubts();
+            let in_doubt = doubts.iter().flat_map(|doubt| &doubt.sites).flat_map(|&site| self.tubes.bends_at(site));
+            let loose: Loose = in_doubt.flat_map(|bend| self.tubes.ends(bend)).collect();
+            if !loose.is_empty() {
+                return Ok(Run::Bent(loose));
+            }
+            changes = self.refine(&doubts, budget)?;
         }
         // Where solids are in doubt, it may be about what is inside of them, which a lattice does not look at.
         if !self.solids.is_empty() && !sets.doubts().is_empty() {
             return Ok(Run::Doubtful);
         }
+        self.polytopes.exchange(cells);
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
         let Some(boundary) = facets::boundary(&self.polytopes, pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
@@ -155,7 +167,7 @@ impl<'a> Engine<'a> {
             budget.cancel.check()?;
             Ok(self.polytope(index, State::default()))
         };
-        let all: Option<Vec<Polytope>> = (0..self.sites.len()).into_par_iter().map(first).collect::<Result<_, Stopped>>()?;
+        let all: Option<Vec<Polytope>> = (0..self.tubes.figures).into_par_iter().map(first).collect::<Result<_, Stopped>>()?;
         let is_made = all.is_some();
         self.polytopes.all = all.unwrap_or_default();
         Ok(is_made)
@@ -183,8 +195,12 @@ impl<'a> Engine<'a> {
         let most = self.setting.shell(figure, State::default()).outer;
         let cut = Cut { beyond: [beyond[0], beyond[1]], most };
         // Where a cut far out leaves a form no room, a finer one may have some.
-        let of_level = |level: u32| self.forms.of(self.setting, self.sites, polytopes::kind(figure), State { level, ..state });
-        (state.level..LEVELS).find_map(|level| Polytope::new(figure, of_level(level)?, shell, cut, seed))
+        let of_level = |kind: Kind, level: u32| self.forms.of(self.setting, self.sites, kind, State { level, ..state });
+        if let Some(rod) = self.tubes.rod(index as u32) {
+            return Polytope::new(figure, of_level(Kind::Tube, state.level)?, shell, cut, Some(rod), seed);
+        }
+        let kind = polytopes::kind(figure);
+        (state.level..LEVELS).find_map(|level| Polytope::new(figure, of_level(kind, level)?, shell, cut, None, seed))
     }
 
     /// Changes polytopes of sites in doubt, and returns how. Where dilations have no common point, planes between them part the polytopes, too; where they have one, polytopes are around the dilations; and where that was done,

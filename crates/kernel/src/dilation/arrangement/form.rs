@@ -26,6 +26,8 @@ pub(super) struct Form {
 pub(super) enum Kind {
     Ball,
     Rod,
+    /// A rod in a tube that turns: at right angles, corners of its belt are on the axis again.
+    Tube,
 }
 
 /// The share of the band that a rod's form leaves. Where tubes meet, corners lie all over it, and the more of it is left, the more of them are saved later; a ball by itself is best as it is.
@@ -55,11 +57,12 @@ impl Form {
     /// One with few corners whose hull, scaled by at most `most`, is around the unit ball; none where that takes too many.
     pub(super) fn within(most: f64, kind: Kind) -> Option<Self> {
         if kind == Kind::Ball {
-            let covering = Covering::within(most, MOST_DIRECTIONS, 0)?;
+            let covering = Covering::within(most, MOST_DIRECTIONS, 0, 1)?;
             let shapes = vec![Shape::ball(&covering)?];
             return Some(Self { covering, shapes });
         }
-        let covering = Covering::within(1.0 + (1.0 - LEFT_BY_RODS) * (most - 1.0), MOST_DIRECTIONS, STRIP_WEIGHT)?;
+        let (left, step) = if kind == Kind::Tube { (0.0, 4) } else { (LEFT_BY_RODS, 1) };
+        let covering = Covering::within(1.0 + (1.0 - left) * (most - 1.0), MOST_DIRECTIONS, STRIP_WEIGHT, step)?;
         let shapes = (0..4).map(|cut| Shape::rod(&covering, [cut & 1 != 0, cut & 2 != 0])).collect::<Option<_>>()?;
         Some(Self { covering, shapes })
     }

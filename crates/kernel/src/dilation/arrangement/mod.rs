@@ -5,6 +5,7 @@
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does, see `engine`.
 
 mod bodies;
+mod cells;
 mod covering;
 mod cubes;
 mod ellipsoid;
@@ -28,6 +29,7 @@ mod structure;
 #[cfg(test)]
 mod tests;
 mod triangulate;
+mod tubes;
 
 use super::plan::Setting;
 use super::surface::BlockSurface;
@@ -45,6 +47,7 @@ use noise::Cleared;
 use pieces::{Body, Lists};
 use polytopes::{MOST_POLYTOPES, Polytopes};
 use steady::Steady;
+use tubes::{Loose, Tubes};
 
 /// The mean square of the number of neighbours at most: lines are cut by all of them.
 const MOST_NEAR: usize = 40_000;
@@ -61,6 +64,9 @@ const NOISE: f64 = 1.0 / 256.0;
 const CLEARED: f64 = 1e3;
 const WORTH: f64 = 0.9;
 
+/// Rounds in which bends are given up that leave no room for others; then all are.
+const ROUNDS_OF_BENDS: usize = 6;
+
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: usize = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
@@ -75,12 +81,23 @@ pub(super) struct Arrangement {
     beyond: Vec<Box<[Option<f64>]>>,
     near: Lists,
     forms: Forms,
+    tubes: Tubes,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
-    /// The surfaces of solids, whose triangles are among the sites.
+    /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
     solids: Vec<TriMesh>,
+    inside: f64,
     /// About how many triangles will be made.
     pub(super) triangles: f64,
+}
+
+/// How polytopes were begun.
+enum Begun {
+    Done,
+    /// A lattice serves better.
+    Left,
+    /// There are bends that must not be, at these ends.
+    Bent(Loose),
 }
 
 /// The boundary of a union of polytopes.
@@ -125,26 +142,74 @@ impl Arrangement {
 
     /// The arrangement of joined sites, with the share of faces that no polyhedron has, and the surfaces of solids; `None` likewise.
     fn of(sites: Sites, left: f64, setting: Setting, solids: Vec<TriMesh>, budget: &Budget) -> Result<Option<Self>, Stopped> {
+        // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
+        let faces: usize = solids.iter().map(|solid| solid.triangles.len()).sum();
+        let inside = 0.5 * left * faces as f64 / sites.leaves as f64;
+        let mut arrangement = Self {
+            setting,
+            sites,
+            beyond: Vec::new(),
+            near: Lists::default(),
+            forms: Forms::default(),
+            tubes: Tubes::default(),
+            polytopes: Polytopes::default(),
+            solids,
+            inside,
+            triangles: 0.0,
+        };
+        Ok(arrangement.begin(&mut Loose::new(), budget)?.then_some(arrangement))
+    }
+
+    /// Makes the first polytopes, with no bends at ends that are loose; false where a lattice serves better.
+    fn begin(&mut self, loose: &mut Loose, budget: &Budget) -> Result<bool, Stopped> {
+        for round in 0.. {
+            let is_last = round == ROUNDS_OF_BENDS;
+            match self.begin_with(if is_last { None } else { Some(loose) }, budget)? {
+                Begun::Done => return Ok(true),
+                Begun::Left => return Ok(false),
+                Begun::Bent(more) => loose.extend(more),
+            }
+        }
+        Ok(false)
+    }
+
+    /// The same, with no bends at all unless ends are given.
+    fn begin_with(&mut self, loose: Option<&Loose>, budget: &Budget) -> Result<Begun, Stopped> {
+        let Self { setting, sites, forms, tubes, .. } = self;
+        // Without the bends of a round before.
+        if !tubes.bends.is_empty() {
+            sites.list.truncate(tubes.figures);
+        }
         let flatness = FLATNESS * setting.slack;
         let shell = |figure: &Figure| setting.shell(figure, State::default());
-        let forms = Forms::default();
         let mut beyond = hinges::cuts(&sites.list, flatness, shell, budget)?;
-        let scales = if sites.list.iter().any(|figure| polytopes::kind(figure) == Kind::Rod) {
-            let Some(form) = forms.of(&setting, &sites.list, Kind::Rod, State::default()) else { return Ok(None) };
-            [form.covering.reach, form.covering.girth]
-        } else {
-            [1.0; 2]
-        };
+        let has_rods = sites.list.iter().any(|figure| polytopes::kind(figure) == Kind::Rod);
+        let form = if has_rods { forms.of(setting, &sites.list, Kind::Rod, State::default()) } else { None };
+        if has_rods && form.is_none() {
+            return Ok(Begun::Left);
+        }
+        let scales = form.map_or([1.0; 2], |form| [form.covering.reach, form.covering.girth]);
         for (beyond, cut) in
             beyond.iter_mut().zip(joints::cuts(&sites.list, flatness, scales, shell, budget)?).filter(|(beyond, _)| beyond.is_empty())
         {
             *beyond = Box::new(cut);
         }
+        let of_tubes = if has_rods { forms.of(setting, &sites.list, Kind::Tube, State::default()) } else { None };
+        *tubes = match (of_tubes, loose) {
+            (Some(form), Some(loose)) => Tubes::of(&sites.list, &mut beyond, loose, form, shell),
+            _ => Tubes::none(sites.list.len()),
+        };
+        let bends: Vec<Figure> = tubes.bends.iter().map(|bend| bend.figure(&sites.list)).collect();
+        sites.list.extend(bends);
+        beyond.resize_with(sites.list.len(), || Box::new([None; 2]));
         let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
-        let bodies = sites.list.iter().zip(&beyond);
-        let bodies: Vec<Body<'_>> =
-            bodies.map(|(figure, beyond)| Body { figure, reach: reach(figure), cuts: joints::planes(figure, beyond) }).collect();
-        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
+        let cuts = |(index, figure): (u32, &Figure)| {
+            let of_bend = tubes.bend_of(index).map(|bend| tubes.bends[bend].cuts().into());
+            of_bend.unwrap_or_else(|| joints::planes(figure, &beyond[index as usize]))
+        };
+        let body = |(index, figure)| Body { figure, reach: reach(figure), cuts: cuts((index, figure)) };
+        let bodies: Vec<Body<'_>> = (0..).zip(&sites.list).map(body).collect();
+        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(Begun::Left) };
         drop(bodies);
         let may_be_near = |figure: &Figure| {
             let per_cube = match figure.outline {
@@ -154,17 +219,32 @@ impl Arrangement {
             per_cube * figure.area(setting.reach) / setting.lattice.pitch.powi(2)
         };
         if near.total() as f64 > FEW_NEAR + sites.list.iter().map(may_be_near).sum::<f64>() {
-            return Ok(None);
+            return Ok(Begun::Left);
         }
-        // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
-        let inside = 0.5 * left * solids.iter().map(|solid| solid.triangles.len()).sum::<usize>() as f64 / sites.leaves as f64;
-        let mut arrangement = Self { setting, sites, beyond, near, forms, polytopes: Polytopes::default(), solids, triangles: 0.0 };
-        let mut engine = Engine::new(&arrangement, 0, &[]);
-        let Engine { polytopes, .. } = if engine.begin(budget)? { engine } else { return Ok(None) };
-        arrangement.polytopes = polytopes;
-        arrangement.triangles = (1.0 - inside) * arrangement.expected_triangles();
-        let fits = arrangement.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
-        Ok(fits.then_some(arrangement))
+        let crowded = tubes.crowded(&near);
+        if !crowded.is_empty() {
+            return Ok(Begun::Bent(crowded.into_iter().flat_map(|bend| tubes.ends(bend)).collect()));
+        }
+        self.near = near.of_cells(tubes);
+        self.beyond = beyond;
+        let mut engine = Engine::new(self, 0, &[]);
+        let Engine { polytopes, .. } = if engine.begin(budget)? { engine } else { return Ok(Begun::Left) };
+        self.polytopes = polytopes;
+        let Self { setting, sites, forms, tubes, polytopes, .. } = self;
+        if !tubes.bends.is_empty()
+            && let Some(form) = forms.of(setting, &sites.list, Kind::Tube, State::default())
+        {
+            let bends = match tubes.build(&sites.list, &mut polytopes.all, form, |figure| setting.shell(figure, State::default())) {
+                Ok(()) => tubes.crossed(&self.near),
+                Err(bends) => bends,
+            };
+            if !bends.is_empty() {
+                return Ok(Begun::Bent(bends.into_iter().flat_map(|bend| self.tubes.ends(bend)).collect()));
+            }
+        }
+        self.triangles = (1.0 - self.inside) * self.expected_triangles();
+        let fits = self.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
+        Ok(if fits { Begun::Done } else { Begun::Left })
     }
 
     /// Leaf cells of the attractor.
@@ -173,11 +253,13 @@ impl Arrangement {
     }
 
     /// About how many triangles will be made, from a sample of the polytopes.
-    fn expected_triangles(&self) -> f64 {
+    fn expected_triangles(&mut self) -> f64 {
         let count = self.sites.list.len();
         let step = count.div_ceil(SAMPLE).max(1);
         let sample: Vec<u32> = (0..count as u32).step_by(step).collect();
+        self.polytopes.exchange(&mut self.tubes.cells);
         let triangles = pieces::count(&self.polytopes, &self.near, &sample);
+        self.polytopes.exchange(&mut self.tubes.cells);
         triangles as f64 * count as f64 / sample.len() as f64
     }
 
@@ -186,21 +268,35 @@ impl Arrangement {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
-        let mut first = std::mem::take(&mut self.polytopes);
-        let solids: Vec<Inside<'_>> = self.solids.iter().map(Inside::new).collect();
-        for trial in 0..TRIALS {
-            let mut engine = Engine::new(self, trial, &solids);
-            engine.polytopes = std::mem::take(&mut first);
-            match engine.run(budget)? {
+        let solids = std::mem::take(&mut self.solids);
+        let inside: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
+        let (mut trial, mut loose) = (0, Loose::new());
+        while trial < TRIALS {
+            let (mut first, mut cells) = (std::mem::take(&mut self.polytopes), std::mem::take(&mut self.tubes.cells));
+            let mut engine = Engine::new(self, trial, &inside);
+            std::mem::swap(&mut engine.polytopes, &mut first);
+            match engine.run(&mut cells, budget)? {
                 Run::Done(mut arranged) => {
-                    if !solids::leave_out(&solids, &mut arranged.surface) {
+                    if !solids::leave_out(&inside, &mut arranged.surface) {
                         break;
                     }
                     arranged.surface.leaves = self.sites.leaves;
                     arranged.surface.site_error = self.sites.error;
                     return Ok(Some(*arranged));
                 }
-                Run::Open => {}
+                Run::Bent(more) if loose.is_empty() => {
+                    loose.extend(more);
+                    if !self.begin(&mut loose, budget)? {
+                        break;
+                    }
+                }
+                Run::Bent(_) | Run::Open if !self.tubes.bends.is_empty() => {
+                    if !matches!(self.begin_with(None, budget)?, Begun::Done) {
+                        break;
+                    }
+                }
+                Run::Bent(_) => break,
+                Run::Open => trial += 1,
                 Run::Doubtful => break,
             }
         }
@@ -208,7 +304,8 @@ impl Arrangement {
     }
 
     /// Its figures, for searches, and its setting.
-    pub(super) fn into_index(self) -> (Index, Setting) {
+    pub(super) fn into_index(mut self) -> (Index, Setting) {
+        self.sites.list.truncate(self.tubes.figures);
         (Index::new(self.sites.list, self.setting.slack), self.setting)
     }
 }

@@ -5,8 +5,9 @@
 //! line it is found on, and ends with one name are one vertex. So the union's boundary is closed if every comparison of heights has one outcome only, which is checked by what comes out: see `facets`.
 
 use super::figure::Figure;
-use super::polytopes::{Mask, Plane, Polytope, Polytopes, edge_number, facet_number, height, normal, owner};
+use super::polytopes::{Mask, Plane, Polytope, Polytopes, facet_number, height, normal, owner};
 use super::structure::Edge;
+use super::tubes::Tubes;
 use crate::attractor::cell::{Point, between, cross, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -55,6 +56,25 @@ impl Lists {
     /// How long all are together.
     pub(super) fn total(&self) -> usize {
         self.0.iter().map(Vec::len).sum()
+    }
+
+    /// Those of cells, but for the ones that they are joined to, from those of bodies.
+    pub(super) fn of_cells(self, tubes: &Tubes) -> Self {
+        if tubes.bends.is_empty() {
+            return self;
+        }
+        let mut lists = vec![Vec::new(); self.0.len()];
+        for (body, near) in (0..).zip(&self.0) {
+            for own in tubes.cells_of(body) {
+                let others = near.iter().flat_map(|&other| tubes.cells_of(other));
+                lists[own as usize].extend(others.filter(|&other| own != other && !tubes.are_joined(own, other)));
+            }
+        }
+        for list in &mut lists {
+            list.sort_unstable();
+            list.dedup();
+        }
+        Self(lists)
     }
 }
 
@@ -163,6 +183,7 @@ pub(super) fn find(polytopes: &Polytopes, near: &Lists, budget: &Budget) -> Resu
 fn beside(polytopes: &Polytopes, near: &[u32], index: u32, beyond: &mut Beyond) -> (Vec<u32>, Mask) {
     let (structure, polytope) = (polytopes.structure(index), polytopes.of(index));
     let (mut beside, mut hidden) = (Vec::new(), Mask::default());
+    polytope.seams.iter().flat_map(|seams| &seams.inside).for_each(|&facet| hidden.add(usize::from(facet)));
     for &other in near {
         if !beyond.fill(&polytope.corners, polytopes.of(other)) {
             continue;
@@ -202,6 +223,12 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     facets.sort_unstable();
     facets.dedup();
     2 * scratch.out.len().saturating_sub(facets.len())
+}
+
+/// Whether a facet of one of two polytopes parts the other from it.
+pub(super) fn are_parted(one: &Polytope, other: &Polytope) -> bool {
+    let mut beyond = Beyond::default();
+    !beyond.fill(&one.corners, other) || !beyond.fill(&other.corners, one)
 }
 
 /// The facets of a polytope that the corners of another are beyond.
@@ -333,21 +360,31 @@ fn covered_of_line(polytopes: &Polytopes, index: u32, [p, q]: [&Point; 2], parti
 }
 
 /// What is left of a line from 0 to 1 when intervals are taken away: ends with their names.
-fn uncovered(cuts: &mut [[Cut; 2]], ends: [Name; 2], name: impl Fn(u32) -> Name, mut visit: impl FnMut([(f64, Name); 2])) {
+///
+/// Cells that share a facet cover what is on both sides of it; near places where three of them meet rounding may leave a crack, which is none of the union's.
+fn uncovered(
+    polytopes: &Polytopes,
+    cuts: &mut [[Cut; 2]],
+    ends: [Name; 2],
+    name: impl Fn(u32) -> Name,
+    mut visit: impl FnMut([(f64, Name); 2]),
+) {
     cuts.sort_unstable_by(|a, b| a[0].at.total_cmp(&b[0].at));
-    let mut from = (0.0, ends[0]);
+    let mut from = Cut { at: 0.0, facet: None };
+    let named = |cut: &Cut, end: Name| (cut.at, cut.facet.map_or(end, &name));
     for [start, end] in cuts.iter() {
-        if let Some(facet) = start.facet
-            && start.at > from.0
-        {
-            visit([from, (start.at, name(facet))]);
+        let is_crack = || [from.facet, start.facet].iter().all(|facet| facet.is_some_and(|facet| polytopes.is_inside(facet)));
+        if start.facet.is_some() && start.at > from.at && !is_crack() {
+            visit([named(&from, ends[0]), named(start, ends[1])]);
         }
-        let Some(facet) = end.facet else { return };
-        if end.at > from.0 {
-            from = (end.at, name(facet));
+        if end.facet.is_none() {
+            return;
+        }
+        if end.at > from.at {
+            from = *end;
         }
     }
-    visit([from, (1.0, ends[1])]);
+    visit([named(&from, ends[0]), (1.0, ends[1])]);
 }
 
 /// A place where an edge of one of two polytopes pierces a facet of the other: on facets of the first and of the second.
@@ -465,7 +502,7 @@ impl Arrangement<'_> {
                 if self.hidden[other as usize].has(owner(theirs).1) {
                     continue;
                 }
-                let name = pierced(edge_number(index, number), theirs);
+                let name = pierced(self.polytopes.seam(index, number).name, theirs);
                 let at = between(p, q, at);
                 for &facet in edge.facets.iter().filter(|&&facet| self.is_seen(index, facet)) {
                     let own = facet_number(index, usize::from(facet));
@@ -483,9 +520,11 @@ impl Arrangement<'_> {
         for number in numbers.filter(|&number| !is_gone[number]) {
             let edge = &structure.edges[number];
             let [p, q] = edge.corners.map(usize::from);
-            let name = |facet| pierced(edge_number(index, number), facet);
-            let facets = edge.facets.map(|facet| facet_number(index, usize::from(facet)));
-            uncovered(&mut cuts[number], edge.corners.map(|at| corner(edge_number(index, usize::from(at)))), name, |ends| {
+            let seam = self.polytopes.seam(index, number);
+            let Some(facets) = seam.facets else { continue };
+            let name = |facet| pierced(seam.name, facet);
+            let ends = edge.corners.map(|at| corner(self.polytopes.corner_name(index, usize::from(at))));
+            uncovered(self.polytopes, &mut cuts[number], ends, name, |ends| {
                 out.push(piece(facets, ends, |at| between(&corners[p], &corners[q], at)));
             });
         }
@@ -506,7 +545,7 @@ impl Arrangement<'_> {
             let mut is_gone = false;
             for place in 0..recent.len() {
                 let Third { index: third, ref mut parting } = recent[place];
-                if third == other || !self.polytopes.of(third).may_meet(&p.at, &q.at) {
+                if third == other || self.polytopes.are_joined(other, third) || !self.polytopes.of(third).may_meet(&p.at, &q.at) {
                     continue;
                 }
                 let Some(cuts) = covered_of_line(self.polytopes, third, [&p.at, &q.at], parting) else { continue };
@@ -519,7 +558,7 @@ impl Arrangement<'_> {
             }
             if !is_gone {
                 let name = |facet| meeting([facets[0], facets[1], facet]);
-                uncovered(line, [p.name, q.name], name, |ends| {
+                uncovered(self.polytopes, line, [p.name, q.name], name, |ends| {
                     out.push(piece(facets, ends, |at| between(&p.at, &q.at, at)));
                 });
             }

@@ -1,8 +1,11 @@
 //! The polytopes of figures: what stands for their dilations by a ball.
 
+use super::cells::{Seam, Seams};
+use super::covering::Covering;
 use super::figure::{Figure, Outline, box_of};
 use super::form::{Form, Kind, Spot};
 use super::structure::{CutOff, Structure};
+use super::tubes::Rod;
 use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
 use crate::split_mix;
 use std::cmp::Ordering;
@@ -79,6 +82,8 @@ pub(super) struct Polytope {
     /// Its box.
     low: Point,
     high: Point,
+    /// Of a cell, what it has in common with others: see `cells`.
+    pub(super) seams: Option<Box<Seams>>,
 }
 
 /// The polytopes of all figures.
@@ -145,7 +150,7 @@ pub(super) const SHIFT: f64 = 0.08;
 /// The share of it by which facets, or corners, of one polytope differ, at most.
 pub(super) const OWN_SHIFT: f64 = 0.1;
 /// The share of the rest by which polytopes differ as a whole: all of them are as far out as that allows, and so are chords between their corners.
-const ALL_SHIFT: f64 = 0.25;
+pub(super) const ALL_SHIFT: f64 = 0.25;
 /// Corners are shifted against each other by this share of what is the shortest edge of the polar polytope at most: the form stays what it is.
 const LEAST_EDGE: f64 = 0.1;
 /// Shifts that are tried, each a quarter of the one before: where two facets nearly lie in a plane, the first may be too large.
@@ -155,10 +160,10 @@ impl Polytope {
     /// The polytope of a point or a segment, with a form that lies in its shell; none where that leaves no room to shift corners.
     ///
     /// Corners are shifted by numbers that look random, so that no four planes, and no edges, of different polytopes meet in a point but by chance: each polytope as a whole outwards, so that facets
-    /// of neighbours which would coincide lie one above the other, and its corners against each other a little, out of all planes that forms have in common. Facets where it is cut are as far beyond its ends as is said.
-    pub(super) fn new(figure: &Figure, form: &Form, shell: Shell, cut: Cut, seed: u64) -> Option<Self> {
+    /// of neighbours which would coincide lie one above the other, and its corners against each other a little, out of all planes that forms have in common. Facets where it is cut are as far beyond its ends as is said. Strips of a segment in a tube are the tube's.
+    pub(super) fn new(figure: &Figure, form: &Form, shell: Shell, cut: Cut, tube: Option<&Rod>, seed: u64) -> Option<Self> {
         let ends = ordered(figure);
-        let frame = frame(&subtract(&ends[1], &ends[0]));
+        let frame = tube.map_or_else(|| frame(&subtract(&ends[1], &ends[0])), |rod| rod.frame);
         let is_cut = cut.beyond.map(|beyond| beyond.is_some());
         let (covering, shape) = (&form.covering, form.shape(is_cut));
         // Where there are no caps, it is around the inner ball if its strips are.
@@ -169,9 +174,8 @@ impl Polytope {
             return None;
         }
         let share = |index: usize| share(seed, index as u64);
-        let all = low + (OWN_SHIFT + (1.0 - 2.0 * OWN_SHIFT) * (1.0 - ALL_SHIFT * share(0))) * room;
-        // Corners of the ring are shifted by more than their strips, and the others across their directions, too.
-        let own = (0.8 / covering.girth * OWN_SHIFT * room).min(LEAST_EDGE * covering.shortest * shell.inner);
+        let all = |room: f64| low + (OWN_SHIFT + (1.0 - 2.0 * OWN_SHIFT) * (1.0 - ALL_SHIFT * share(0))) * room;
+        let (all, own) = tube.map_or_else(|| (all(room), covering.own_shift(room, shell)), |rod| (rod.reach, rod.own));
         let turned = |x: &Point| -> Point { std::array::from_fn(|axis| (0..3).map(|k| x[k] * frame[k][axis]).sum()) };
         let belt = if ends[0] == ends[1] { 0 } else { covering.belt };
         let across = |strip: usize| -> Point {
@@ -179,7 +183,7 @@ impl Polytope {
             [cosine, sine, 0.0]
         };
         let shifted = |own: f64| {
-            let of_strip = |strip: usize| all / covering.girth + own * share(1 + strip);
+            let of_strip = |strip: usize| tube.map_or_else(|| all / covering.girth + own * share(1 + strip), |rod| rod.strips[strip]);
             // From the end that they are at.
             let corner = |(corner, spot): (usize, &Spot)| {
                 let bits = bits(seed, (1 + belt + corner) as u64);
@@ -228,7 +232,7 @@ impl Polytope {
     /// One with these facets and corners.
     pub(super) fn with(structure: Arc<Structure>, planes: Box<[Plane]>, cuts: Box<[Plane]>, corners: Box<[Point]>) -> Self {
         let [low, high] = box_of(&corners);
-        Self { structure, planes, cuts, corners, low, high }
+        Self { structure, planes, cuts, corners, low, high, seams: None }
     }
 
     /// What is left of it below a plane; none where that is all, or nothing, or where a corner is too near to the plane to tell, or there would be too many facets.
@@ -253,6 +257,13 @@ impl Polytope {
     }
 }
 
+impl Covering {
+    /// By how much corners, or strips, of a polytope with some room in its shell may differ: corners of the belt do by more than their strips, and the others across their directions, too.
+    pub(super) fn own_shift(&self, room: f64, shell: Shell) -> f64 {
+        (0.8 / self.girth * OWN_SHIFT * room).min(LEAST_EDGE * self.shortest * shell.inner)
+    }
+}
+
 impl Polytopes {
     pub(super) fn count(&self) -> u32 {
         self.all.len() as u32
@@ -266,6 +277,40 @@ impl Polytopes {
     #[inline]
     pub(super) fn structure(&self, index: u32) -> &Structure {
         &self.of(index).structure
+    }
+
+    /// Exchanges some for others.
+    pub(super) fn exchange(&mut self, others: &mut [(u32, Polytope)]) {
+        for (index, other) in others {
+            std::mem::swap(other, &mut self.all[*index as usize]);
+        }
+    }
+
+    /// The name of a corner, and an edge's with its facets: those of other cells' where they have them in common.
+    #[inline]
+    pub(super) fn corner_name(&self, index: u32, corner: usize) -> u32 {
+        self.of(index).seams.as_ref().map_or_else(|| edge_number(index, corner), |seams| seams.corners[corner])
+    }
+
+    #[inline]
+    pub(super) fn seam(&self, index: u32, edge: usize) -> Seam {
+        let own = || {
+            let facets = self.structure(index).edges[edge].facets.map(|facet| facet_number(index, usize::from(facet)));
+            Seam { name: edge_number(index, edge), facets: Some(facets) }
+        };
+        self.of(index).seams.as_ref().map_or_else(own, |seams| seams.edges[edge])
+    }
+
+    /// Whether a facet is one that two cells have in common.
+    pub(super) fn is_inside(&self, facet: u32) -> bool {
+        let (index, facet) = owner(facet);
+        self.of(index).seams.as_ref().is_some_and(|seams| seams.inside.contains(&(facet as u16)))
+    }
+
+    /// Whether two cells have facets in common.
+    #[inline]
+    pub(super) fn are_joined(&self, one: u32, other: u32) -> bool {
+        self.of(one).seams.as_ref().is_some_and(|seams| seams.beside.contains(&other))
     }
 
     /// The plane of a facet.
@@ -326,7 +371,8 @@ mod tests {
                 let form = &forms[usize::from(kind(&figure) == Kind::Rod)];
                 let is_cut = if length == 0.0 { [false; 2] } else { [round / 6 % 2 == 1, round / 12 % 2 == 1] };
                 let beyond = is_cut.map(|is_cut| is_cut.then_some(0.02 * (shell.outer - shell.inner)));
-                let polytope = Polytope::new(&figure, form, shell, Cut { beyond, most: shell.outer }, round as u64).expect("there is room");
+                let polytope =
+                    Polytope::new(&figure, form, shell, Cut { beyond, most: shell.outer }, None, round as u64).expect("there is room");
                 assert_eq!(polytope.cuts.len(), is_cut.iter().filter(|&&is_cut| is_cut).count());
                 for corner in &polytope.corners {
                     assert!(distance_squared(corner, &figure.closest(corner)).sqrt() <= shell.outer * (1.0 + 1e-12), "{round}");

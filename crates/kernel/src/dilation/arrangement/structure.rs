@@ -4,7 +4,7 @@ use super::polytopes::{Mask, Plane, height, normal};
 use crate::attractor::cell::{Point, cross, dot, subtract};
 
 /// The edges of a polytope, and how many facets and corners it has.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Structure {
     pub(super) facets: usize,
     pub(super) corners: usize,
