@@ -8,12 +8,10 @@ use super::form::Form;
 use super::polytopes::{Plane, Polytope, Shell, edge_number, facet_number};
 use super::structure::{Edge, Structure};
 use super::tubes::{Bend, Rod, Tubes};
-use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
-use std::collections::BTreeMap;
+use crate::attractor::cell::{Point, cross, dot, subtract, unit};
+use rayon::iter::Either;
+use rayon::prelude::*;
 use std::sync::Arc;
-
-/// Corners that are no farther from the axis of a bend than the first are on it, and none may be as near as the second but farther, in units of the radius.
-const ON_AXIS: [f64; 2] = [1e-9, 1e-4];
 
 /// What a cell has in common with others.
 #[derive(Debug)]
@@ -48,9 +46,7 @@ enum Part {
 struct Node {
     part: Part,
     at: Point,
-    /// Its number in the tube's ring; none of what is added on the axis.
-    corner: Option<usize>,
-    /// Its name: the first segment's cell has it first.
+    /// That of the first segment's cell.
     name: u32,
 }
 
@@ -59,6 +55,17 @@ struct Ring {
     nodes: Vec<Node>,
     /// The planes that end the first segment's cell, and the second one's, turned over, where the wedge is; and where the cells meet.
     planes: [Plane; 3],
+}
+
+impl Ring {
+    /// The corners on one side, from one on the axis to the other, as strips go around.
+    fn row(&self, part: Part) -> Option<Vec<usize>> {
+        let count = self.nodes.len();
+        let of = |place: usize| self.nodes[place % count].part;
+        let start = (0..count).find(|&place| of(place) == Part::Axis && of(place + 1) == part)?;
+        let length = 2 + self.nodes.iter().filter(|node| node.part == part).count();
+        Some((start..start + length).map(|place| place % count).collect())
+    }
 }
 
 /// A cell before its edges have names.
@@ -73,107 +80,81 @@ struct Raw {
 }
 
 impl Tubes {
-    /// Makes the bodies of bends, which are added to those of all figures, and the cells.
+    /// Makes the cells, and what the topology is told of instead, from polytopes that end at bends: to those of figures the wedges' are added.
     ///
     /// # Errors
-    /// The bends that leave no room for theirs.
+    /// The figures whose cells cannot be.
     pub(super) fn build(
         &mut self,
         sites: &[Figure],
         polytopes: &mut Vec<Polytope>,
         form: &Form,
-        shell: impl Fn(&Figure) -> Shell,
-    ) -> Result<(), Vec<usize>> {
-        let shell = |bend: &Bend| shell(&sites[bend.rods[0] as usize]);
-        let all = |made: &dyn Fn(usize) -> bool| (0..self.bends.len()).filter(|&number| !made(number)).collect::<Vec<usize>>();
-        let rings: Vec<Option<Ring>> = self.bends.iter().map(|bend| self.ring(bend, polytopes, shell(bend).outer)).collect();
-        let failed = all(&|number| rings[number].is_some());
-        if !failed.is_empty() {
-            return Err(failed);
-        }
-        let rings: Vec<Ring> = rings.into_iter().flatten().collect();
-        let wedge = |(number, bend): (usize, &Bend)| self.wedge(number, bend, &rings[number], polytopes, shell(bend).inner);
-        let wedges: Vec<Option<Raw>> = self.bends.iter().enumerate().map(wedge).collect();
-        let failed = all(&|number| wedges[number].is_some() || self.bends[number].steps == 0);
-        if !failed.is_empty() {
-            return Err(failed);
-        }
-        let body = |(bend, wedge): (&Bend, &Option<Raw>)| {
-            let strips = bend.rods.iter().flat_map(|&rod| &polytopes[rod as usize].planes[..form.covering.belt]).copied();
-            let facets = wedge.iter().flat_map(|wedge| &wedge.planes[wedge.inside.len()..]).copied();
-            let cuts = bend.cuts();
-            let most = shell(bend).outer;
-            let around = |corner: usize| std::array::from_fn(|axis| bend.at[axis] + if corner >> axis & 1 == 1 { most } else { -most });
-            let planes = strips.chain(facets).chain(cuts).collect();
-            Polytope::with(Arc::new(Structure::default()), planes, cuts.into(), (0..8).map(around).collect())
+        slack: f64,
+        shell: impl Fn(&Figure) -> Shell + Sync,
+    ) -> Result<(), Vec<u32>> {
+        let ring = |bend: &Bend| self.ring(bend, &polytopes[bend.rods[0] as usize], slack).ok_or(bend.rods[0]);
+        let rings: Vec<Ring> = all(self.bends.par_iter().map(ring))?;
+        let wedge = |&number: &usize| {
+            let bend = &self.bends[number];
+            let inner = shell(&sites[bend.rods[0] as usize]).inner;
+            bend.wedge.and_then(|index| self.wedge_cell(index, bend, &rings[number], polytopes, inner)).ok_or(bend.rods[0])
         };
-        let bodies: Vec<Polytope> = self.bends.iter().zip(&wedges).map(body).collect();
-        let rods = (0..).zip(&self.rods).filter_map(|(index, rod)| Some((index, rod.as_ref()?)));
-        let cell = |(index, rod): (u32, &Rod)| self.cell(index, rod, &rings, &polytopes[index as usize], form);
-        let raw: Option<Vec<Raw>> = rods.map(cell).chain(wedges.into_iter().filter(Option::is_some)).collect();
-        let Some(mut cells) = raw.and_then(named) else { return Err((0..self.bends.len()).collect()) };
-        // Where cells of segments meet, there is nothing between them.
-        for (number, bend) in self.bends.iter().enumerate().filter(|(_, bend)| bend.steps == 0) {
-            let nothing = Polytope::with(Arc::new(Structure::default()), Box::default(), Box::default(), Box::new([bend.at]));
-            cells.push((self.figure(number), nothing));
+        let wedges: Vec<Raw> = all(self.wedges.par_iter().map(wedge))?;
+        let rods: Vec<(u32, &Rod)> = (0..).zip(&self.rods).filter_map(|(index, rod)| Some((index, rod.as_ref()?))).collect();
+        let cell = |&(index, rod): &(u32, &Rod)| self.cell(index, rod, &rings, &polytopes[index as usize], form).ok_or(index);
+        let mut raw: Vec<Raw> = all(rods.par_iter().map(cell))?;
+        let mut bodies: Vec<(u32, Polytope)> =
+            rods.iter().filter_map(|&(index, rod)| Some((index, self.body(index, rod, polytopes, form)?))).collect();
+        let around = |(&number, wedge): (&usize, &Raw)| {
+            let bend = &self.bends[number];
+            let strips = bend.rods.iter().flat_map(|&rod| &polytopes[rod as usize].planes[..form.covering.belt]).copied();
+            let facets = wedge.planes[wedge.inside.len()..].iter().copied();
+            let cuts = bend.cuts();
+            let most = shell(&sites[bend.rods[0] as usize]).outer;
+            let corner = |corner: usize| std::array::from_fn(|axis| bend.at[axis] + if corner >> axis & 1 == 1 { most } else { -most });
+            let planes = strips.chain(facets).chain(cuts).collect();
+            Polytope::with(Arc::default(), planes, cuts.into(), (0..8).map(corner).collect())
+        };
+        let added: Vec<Polytope> = self.wedges.iter().zip(&wedges).map(around).collect();
+        raw.extend(wedges);
+        self.cells = named(raw)?;
+        polytopes.extend(added);
+        for (index, body) in &mut bodies {
+            std::mem::swap(&mut polytopes[*index as usize], body);
         }
-        polytopes.extend(bodies);
-        self.cells = cells;
         Ok(())
     }
 
-    /// The ring at a bend; none where a corner is neither on its axis nor clear of it.
-    fn ring(&self, bend: &Bend, polytopes: &[Polytope], outer: f64) -> Option<Ring> {
+    /// The ring at a bend, given what stands for the first segment; none where a corner is neither on the axis of its wedge nor clear of it.
+    fn ring(&self, bend: &Bend, polytope: &Polytope, slack: f64) -> Option<Ring> {
         let (index, rod) = (bend.rods[0], self.rod(bend.rods[0])?);
-        let (belt, way, polytope) = (rod.strips.len(), &bend.ways[0], &polytopes[index as usize]);
-        let has_wedge = bend.steps > 0;
-        let place = |corner: usize| rod.corner(corner) + rod.end(1) * belt;
-        // How far out of the turn.
-        let out = cross(way, &bend.axis);
-        let height = |at: &Point| dot(&subtract(at, &bend.at), &out);
-        let slope = (0.5 * bend.turn).tan();
-        let mut nodes: Vec<Node> = Vec::with_capacity(belt + 2);
-        for corner in 0..belt {
-            let at = &polytope.corners[place(corner)];
-            let height = height(at);
+        let (way, has_wedge) = (&bend.ways[0], bend.wedge.is_some());
+        let (out, slope) = (bend.out(0), (0.5 * bend.turn).tan());
+        let node = |corner: usize| {
+            let place = rod.corner(1, corner);
+            let at = &polytope.corners[place];
+            let height = dot(&subtract(at, &bend.at), &out);
             let part = match height {
-                _ if height.abs() <= ON_AXIS[0] * outer => Part::Axis,
-                _ if height.abs() <= ON_AXIS[1] * outer && has_wedge => return None,
+                _ if has_wedge && height.abs() <= ON_AXIS[0] * slack => Part::Axis,
+                _ if has_wedge && height.abs() <= ON_AXIS[1] * slack => return None,
                 _ if height > 0.0 => Part::Outer,
                 _ => Part::Inner,
             };
             let moved = if !has_wedge || part == Part::Inner { height * slope } else { 0.0 };
             let at = std::array::from_fn(|axis| at[axis] + moved * way[axis]);
-            nodes.push(Node { part, at, corner: Some(corner), name: edge_number(index, place(corner)) });
-        }
-        if has_wedge {
-            let mut added = 0;
-            for corner in (0..belt).rev() {
-                let next = (corner + 1) % belt;
-                // What was added is behind both.
-                let parts = [corner, next].map(|corner| nodes.iter().find(|node| node.corner == Some(corner)).map(|node| node.part));
-                if matches!(parts, [Some(Part::Outer), Some(Part::Inner)] | [Some(Part::Inner), Some(Part::Outer)]) {
-                    let [p, q] = [corner, next].map(|corner| &polytope.corners[place(corner)]);
-                    let at = between(p, q, height(p) / (height(p) - height(q)));
-                    let name = edge_number(index, polytope.corners.len() + added);
-                    nodes.insert(corner + 1, Node { part: Part::Axis, at, corner: None, name });
-                    added += 1;
-                }
-            }
-            let first = nodes.iter().position(|node| node.part == Part::Axis)?;
-            nodes.rotate_left(first);
-            if nodes.iter().filter(|node| node.part == Part::Axis).count() != 2 {
-                return None;
-            }
+            Some(Node { part, at, name: edge_number(index, place) })
+        };
+        let nodes: Vec<Node> = (0..rod.strips.len()).map(node).collect::<Option<_>>()?;
+        let on_axis = nodes.iter().filter(|node| node.part == Part::Axis).count();
+        if has_wedge && on_axis != 2 {
+            return None;
         }
         let plane = |normal: Point| [normal[0], normal[1], normal[2], dot(&normal, &bend.at)];
-        let middle = unit(&std::array::from_fn(|k| bend.ways[0][k] + bend.ways[1][k]));
-        Some(Ring { nodes, planes: [plane(bend.ways[0]), plane(bend.ways[1]), plane(middle)] })
+        Some(Ring { nodes, planes: [bend.ways[0], bend.ways[1], bend.middle()].map(plane) })
     }
 
     /// The cell of a segment.
     fn cell(&self, index: u32, rod: &Rod, rings: &[Ring], polytope: &Polytope, form: &Form) -> Option<Raw> {
-        let belt = rod.strips.len();
         let shape = form.shape(rod.is_cut);
         let mut cell = Raw {
             index,
@@ -184,118 +165,109 @@ impl Tubes {
             inside: Vec::new(),
             beside: Vec::new(),
         };
-        // Where it goes on first: so what is added there has the numbers that its ring gives it.
-        for side in [1, 0] {
+        for side in [0, 1] {
             let Some(number) = rod.bends[side] else { continue };
-            let (bend, ring, end) = (&self.bends[number], &rings[number], rod.end(side));
-            let has_wedge = bend.steps > 0;
-            let place = |corner: usize| rod.corner(corner) + end * belt;
-            let mut around: Vec<(u16, Part)> = Vec::with_capacity(ring.nodes.len());
-            for node in &ring.nodes {
-                let own = node.corner.map_or(cell.corners.len(), place);
-                if node.corner.is_none() {
-                    cell.corners.push(node.at);
-                    cell.names.push(node.name);
-                } else if side == 1 || !has_wedge || node.part != Part::Outer {
-                    cell.corners[own] = node.at;
-                    cell.names[own] = node.name;
-                }
-                around.push((own as u16, node.part));
-            }
-            // Seen from outside, strips go clockwise around the end where a segment begins.
-            if end == 0 {
-                around.reverse();
-            }
-            if rod.is_reversed {
-                around.reverse();
-            }
-            let count = around.len();
-            for place in 0..count {
-                let [before, (own, _), after] = [count - 1, 0, 1].map(|step| around[(place + step) % count]);
-                if usize::from(own) >= polytope.corners.len() {
-                    let strip = cell.facets[..belt].iter_mut().find(|strip| strip.contains(&before.0) && strip.contains(&after.0))?;
-                    let at = strip.iter().position(|&corner| corner == after.0)?;
-                    // Against the way around the end.
-                    strip.insert(at + 1, own);
+            let (bend, ring) = (&self.bends[number], &rings[number]);
+            for (corner, node) in ring.nodes.iter().enumerate() {
+                // Outer corners of the second segment are its own.
+                if side == 1 || bend.wedge.is_none() || node.part != Part::Outer {
+                    cell.corners[rod.corner(side, corner)] = node.at;
+                    cell.names[rod.corner(side, corner)] = node.name;
                 }
             }
-            let flat = shape.flats[end]?;
+            let flat = shape.flats[rod.end(side)]?;
             let turned = |plane: Plane| if side == 1 { plane } else { plane.map(|part| -part) };
-            let [first, second, middle] = ring.planes;
-            let other = bend.rods[side];
-            cell.beside.push(other);
-            cell.inside.push(flat as u16);
-            if !has_wedge {
-                cell.facets[flat] = around.iter().map(|&(corner, _)| corner).collect();
-                cell.planes[flat] = turned(middle);
-                continue;
-            }
-            let of = |part: Part| {
-                // From one corner on the axis to the other.
-                let start = (0..count).find(|&place| around[place].1 == Part::Axis && around[(place + 1) % count].1 == part)?;
-                let length = 2 + around.iter().filter(|(_, own)| *own == part).count();
-                Some((0..length).map(|step| around[(start + step) % count].0).collect::<Vec<u16>>())
+            // Strips go counter-clockwise seen from where the tube goes on.
+            let facet = |row: Vec<usize>| {
+                let mut facet: Vec<u16> = row.into_iter().map(|corner| rod.corner(side, corner) as u16).collect();
+                if side == 0 {
+                    facet.reverse();
+                }
+                facet
             };
-            cell.facets[flat] = of(Part::Outer)?;
-            cell.planes[flat] = turned([first, second][1 - side]);
+            cell.inside.push(flat as u16);
+            cell.beside.push(bend.rods[side]);
+            let Some(wedge) = bend.wedge else {
+                cell.planes[flat] = turned(ring.planes[2]);
+                continue;
+            };
+            cell.facets[flat] = facet(ring.row(Part::Outer)?);
+            cell.planes[flat] = turned(ring.planes[1 - side]);
             cell.inside.push(cell.facets.len() as u16);
-            cell.facets.push(of(Part::Inner)?);
-            cell.planes.push(turned(middle));
-            cell.beside.push(self.figure(number));
+            cell.facets.push(facet(ring.row(Part::Inner)?));
+            cell.planes.push(turned(ring.planes[2]));
+            cell.beside.push(wedge);
         }
         Some(cell)
     }
 
-    /// The wedge of a bend, whose first two facets are those that it has in common with segments; none where there is none, or where a facet would be too near.
-    fn wedge(&self, number: usize, bend: &Bend, ring: &Ring, polytopes: &[Polytope], inner: f64) -> Option<Raw> {
-        let (steps, index, [_, next]) = (bend.steps, self.figure(number), bend.rods);
+    /// What stands for the dilation of a segment where its cell does not: it is cut beyond planes that bisect bends, and by the other segment's strips that are there.
+    fn body(&self, index: u32, rod: &Rod, polytopes: &[Polytope], form: &Form) -> Option<Polytope> {
+        let mitres = [0, 1].map(|side| rod.bends[side].map(|bend| &self.bends[bend]).filter(|bend| bend.wedge.is_none()));
+        if mitres.iter().all(Option::is_none) {
+            return None;
+        }
+        let (polytope, shape) = (&polytopes[index as usize], form.shape(rod.is_cut));
+        let (mut planes, mut corners) = (polytope.planes.to_vec(), polytope.corners.to_vec());
+        for (side, bend) in mitres.into_iter().enumerate().filter_map(|(side, bend)| Some((side, bend?))) {
+            planes[shape.flats[rod.end(side)]?] = bend.mitre(1 - side);
+            let (own, outs) =
+                (bend.ways[1 - side].map(|part| if side == 1 { part } else { -part }), [1 - side, side].map(|which| bend.out(which)));
+            let strips = &polytopes[bend.rods[side] as usize].planes[..form.covering.belt];
+            planes.extend(strips.iter().filter(|plane| dot(&[plane[0], plane[1], plane[2]], &outs[1]) > 0.0));
+            for corner in (0..rod.strips.len()).map(|corner| rod.corner(side, corner)) {
+                let height = dot(&subtract(&corners[corner], &bend.at), &outs[0]);
+                let moved = bend.beyond / (0.5 * bend.turn).cos() + height * (0.5 * bend.turn).tan();
+                corners[corner] = std::array::from_fn(|axis| corners[corner][axis] + moved * own[axis]);
+            }
+        }
+        let cuts = shape.flats.iter().flatten().map(|&flat| planes[flat]).collect();
+        Some(Polytope::with(Arc::default(), planes.into(), cuts, corners.into()))
+    }
+
+    /// The wedge of a bend, whose first two facets are those that it has in common with segments; none where a facet would be too near.
+    fn wedge_cell(&self, index: u32, bend: &Bend, ring: &Ring, polytopes: &[Polytope], inner: f64) -> Option<Raw> {
+        let (steps, next) = (bend.steps, bend.rods[1]);
         let rod = self.rod(next)?;
-        let second = |corner: usize| rod.corner(corner) + rod.end(0) * rod.strips.len();
-        let count = ring.nodes.len();
-        let start =
-            (0..count).find(|&place| ring.nodes[place].part == Part::Axis && ring.nodes[(place + 1) % count].part == Part::Outer)?;
-        let length = 2 + ring.nodes.iter().filter(|node| node.part == Part::Outer).count();
-        let row: Vec<&Node> = (0..length).map(|step| &ring.nodes[(start + step) % count]).collect();
+        let row = ring.row(Part::Outer)?;
+        let last = row.len() - 1;
         // The ends of the row, then what is between them, step by step.
-        let (mut corners, mut names) = (vec![row[0].at, row[length - 1].at], vec![row[0].name, row[length - 1].name]);
+        let ends = [row[0], row[last]].map(|corner| &ring.nodes[corner]);
+        let (mut corners, mut names) = (ends.map(|node| node.at).to_vec(), ends.map(|node| node.name).to_vec());
         for step in 0..=steps {
-            for node in &row[1..length - 1] {
-                let at = second(node.corner?);
-                if step == steps {
-                    corners.push(polytopes[next as usize].corners[at]);
-                    names.push(edge_number(next, at));
-                    continue;
-                }
-                let from = bend.turned(&subtract(&node.at, &bend.at), step as f64 / steps as f64);
-                let own = if step == 0 { node.name } else { edge_number(index, corners.len()) };
-                corners.push(if step == 0 { node.at } else { std::array::from_fn(|axis| bend.at[axis] + from[axis]) });
-                names.push(own);
+            for &corner in &row[1..last] {
+                let node = &ring.nodes[corner];
+                let (at, name) = if step == 0 {
+                    (node.at, node.name)
+                } else if step == steps {
+                    let place = rod.corner(0, corner);
+                    (polytopes[next as usize].corners[place], edge_number(next, place))
+                } else {
+                    let from = bend.turned(&subtract(&node.at, &bend.at), step as f64 / steps as f64);
+                    (std::array::from_fn(|axis| bend.at[axis] + from[axis]), edge_number(index, corners.len()))
+                };
+                corners.push(at);
+                names.push(name);
             }
         }
         let place = |step: usize, along: usize| match along {
             0 => 0,
-            _ if along == length - 1 => 1,
-            _ => (2 + step * (length - 2) + along - 1) as u16,
+            _ if along == last => 1,
+            _ => (1 + step * (last - 1) + along) as u16,
         };
-        let whole = |step: usize| (0..length).map(move |along| place(step, along));
-        let (mut from, mut to): (Vec<u16>, Vec<u16>) = (whole(0).collect(), whole(steps).collect());
-        // As the tube's strips go around, which is counter-clockwise seen from where it goes to.
-        from.reverse();
-        let (mut facets, mut planes) = (Vec::new(), Vec::new());
-        facets.push(std::mem::take(&mut from));
-        facets.push(std::mem::take(&mut to));
-        planes.extend([ring.planes[0].map(|part| -part), ring.planes[1]]);
+        let whole = |step: usize| (0..=last).map(move |along| place(step, along));
+        let mut facets: Vec<Vec<u16>> = vec![whole(0).rev().collect(), whole(steps).collect()];
+        let mut planes = vec![ring.planes[0].map(|part| -part), ring.planes[1]];
         for step in 0..steps {
-            for along in 0..length - 1 {
+            for along in 0..last {
                 let mut facet = vec![place(step, along), place(step, along + 1), place(step + 1, along + 1), place(step + 1, along)];
                 facet.dedup();
-                if facet[0] == facet[facet.len() - 1] {
+                if along == 0 {
                     facet.pop();
                 }
                 let at = |k: usize| subtract(&corners[usize::from(facet[k])], &bend.at);
-                let last = facet.len() - 1;
-                // Across its diagonals, or two sides.
-                let normal = unit(&cross(&subtract(&at(2), &at(0)), &subtract(&at(last), &at(1))));
+                // Across its diagonals, or two sides of a triangle.
+                let normal = unit(&cross(&subtract(&at(2), &at(0)), &subtract(&at(facet.len() - 1), &at(1))));
                 let offset = dot(&normal, &at(0));
                 if offset < inner {
                     return None;
@@ -308,46 +280,63 @@ impl Tubes {
     }
 }
 
-/// The cells, with the names of their edges; none where they do not close, or are not convex.
-fn named(raw: Vec<Raw>) -> Option<Vec<(u32, Polytope)>> {
-    let mut structures = Vec::with_capacity(raw.len());
-    // Of every seam the edges that are one.
-    let mut seams: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
-    for (place, cell) in raw.iter().enumerate() {
-        let structure = Structure::closed(&cell.facets, cell.corners.len())?;
-        if !structure.is_convex(&cell.planes, &cell.corners, 0.0) {
-            return None;
-        }
-        for (number, Edge { corners, facets }) in structure.edges.iter().enumerate() {
+/// Corners that are no farther from the axis of a wedge than the first are on it, and none may be as near as the second but farther, in units of the slack.
+const ON_AXIS: [f64; 2] = [4.0, 1e6];
+
+/// All of some, or what is told by those that are not.
+fn all<T: Send>(some: impl ParallelIterator<Item = Result<T, u32>>) -> Result<Vec<T>, Vec<u32>> {
+    let (found, failed): (Vec<T>, Vec<u32>) = some.partition_map(|one| match one {
+        Ok(found) => Either::Left(found),
+        Err(index) => Either::Right(index),
+    });
+    if failed.is_empty() { Ok(found) } else { Err(failed) }
+}
+
+/// The cells, with the names of their edges.
+///
+/// # Errors
+/// The cells that do not close, are not convex, or have an edge in common with none or several.
+fn named(raw: Vec<Raw>) -> Result<Vec<(u32, Polytope)>, Vec<u32>> {
+    let structure = |cell: &Raw| {
+        let structure = Structure::closed(&cell.facets, cell.corners.len());
+        structure.filter(|structure| structure.is_convex(&cell.planes, &cell.corners, 0.0)).ok_or(cell.index)
+    };
+    let structures: Vec<Structure> = all(raw.par_iter().map(structure))?;
+    // The edges of every seam by its ends: those of one cell, then of the other.
+    let mut seams: Vec<([u32; 2], u32, u16)> = Vec::new();
+    for (place, (cell, structure)) in (0..).zip(raw.iter().zip(&structures)) {
+        for (number, Edge { corners, facets }) in (0..).zip(&structure.edges) {
             if facets.iter().filter(|facet| cell.inside.contains(facet)).count() == 1 {
                 let [p, q] = corners.map(|corner| cell.names[usize::from(corner)]);
-                seams.entry([p.min(q), p.max(q)]).or_default().push((place, number));
+                seams.push(([p.min(q), p.max(q)], place, number));
             }
         }
-        structures.push(structure);
     }
+    seams.par_sort_unstable();
     let own = |(cell, structure): (&Raw, &Structure)| {
         let seam = |(number, edge): (usize, &Edge)| {
-            let is_inside = edge.facets.map(|facet| cell.inside.contains(&facet));
+            let is_inside = edge.facets.iter().any(|facet| cell.inside.contains(facet));
             let facets = edge.facets.map(|facet| facet_number(cell.index, usize::from(facet)));
-            Seam { name: edge_number(cell.index, number), facets: (is_inside == [false; 2]).then_some(facets) }
+            Seam { name: edge_number(cell.index, number), facets: (!is_inside).then_some(facets) }
         };
         structure.edges.iter().enumerate().map(seam).collect::<Vec<Seam>>()
     };
     let mut edges: Vec<Vec<Seam>> = raw.iter().zip(&structures).map(own).collect();
-    for both in seams.values() {
-        let &[(first, own), (second, theirs)] = both.as_slice() else { return None };
-        let outside = |place: usize, number: usize| {
-            let facets = structures[place].edges[number].facets;
-            facets
-                .into_iter()
-                .find(|facet| !raw[place].inside.contains(facet))
-                .map(|facet| facet_number(raw[place].index, usize::from(facet)))
+    for both in seams.chunk_by(|a, b| a.0 == b.0) {
+        let places = || both.iter().map(|&(_, place, number)| (place as usize, usize::from(number)));
+        let outside = |(place, number): (usize, usize)| {
+            let (cell, facets) = (&raw[place], structures[place].edges[number].facets);
+            let facet = facets.into_iter().find(|facet| !cell.inside.contains(facet));
+            facet.map(|facet| (facet_number(cell.index, usize::from(facet)), facet == facets[0]))
         };
-        let (ours, other) = (outside(first, own)?, outside(second, theirs)?);
-        let is_left = !raw[first].inside.contains(&structures[first].edges[own].facets[0]);
-        edges[first][own].facets = Some(if is_left { [ours, other] } else { [other, ours] });
-        edges[second][theirs].name = edges[first][own].name;
+        let found: Vec<(u32, bool)> = places().filter_map(outside).collect();
+        let (&[(ours, is_left), (other, _)], Some((first, number)), Some((second, theirs))) =
+            (found.as_slice(), places().next(), places().nth(1))
+        else {
+            return Err(both.iter().map(|&(_, place, _)| raw[place as usize].index).collect());
+        };
+        edges[first][number].facets = Some(if is_left { [ours, other] } else { [other, ours] });
+        edges[second][theirs].name = edges[first][number].name;
     }
     let cell = |((cell, structure), edges): ((Raw, Structure), Vec<Seam>)| {
         let Raw { index, planes, corners, names, inside, beside, .. } = cell;
@@ -355,5 +344,112 @@ fn named(raw: Vec<Raw>) -> Option<Vec<(u32, Polytope)>> {
         polytope.seams = Some(Box::new(Seams { corners: names.into(), edges: edges.into(), inside: inside.into(), beside: beside.into() }));
         (index, polytope)
     };
-    Some(raw.into_iter().zip(structures).zip(edges).map(cell).collect())
+    Ok(raw.into_iter().zip(structures).zip(edges).map(cell).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::form::Kind;
+    use super::super::polytopes::{Cut, height};
+    use super::super::tubes::Loose;
+    use super::*;
+    use crate::attractor::cell::Site;
+    use crate::dilation::convex::Convex;
+    use crate::dilation::tree::Weighted;
+    use crate::split_mix::Random;
+
+    /// The corners of a path, and whether it goes back to the first.
+    fn path(kind: usize, random: &mut Random) -> (Vec<Point>, bool) {
+        let mut number = |low: f64, high: f64| low + (high - low) * random.share();
+        let (mut at, mut way) = ([3.0, -2.0, 1.0], [1.0, 0.0, 0.0]);
+        let mut path = vec![at];
+        for step in 0..7 {
+            let any = unit(&[number(-1.0, 1.0), number(-1.0, 1.0), number(-1.0, 1.0)]);
+            way = match kind {
+                // Right angles, little by little, in a plane, anyhow; a ring comes below.
+                0 => std::array::from_fn(|axis| if axis == (step + usize::from(any[0] > 0.0)) % 3 { any[1].signum() } else { 0.0 }),
+                1 => unit(&std::array::from_fn(|axis| way[axis] + 0.2 * any[axis])),
+                2 => unit(&[way[0] + 1.5 * any[0], way[1] + 1.5 * any[1], 0.0]),
+                _ => unit(&std::array::from_fn(|axis| way[axis] + 1.2 * any[axis])),
+            };
+            let length = number(2.0, 6.0);
+            at = std::array::from_fn(|axis| at[axis] + length * way[axis]);
+            path.push(at);
+        }
+        if kind == 4 {
+            let (corners, tilt) = (3.0 + (12.0 * number(0.0, 1.0)).floor(), number(0.0, 1.0));
+            let corner = |k: f64| {
+                let (sine, cosine) = (std::f64::consts::TAU * k / corners).sin_cos();
+                [6.0 * cosine, 6.0 * sine, 6.0 * tilt * cosine]
+            };
+            return ((0..corners as usize).map(|k| corner(k as f64)).collect(), true);
+        }
+        (path, false)
+    }
+
+    /// Cells have the same union as the bodies that the topology is told of, both are between the dilations by both ends of the band, each body stands for its own, and all of these together are the path's.
+    #[test]
+    fn cells_and_bodies_are_between_the_dilations() {
+        let mut random = Random(37);
+        let [mut wedges, mut mitres, mut rings, mut places] = [0; 4];
+        for round in 0..120 {
+            let (corners, is_ring) = path(round % 5, &mut random);
+            let shell = [(0.9, 1.1), (0.975, 1.025), (0.7, 1.4)][round / 5 % 3];
+            let shell = Shell { inner: shell.0, outer: shell.1 };
+            let count = if is_ring { corners.len() } else { corners.len() - 1 };
+            let ends = |k: usize| [corners[k], corners[(k + 1) % corners.len()]];
+            let mut figures: Vec<Figure> =
+                (0..count).map(|k| Figure::from(Weighted { site: Site::Segment(ends(k)), deficit: 0.0 })).collect();
+            let shift = random.next() as usize % count;
+            figures.rotate_left(shift);
+            let Some(form) = Form::within(shell.reach(), Kind::Tube) else { panic!("{round}") };
+            let mut beyond: Vec<Box<[Option<f64>]>> = (0..count).map(|_| Box::new([None; 2]) as Box<[Option<f64>]>).collect();
+            let slack = 1e-12;
+            let mut tubes = Tubes::of(&figures, &mut beyond, &Loose::new(), &form, slack, |_| shell);
+            let polytope = |index: usize| {
+                let cut = Cut { beyond: [beyond[index][0], beyond[index][1]], most: shell.outer };
+                Polytope::new(&figures[index], &form, shell, cut, tubes.rod(index as u32), index as u64)
+            };
+            let mut polytopes: Vec<Polytope> = (0..count).filter(|&k| tubes.rod(k as u32).is_some()).filter_map(polytope).collect();
+            // Not all bends are tubes; here those are looked at that are nothing else.
+            if polytopes.len() < count {
+                continue;
+            }
+            assert!(tubes.build(&figures, &mut polytopes, &form, slack, |_| shell).is_ok(), "{round}");
+            wedges += tubes.wedges.len();
+            mitres += tubes.bends.len() - tubes.wedges.len();
+            rings += usize::from(tubes.bends.len() == count);
+            let all: Vec<Figure> = figures.iter().cloned().chain(tubes.points(&figures)).collect();
+            assert_eq!(all.len(), polytopes.len());
+            let is_in = |polytope: &Polytope, x: &Point, spare: f64| polytope.planes.iter().all(|plane| height(plane, x) <= spare);
+            for _ in 0..3_000 {
+                let bend = &tubes.bends[random.next() as usize % tubes.bends.len()];
+                let mut number = || 2.0 * random.share() - 1.0;
+                let away = unit(&[number(), number(), number()]);
+                let far = 1.3 * shell.outer * number().abs().sqrt();
+                let along = number();
+                let on = bend.ways[usize::from(along > 0.0)].map(|part| 1.2 * along * part);
+                let x: Point = std::array::from_fn(|axis| bend.at[axis] + on[axis] + far * away[axis]);
+                let of = |figure: &Figure| figure.distance_squared(&x).sqrt();
+                let distance = figures.iter().map(of).fold(f64::INFINITY, f64::min);
+                let in_cells = |spare: f64| tubes.cells.iter().any(|(_, cell)| is_in(cell, &x, spare));
+                let in_bodies = |spare: f64| polytopes.iter().any(|body| is_in(body, &x, spare));
+                let tiny = 1e-9;
+                assert!(!in_cells(-tiny) || in_bodies(tiny), "{round}: {x:?} is in a cell and in no body");
+                assert!(!in_bodies(-tiny) || in_cells(tiny), "{round}: {x:?} is in a body and in no cell");
+                assert!(distance > shell.inner - tiny || in_cells(tiny), "{round}: {x:?} is {distance} from the path");
+                assert!(distance < shell.outer + tiny || !in_cells(-tiny), "{round}: {x:?} is {distance} from the path");
+                let is_kept = |body: &Polytope, spare: f64| body.cuts.iter().all(|plane| height(plane, &x) <= spare);
+                let mut is_one_s = false;
+                for (figure, body) in all.iter().zip(&polytopes) {
+                    assert!(of(figure) > shell.inner - tiny || !is_kept(body, -tiny) || is_in(body, &x, tiny), "{round}: {x:?}");
+                    assert!(!is_in(body, &x, -tiny) || (of(figure) < shell.outer + tiny && is_kept(body, tiny)), "{round}: {x:?}");
+                    is_one_s |= of(figure) <= distance + tiny && is_kept(body, tiny);
+                }
+                assert!(distance > shell.outer || is_one_s, "{round}: {x:?} is in no dilation");
+                places += usize::from(in_cells(0.0));
+            }
+        }
+        assert!(wedges > 150 && mitres > 100 && rings > 15 && places > 30_000, "{wedges} {mitres} {rings} {places}");
+    }
 }

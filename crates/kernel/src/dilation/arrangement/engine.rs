@@ -127,7 +127,7 @@ impl<'a> Engine<'a> {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn run(&mut self, cells: &mut [(u32, Polytope)], budget: &Budget) -> Result<Run, Stopped> {
+    pub(super) fn run(&mut self, cells: Vec<(u32, Polytope)>, budget: &Budget) -> Result<Run, Stopped> {
         if self.polytopes.all.is_empty() && !self.begin(budget)? {
             return Ok(Run::Open);
         }
@@ -139,8 +139,7 @@ impl<'a> Engine<'a> {
                 return Ok(Run::Doubtful);
             }
             let doubts = sets.doubts();
-            let in_doubt = doubts.iter().flat_map(|doubt| &doubt.sites).flat_map(|&site| self.tubes.bends_at(site));
-            let loose: Loose = in_doubt.flat_map(|bend| self.tubes.ends(bend)).collect();
+            let loose = self.tubes.ends(doubts.iter().flat_map(|doubt| doubt.sites.iter().copied()));
             if !loose.is_empty() {
                 return Ok(Run::Bent(loose));
             }
@@ -150,7 +149,7 @@ impl<'a> Engine<'a> {
         if !self.solids.is_empty() && !sets.doubts().is_empty() {
             return Ok(Run::Doubtful);
         }
-        self.polytopes.exchange(cells);
+        cells.into_iter().for_each(|(index, cell)| self.polytopes.all[index as usize] = cell);
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
         let Some(boundary) = facets::boundary(&self.polytopes, pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };

@@ -131,7 +131,7 @@ impl Arrangement {
                 && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), budget)?
             {
                 let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
-                let figures = &arrangement.sites.list;
+                let figures = &arrangement.sites.list[..arrangement.tubes.figures];
                 if (Steady { figures, radius: setting.reach, moved: moved + slack, solids: &solids }).is_shown(budget)? {
                     return Ok(Some(arrangement));
                 }
@@ -162,15 +162,15 @@ impl Arrangement {
 
     /// Makes the first polytopes, with no bends at ends that are loose; false where a lattice serves better.
     fn begin(&mut self, loose: &mut Loose, budget: &Budget) -> Result<bool, Stopped> {
-        for round in 0.. {
-            let is_last = round == ROUNDS_OF_BENDS;
-            match self.begin_with(if is_last { None } else { Some(loose) }, budget)? {
+        for _ in 0..ROUNDS_OF_BENDS {
+            match self.begin_with(Some(loose), budget)? {
                 Begun::Done => return Ok(true),
-                Begun::Left => return Ok(false),
+                Begun::Left if self.tubes.bends.is_empty() => return Ok(false),
+                Begun::Left => break,
                 Begun::Bent(more) => loose.extend(more),
             }
         }
-        Ok(false)
+        Ok(matches!(self.begin_with(None, budget)?, Begun::Done))
     }
 
     /// The same, with no bends at all unless ends are given.
@@ -196,19 +196,19 @@ impl Arrangement {
         }
         let of_tubes = if has_rods { forms.of(setting, &sites.list, Kind::Tube, State::default()) } else { None };
         *tubes = match (of_tubes, loose) {
-            (Some(form), Some(loose)) => Tubes::of(&sites.list, &mut beyond, loose, form, shell),
+            (Some(form), Some(loose)) => Tubes::of(&sites.list, &mut beyond, loose, form, setting.slack, shell),
             _ => Tubes::none(sites.list.len()),
         };
-        let bends: Vec<Figure> = tubes.bends.iter().map(|bend| bend.figure(&sites.list)).collect();
-        sites.list.extend(bends);
+        if sites.list.len() + tubes.wedges.len() > MOST_POLYTOPES {
+            return Ok(Begun::Left);
+        }
+        sites.list.extend(tubes.points(&sites.list));
         beyond.resize_with(sites.list.len(), || Box::new([None; 2]));
         let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
-        let cuts = |(index, figure): (u32, &Figure)| {
-            let of_bend = tubes.bend_of(index).map(|bend| tubes.bends[bend].cuts().into());
-            of_bend.unwrap_or_else(|| joints::planes(figure, &beyond[index as usize]))
-        };
-        let body = |(index, figure)| Body { figure, reach: reach(figure), cuts: cuts((index, figure)) };
-        let bodies: Vec<Body<'_>> = (0..).zip(&sites.list).map(body).collect();
+        let cuts = |(index, figure): (u32, &Figure)| tubes.cuts(index, figure, &beyond[index as usize]);
+        let bodies = (0..).zip(&sites.list);
+        let bodies: Vec<Body<'_>> =
+            bodies.map(|(index, figure)| Body { figure, reach: reach(figure), cuts: cuts((index, figure)) }).collect();
         let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(Begun::Left) };
         drop(bodies);
         let may_be_near = |figure: &Figure| {
@@ -221,9 +221,9 @@ impl Arrangement {
         if near.total() as f64 > FEW_NEAR + sites.list.iter().map(may_be_near).sum::<f64>() {
             return Ok(Begun::Left);
         }
-        let crowded = tubes.crowded(&near);
+        let crowded = tubes.crowded(&sites.list, &near, setting.outer);
         if !crowded.is_empty() {
-            return Ok(Begun::Bent(crowded.into_iter().flat_map(|bend| tubes.ends(bend)).collect()));
+            return Ok(Begun::Bent(crowded));
         }
         self.near = near.of_cells(tubes);
         self.beyond = beyond;
@@ -234,12 +234,14 @@ impl Arrangement {
         if !tubes.bends.is_empty()
             && let Some(form) = forms.of(setting, &sites.list, Kind::Tube, State::default())
         {
-            let bends = match tubes.build(&sites.list, &mut polytopes.all, form, |figure| setting.shell(figure, State::default())) {
+            budget.cancel.check()?;
+            let shell = |figure: &Figure| setting.shell(figure, State::default());
+            let loose = match tubes.build(&sites.list, &mut polytopes.all, form, setting.slack, shell) {
                 Ok(()) => tubes.crossed(&self.near),
-                Err(bends) => bends,
+                Err(figures) => tubes.ends(figures),
             };
-            if !bends.is_empty() {
-                return Ok(Begun::Bent(bends.into_iter().flat_map(|bend| self.tubes.ends(bend)).collect()));
+            if !loose.is_empty() {
+                return Ok(Begun::Bent(loose));
             }
         }
         self.triangles = (1.0 - self.inside) * self.expected_triangles();
@@ -272,10 +274,10 @@ impl Arrangement {
         let inside: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
         let (mut trial, mut loose) = (0, Loose::new());
         while trial < TRIALS {
-            let (mut first, mut cells) = (std::mem::take(&mut self.polytopes), std::mem::take(&mut self.tubes.cells));
+            let (first, cells) = (std::mem::take(&mut self.polytopes), std::mem::take(&mut self.tubes.cells));
             let mut engine = Engine::new(self, trial, &inside);
-            std::mem::swap(&mut engine.polytopes, &mut first);
-            match engine.run(&mut cells, budget)? {
+            engine.polytopes = first;
+            match engine.run(cells, budget)? {
                 Run::Done(mut arranged) => {
                     if !solids::leave_out(&inside, &mut arranged.surface) {
                         break;
@@ -290,14 +292,13 @@ impl Arrangement {
                         break;
                     }
                 }
-                Run::Bent(_) | Run::Open if !self.tubes.bends.is_empty() => {
+                Run::Bent(_) | Run::Open | Run::Doubtful if !self.tubes.bends.is_empty() => {
                     if !matches!(self.begin_with(None, budget)?, Begun::Done) {
                         break;
                     }
                 }
-                Run::Bent(_) => break,
                 Run::Open => trial += 1,
-                Run::Doubtful => break,
+                Run::Bent(_) | Run::Doubtful => break,
             }
         }
         Ok(None)

@@ -58,22 +58,13 @@ impl Lists {
         self.0.iter().map(Vec::len).sum()
     }
 
-    /// Those of cells, but for the ones that they are joined to, from those of bodies.
+    /// Those of cells: they do not meet the ones that they are joined to.
     pub(super) fn of_cells(self, tubes: &Tubes) -> Self {
         if tubes.bends.is_empty() {
             return self;
         }
-        let mut lists = vec![Vec::new(); self.0.len()];
-        for (body, near) in (0..).zip(&self.0) {
-            for own in tubes.cells_of(body) {
-                let others = near.iter().flat_map(|&other| tubes.cells_of(other));
-                lists[own as usize].extend(others.filter(|&other| own != other && !tubes.are_joined(own, other)));
-            }
-        }
-        for list in &mut lists {
-            list.sort_unstable();
-            list.dedup();
-        }
+        let of = |(index, list): (u32, Vec<u32>)| list.into_iter().filter(|&other| !tubes.are_joined(index, other)).collect();
+        let lists = (0..).zip(self.0).map(of).collect();
         Self(lists)
     }
 }
@@ -361,7 +352,7 @@ fn covered_of_line(polytopes: &Polytopes, index: u32, [p, q]: [&Point; 2], parti
 
 /// What is left of a line from 0 to 1 when intervals are taken away: ends with their names.
 ///
-/// Cells that share a facet cover what is on both sides of it; near places where three of them meet rounding may leave a crack, which is none of the union's.
+/// Cells that share a facet cover what is on both sides of it; where three of them meet rounding may leave a crack, which is none of the union's.
 fn uncovered(
     polytopes: &Polytopes,
     cuts: &mut [[Cut; 2]],
@@ -373,7 +364,7 @@ fn uncovered(
     let mut from = Cut { at: 0.0, facet: None };
     let named = |cut: &Cut, end: Name| (cut.at, cut.facet.map_or(end, &name));
     for [start, end] in cuts.iter() {
-        let is_crack = || [from.facet, start.facet].iter().all(|facet| facet.is_some_and(|facet| polytopes.is_inside(facet)));
+        let is_crack = || matches!((from.facet, start.facet), (Some(p), Some(q)) if polytopes.are_inside([p, q]));
         if start.facet.is_some() && start.at > from.at && !is_crack() {
             visit([named(&from, ends[0]), named(start, ends[1])]);
         }

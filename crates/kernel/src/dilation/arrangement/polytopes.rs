@@ -301,10 +301,14 @@ impl Polytopes {
         self.of(index).seams.as_ref().map_or_else(own, |seams| seams.edges[edge])
     }
 
-    /// Whether a facet is one that two cells have in common.
-    pub(super) fn is_inside(&self, facet: u32) -> bool {
-        let (index, facet) = owner(facet);
-        self.of(index).seams.as_ref().is_some_and(|seams| seams.inside.contains(&(facet as u16)))
+    /// Whether two facets are such that cells have in common, of cells that have facets in common.
+    pub(super) fn are_inside(&self, facets: [u32; 2]) -> bool {
+        let is_inside = |&facet: &u32| {
+            let (index, facet) = owner(facet);
+            self.of(index).seams.as_ref().is_some_and(|seams| seams.inside.contains(&(facet as u16)))
+        };
+        let [one, other] = facets.map(|facet| owner(facet).0);
+        facets.iter().all(is_inside) && self.are_joined(one, other)
     }
 
     /// Whether two cells have facets in common.

@@ -304,6 +304,44 @@ fn bends_are_arranged_at_all_tolerances() {
     }
 }
 
+/// A ring in a plane whose corners turn by little is prisms that share whole rings of corners: two triangles for each of their sides, before any is removed. With right angles there are wedges. Rings that are linked, beside each other, or in each other have the topology that they should.
+#[test]
+fn tubes_have_the_facets_of_their_prisms() {
+    let ring = |count: usize, radius: f64, height: f64| -> Vec<[DVec3; 2]> {
+        let corner = |k: usize| {
+            let (sine, cosine) = (std::f64::consts::TAU * k as f64 / count as f64).sin_cos();
+            DVec3::new(radius * cosine, radius * sine, height)
+        };
+        (0..count).map(|k| [corner(k), corner(k + 1 - if k + 1 == count { count } else { 0 })]).collect()
+    };
+    let made = |segments: &[[DVec3; 2]]| {
+        with_arrangement(&wires(segments), 1.0, 0.1, |arrangement| {
+            let arranged = arrangement.run(&Budget::default()).unwrap().unwrap();
+            assert_eq!(arranged.uncertain, 0);
+            (arranged.surface.triangles.len(), arrangement.triangles)
+        })
+    };
+    let (triangles, told) = made(&ring(40, 12.0, 0.0));
+    assert_eq!((triangles, told), (2 * 8 * 40, 2.0 * 8.0 * 40.0));
+    // Of a square's corners each has eight strips that end there, five of which go on to a wedge of two steps: four facets of four corners, and as many of three.
+    let (triangles, _) = made(&ring(4, 12.0, 0.0));
+    assert_eq!(triangles, 2 * 8 * 4 + 4 * (2 * (2 * 2 + 2)));
+    for (segments, expected) in [
+        (ring(40, 12.0, 0.0), (1, 0, 0)),
+        (ring(4, 12.0, 0.0), (1, 0, 0)),
+        ([ring(30, 12.0, 0.0), ring(25, 9.0, 5.0)].concat(), (2, 0, 0)),
+        (
+            [ring(30, 12.0, 0.0), ring(30, 12.0, 0.0).iter().map(|ends| ends.map(|x| DVec3::new(x.x + 9.0, x.z, x.y))).collect()].concat(),
+            (2, 0, 0),
+        ),
+        ([ring(30, 12.0, 0.0), ring(30, 12.0, 1.5)].concat(), (1, 0, 0)),
+    ] {
+        let dilation = arranged(&wires(&segments), 1.0, 0.1);
+        assert!(dilation.topology_exact && dilation.crossings == 0);
+        assert_eq!(topology(&dilation), expected);
+    }
+}
+
 /// How many triangles there will be at first is told from a sample, among sites by themselves and all over each other.
 #[test]
 fn triangles_are_told_beforehand() {
