@@ -4,7 +4,7 @@
 //! where what the other one covers begins, to the last bit.
 
 use super::figure::Figure;
-use super::form::Form;
+use super::form::{Form, Kind};
 use super::polytopes::{Plane, Polytope, Shell, edge_number, facet_number};
 use super::structure::{Edge, Structure};
 use super::tubes::{Bend, Rod, Tubes};
@@ -84,11 +84,11 @@ impl Tubes {
     ///
     /// # Errors
     /// The figures whose cells cannot be.
-    pub(super) fn build(
+    pub(super) fn build<'f>(
         &mut self,
         sites: &[Figure],
         polytopes: &mut Vec<Polytope>,
-        form: &Form,
+        form: impl Fn(Kind) -> Option<&'f Form> + Sync,
         slack: f64,
         shell: impl Fn(&Figure) -> Shell + Sync,
     ) -> Result<(), Vec<u32>> {
@@ -101,13 +101,15 @@ impl Tubes {
         };
         let wedges: Vec<Raw> = all(self.wedges.par_iter().map(wedge))?;
         let rods: Vec<(u32, &Rod)> = (0..).zip(&self.rods).filter_map(|(index, rod)| Some((index, rod.as_ref()?))).collect();
-        let cell = |&(index, rod): &(u32, &Rod)| self.cell(index, rod, &rings, &polytopes[index as usize], form).ok_or(index);
+        let cell = |&(index, rod): &(u32, &Rod)| {
+            form(rod.kind).and_then(|form| self.cell(index, rod, &rings, &polytopes[index as usize], form)).ok_or(index)
+        };
         let mut raw: Vec<Raw> = all(rods.par_iter().map(cell))?;
         let mut bodies: Vec<(u32, Polytope)> =
-            rods.iter().filter_map(|&(index, rod)| Some((index, self.body(index, rod, polytopes, form)?))).collect();
+            rods.iter().filter_map(|&(index, rod)| Some((index, self.body(index, rod, polytopes, form(rod.kind)?)?))).collect();
         let around = |(&number, wedge): (&usize, &Raw)| {
             let bend = &self.bends[number];
-            let strips = bend.rods.iter().flat_map(|&rod| &polytopes[rod as usize].planes[..form.covering.belt]).copied();
+            let strips = bend.rods.iter().flat_map(|&rod| self.strips(rod, polytopes)).copied();
             let facets = wedge.planes[wedge.inside.len()..].iter().copied();
             let cuts = bend.cuts();
             let most = shell(&sites[bend.rods[0] as usize]).outer;
@@ -213,8 +215,9 @@ impl Tubes {
             planes[shape.flats[rod.end(side)]?] = bend.mitre(1 - side);
             let (own, outs) =
                 (bend.ways[1 - side].map(|part| if side == 1 { part } else { -part }), [1 - side, side].map(|which| bend.out(which)));
-            let strips = &polytopes[bend.rods[side] as usize].planes[..form.covering.belt];
-            planes.extend(strips.iter().filter(|plane| dot(&[plane[0], plane[1], plane[2]], &outs[1]) > 0.0));
+            planes.extend(
+                self.strips(bend.rods[side], polytopes).iter().filter(|plane| dot(&[plane[0], plane[1], plane[2]], &outs[1]) > 0.0),
+            );
             for corner in (0..rod.strips.len()).map(|corner| rod.corner(side, corner)) {
                 let height = dot(&subtract(&corners[corner], &bend.at), &outs[0]);
                 let moved = bend.beyond / (0.5 * bend.turn).cos() + height * (0.5 * bend.turn).tan();
@@ -223,6 +226,11 @@ impl Tubes {
         }
         let cuts = shape.flats.iter().flatten().map(|&flat| planes[flat]).collect();
         Some(Polytope::with(Arc::default(), planes.into(), cuts, corners.into()))
+    }
+
+    /// The planes of a segment's strips.
+    fn strips<'p>(&self, rod: u32, polytopes: &'p [Polytope]) -> &'p [Plane] {
+        &polytopes[rod as usize].planes[..self.rod(rod).map_or(0, |rod| rod.strips.len())]
     }
 
     /// The wedge of a bend, whose first two facets are those that it has in common with segments; none where a facet would be too near.
@@ -349,7 +357,6 @@ fn named(raw: Vec<Raw>) -> Result<Vec<(u32, Polytope)>, Vec<u32>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::form::Kind;
     use super::super::polytopes::{Cut, height};
     use super::super::tubes::Loose;
     use super::*;
@@ -402,20 +409,22 @@ mod tests {
                 (0..count).map(|k| Figure::from(Weighted { site: Site::Segment(ends(k)), deficit: 0.0 })).collect();
             let shift = random.next() as usize % count;
             figures.rotate_left(shift);
-            let Some(form) = Form::within(shell.reach(), Kind::Tube) else { panic!("{round}") };
+            let forms = [Kind::Rod, Kind::Flat, Kind::Square].map(|kind| (kind, Form::within(shell.reach(), kind)));
+            let form = |kind: Kind| forms.iter().find(|(own, _)| *own == kind).and_then(|(_, form)| form.as_ref());
             let mut beyond: Vec<Box<[Option<f64>]>> = (0..count).map(|_| Box::new([None; 2]) as Box<[Option<f64>]>).collect();
             let slack = 1e-12;
-            let mut tubes = Tubes::of(&figures, &mut beyond, &Loose::new(), &form, slack, |_| shell);
+            let mut tubes = Tubes::of(&figures, &mut beyond, &Loose::new(), form, slack, |_| shell);
             let polytope = |index: usize| {
                 let cut = Cut { beyond: [beyond[index][0], beyond[index][1]], most: shell.outer };
-                Polytope::new(&figures[index], &form, shell, cut, tubes.rod(index as u32), index as u64)
+                let rod = tubes.rod(index as u32)?;
+                Polytope::new(&figures[index], form(rod.kind)?, shell, cut, Some(rod), index as u64)
             };
             let mut polytopes: Vec<Polytope> = (0..count).filter(|&k| tubes.rod(k as u32).is_some()).filter_map(polytope).collect();
             // Not all bends are tubes; here those are looked at that are nothing else.
             if polytopes.len() < count {
                 continue;
             }
-            assert!(tubes.build(&figures, &mut polytopes, &form, slack, |_| shell).is_ok(), "{round}");
+            assert!(tubes.build(&figures, &mut polytopes, form, slack, |_| shell).is_ok(), "{round}");
             wedges += tubes.wedges.len();
             mitres += tubes.bends.len() - tubes.wedges.len();
             rings += usize::from(tubes.bends.len() == count);

@@ -66,7 +66,7 @@ impl Setting {
 
 /// The forms of an arrangement by their states, and where there is none: to look for one takes as long as hundreds of polytopes, so it is done once.
 #[derive(Default)]
-pub(super) struct Forms([[[OnceLock<Option<Form>>; 3]; 2]; LEVELS as usize]);
+pub(super) struct Forms([[[OnceLock<Option<Form>>; 4]; 2]; LEVELS as usize]);
 
 impl Forms {
     /// The form for a state below [`LEVELS`].
@@ -196,7 +196,7 @@ impl<'a> Engine<'a> {
         // Where a cut far out leaves a form no room, a finer one may have some.
         let of_level = |kind: Kind, level: u32| self.forms.of(self.setting, self.sites, kind, State { level, ..state });
         if let Some(rod) = self.tubes.rod(index as u32) {
-            return Polytope::new(figure, of_level(Kind::Tube, state.level)?, shell, cut, Some(rod), seed);
+            return Polytope::new(figure, of_level(rod.kind, state.level)?, shell, cut, Some(rod), seed);
         }
         let kind = polytopes::kind(figure);
         (state.level..LEVELS).find_map(|level| Polytope::new(figure, of_level(kind, level)?, shell, cut, None, seed))

@@ -26,8 +26,9 @@ pub(super) struct Form {
 pub(super) enum Kind {
     Ball,
     Rod,
-    /// A rod in a tube that turns: at right angles, corners of its belt are on the axis again.
-    Tube,
+    /// A rod in a tube with wedges in one plane, or at right angles: corners of its belt are on all their axes.
+    Flat,
+    Square,
 }
 
 /// The share of the band that a rod's form leaves. Where tubes meet, corners lie all over it, and the more of it is left, the more of them are saved later; a ball by itself is best as it is.
@@ -61,7 +62,11 @@ impl Form {
             let shapes = vec![Shape::ball(&covering)?];
             return Some(Self { covering, shapes });
         }
-        let (left, step) = if kind == Kind::Tube { (0.0, 4) } else { (LEFT_BY_RODS, 1) };
+        let (left, step) = match kind {
+            Kind::Ball | Kind::Rod => (LEFT_BY_RODS, 1),
+            Kind::Flat => (0.0, 2),
+            Kind::Square => (0.0, 4),
+        };
         let covering = Covering::within(1.0 + (1.0 - left) * (most - 1.0), MOST_DIRECTIONS, STRIP_WEIGHT, step)?;
         let shapes = (0..4).map(|cut| Shape::rod(&covering, [cut & 1 != 0, cut & 2 != 0])).collect::<Option<_>>()?;
         Some(Self { covering, shapes })

@@ -194,9 +194,9 @@ impl Arrangement {
         {
             *beyond = Box::new(cut);
         }
-        let of_tubes = if has_rods { forms.of(setting, &sites.list, Kind::Tube, State::default()) } else { None };
-        *tubes = match (of_tubes, loose) {
-            (Some(form), Some(loose)) => Tubes::of(&sites.list, &mut beyond, loose, form, setting.slack, shell),
+        let of_kind = |kind: Kind| forms.of(setting, &sites.list, kind, State::default());
+        *tubes = match loose {
+            Some(loose) if has_rods => Tubes::of(&sites.list, &mut beyond, loose, of_kind, setting.slack, shell),
             _ => Tubes::none(sites.list.len()),
         };
         if sites.list.len() + tubes.wedges.len() > MOST_POLYTOPES {
@@ -204,23 +204,7 @@ impl Arrangement {
         }
         sites.list.extend(tubes.points(&sites.list));
         beyond.resize_with(sites.list.len(), || Box::new([None; 2]));
-        let reach = |figure: &Figure| figure.in_space(setting.outer) + setting.slack;
-        let cuts = |(index, figure): (u32, &Figure)| tubes.cuts(index, figure, &beyond[index as usize]);
-        let bodies = (0..).zip(&sites.list);
-        let bodies: Vec<Body<'_>> =
-            bodies.map(|(index, figure)| Body { figure, reach: reach(figure), cuts: cuts((index, figure)) }).collect();
-        let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(Begun::Left) };
-        drop(bodies);
-        let may_be_near = |figure: &Figure| {
-            let per_cube = match figure.outline {
-                Outline::Polygon(_) | Outline::Polyhedron(_) => NEAR_ALONG_FACES,
-                Outline::Point(_) | Outline::Segment(_) => NEAR_AROUND_WIRES,
-            };
-            per_cube * figure.area(setting.reach) / setting.lattice.pitch.powi(2)
-        };
-        if near.total() as f64 > FEW_NEAR + sites.list.iter().map(may_be_near).sum::<f64>() {
-            return Ok(Begun::Left);
-        }
+        let Some(near) = few_near(setting, &sites.list, tubes, &beyond, budget)? else { return Ok(Begun::Left) };
         let crowded = tubes.crowded(&sites.list, &near, setting.outer);
         if !crowded.is_empty() {
             return Ok(Begun::Bent(crowded));
@@ -231,12 +215,11 @@ impl Arrangement {
         let Engine { polytopes, .. } = if engine.begin(budget)? { engine } else { return Ok(Begun::Left) };
         self.polytopes = polytopes;
         let Self { setting, sites, forms, tubes, polytopes, .. } = self;
-        if !tubes.bends.is_empty()
-            && let Some(form) = forms.of(setting, &sites.list, Kind::Tube, State::default())
-        {
+        if !tubes.bends.is_empty() {
             budget.cancel.check()?;
+            let of_kind = |kind: Kind| forms.of(setting, &sites.list, kind, State::default());
             let shell = |figure: &Figure| setting.shell(figure, State::default());
-            let loose = match tubes.build(&sites.list, &mut polytopes.all, form, setting.slack, shell) {
+            let loose = match tubes.build(&sites.list, &mut polytopes.all, of_kind, setting.slack, shell) {
                 Ok(()) => tubes.crossed(&self.near),
                 Err(figures) => tubes.ends(figures),
             };
@@ -309,6 +292,32 @@ impl Arrangement {
         self.sites.list.truncate(self.tubes.figures);
         (Index::new(self.sites.list, self.setting.slack), self.setting)
     }
+}
+
+/// The figures that are near to each other, given how far beyond their ends they are cut; none where a lattice serves better, as too many are.
+fn few_near(
+    setting: &Setting,
+    sites: &[Figure],
+    tubes: &Tubes,
+    beyond: &[Box<[Option<f64>]>],
+    budget: &Budget,
+) -> Result<Option<Lists>, Stopped> {
+    let body = |(index, figure)| Body {
+        figure,
+        reach: figure.in_space(setting.outer) + setting.slack,
+        cuts: tubes.cuts(index, figure, &beyond[index as usize]),
+    };
+    let bodies: Vec<Body<'_>> = (0..).zip(sites).map(body).collect();
+    let Some(near) = pieces::near(&bodies, MOST_NEAR, budget)? else { return Ok(None) };
+    let may_be_near = |figure: &Figure| {
+        let per_cube = match figure.outline {
+            Outline::Polygon(_) | Outline::Polyhedron(_) => NEAR_ALONG_FACES,
+            Outline::Point(_) | Outline::Segment(_) => NEAR_AROUND_WIRES,
+        };
+        per_cube * figure.area(setting.reach) / setting.lattice.pitch.powi(2)
+    };
+    let most = FEW_NEAR + sites.iter().map(may_be_near).sum::<f64>();
+    Ok((near.total() as f64 <= most).then_some(near))
 }
 
 /// Triangles of a polytope that little is near to, about: with more sites than memory has room for that many, polytopes are not even begun.

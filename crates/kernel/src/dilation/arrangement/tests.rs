@@ -322,10 +322,10 @@ fn tubes_have_the_facets_of_their_prisms() {
         })
     };
     let (triangles, told) = made(&ring(40, 12.0, 0.0));
-    assert_eq!((triangles, told), (2 * 8 * 40, 2.0 * 8.0 * 40.0));
-    // Of a square's corners each has eight strips that end there, five of which go on to a wedge of two steps: four facets of four corners, and as many of three.
+    assert_eq!((triangles, told), (2 * 6 * 40, 2.0 * 6.0 * 40.0));
+    // Of six corners of a square's rings two are on the axis of a wedge, and two beyond it: each of its three steps has two triangles and a facet of four corners.
     let (triangles, _) = made(&ring(4, 12.0, 0.0));
-    assert_eq!(triangles, 2 * 8 * 4 + 4 * (2 * (2 * 2 + 2)));
+    assert_eq!(triangles, 2 * 6 * 4 + 4 * 3 * (2 + 2));
     for (segments, expected) in [
         (ring(40, 12.0, 0.0), (1, 0, 0)),
         (ring(4, 12.0, 0.0), (1, 0, 0)),

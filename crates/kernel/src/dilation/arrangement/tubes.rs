@@ -22,7 +22,7 @@ use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit
 use crate::dilation::convex::Convex;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
 /// Angles by which tubes turn, in radians: where it is less, the axis is up to rounding, and more would take long segments.
@@ -80,6 +80,8 @@ pub(super) struct Bend {
 /// What a segment in a tube is like.
 #[derive(Debug)]
 pub(super) struct Rod {
+    /// What form its polytope has.
+    pub(super) kind: Kind,
     /// Whether the tube goes from the second of its ends, in their order, to the first.
     pub(super) is_reversed: bool,
     /// The last vector is along it, from the first end to the second.
@@ -124,7 +126,6 @@ struct Course<'a> {
     ways: Vec<Point>,
     turns: Vec<f64>,
     is_ring: bool,
-    covering: &'a Covering,
     shell: Shell,
     /// How far angles are off that are as they should be.
     noise: f64,
@@ -137,8 +138,8 @@ struct Part {
     is_ring: bool,
     /// The direction across the first segment where strips begin.
     first: Point,
-    /// The corners of rings on the axis of some wedge.
-    corners: Vec<bool>,
+    /// Whether axes of wedges are along that direction, and across it.
+    axes: [bool; 2],
 }
 
 impl Course<'_> {
@@ -171,23 +172,19 @@ impl Course<'_> {
         if start == end {
             return None;
         }
-        let belt = self.covering.belt;
         let first = frame(&self.ways[start]);
-        let (mut turning, mut begin, mut corners) = (first, None, vec![false; belt]);
+        let (mut turning, mut begin, mut axes) = (first, None, [false; 2]);
         let (mut place, mut is_ring) = (start, false);
         while place + 1 < end || (may_be_ring && !is_ring) {
             let (next, turn) = (self.next(place), self.turns[place]);
             let axis = unit(&cross(&self.ways[place], &self.ways[next]));
             if !self.shell.is_mitre(turn) {
                 let angle = dot(&axis, &turning[1]).atan2(dot(&axis, &turning[0]));
-                let off = (angle - *begin.get_or_insert(angle)) / TAU * belt as f64;
-                let corner = off.round();
-                if (off - corner).abs() * TAU / belt as f64 > self.noise {
+                let off = (angle - *begin.get_or_insert(angle)) / FRAC_PI_2;
+                if (off - off.round()).abs() * FRAC_PI_2 > self.noise {
                     break;
                 }
-                let corner = (corner as i64).rem_euclid(belt as i64) as usize;
-                corners[corner] = true;
-                corners[(corner + belt / 2) % belt] = true;
+                axes[(off.round() as i64).rem_euclid(2) as usize] = true;
             }
             turning = carried(&turning, &axis, turn, &self.ways[next]);
             if next == 0 {
@@ -198,7 +195,7 @@ impl Course<'_> {
         }
         let (sine, cosine) = begin.unwrap_or_default().sin_cos();
         let first = std::array::from_fn(|k| cosine * first[0][k] + sine * first[1][k]);
-        Some(Part { range: start..place + 1, is_ring, first, corners })
+        Some(Part { range: start..place + 1, is_ring, first, axes })
     }
 }
 
@@ -293,11 +290,11 @@ impl Tubes {
     }
 
     /// The tubes of some figures, whose segments are cut at bends from now on.
-    pub(super) fn of(
+    pub(super) fn of<'f>(
         sites: &[Figure],
         beyond: &mut [Box<[Option<f64>]>],
         loose: &Loose,
-        form: &Form,
+        form: impl Fn(Kind) -> Option<&'f Form>,
         slack: f64,
         shell: impl Fn(&Figure) -> Shell,
     ) -> Self {
@@ -318,11 +315,17 @@ impl Tubes {
                 turns: turns.collect(),
                 shell: shell(&sites[chain[0].0 as usize]),
                 is_ring,
-                covering: &form.covering,
                 noise: slack / shell(&sites[chain[0].0 as usize]).outer,
                 chain,
             };
-            course.parts().iter().for_each(|part| tubes.add(&course, beyond, part));
+            for part in course.parts() {
+                let kind = match part.axes {
+                    [_, true] => Kind::Square,
+                    [true, false] => Kind::Flat,
+                    [false, false] => Kind::Rod,
+                };
+                form(kind).into_iter().for_each(|form| tubes.add(&course, beyond, &part, kind, &form.covering));
+            }
         }
         tubes
     }
@@ -342,9 +345,9 @@ impl Tubes {
     }
 
     /// Adds a tube along some segments, if there is room for one.
-    fn add(&mut self, course: &Course<'_>, beyond: &mut [Box<[Option<f64>]>], part: &Part) {
-        let Part { range, is_ring, first, corners } = part;
-        let Course { sites, chain, ways, turns, covering, shell, .. } = course;
+    fn add(&mut self, course: &Course<'_>, beyond: &mut [Box<[Option<f64>]>], part: &Part, kind: Kind, covering: &Covering) {
+        let Part { range, is_ring, first, axes } = part;
+        let Course { sites, chain, ways, turns, shell, .. } = course;
         let Shell { inner, outer } = *shell;
         let last = range.len() - 1;
         let bends = if *is_ring { range.len() } else { last };
@@ -377,7 +380,8 @@ impl Tubes {
         let mut strips: Vec<f64> =
             (1..).take(covering.belt).map(|strip| reach / covering.girth + own * shift(SEEDS[0], chain[0].0, strip)).collect();
         // Beside corners on an axis they are as far out as each other, twice around as the last one is beside the first.
-        for corner in (0..covering.belt).rev().cycle().take(2 * covering.belt).filter(|&corner| corners[corner]) {
+        let is_on_axis = |corner: usize| (4 * corner).is_multiple_of(covering.belt) && axes[4 * corner / covering.belt % 2];
+        for corner in (0..covering.belt).rev().cycle().take(2 * covering.belt).filter(|&corner| is_on_axis(corner)) {
             strips[(corner + covering.belt - 1) % covering.belt] = strips[corner];
         }
         let mut frame = [*first, cross(&ways[0], first), ways[0]];
@@ -389,6 +393,7 @@ impl Tubes {
             let (is_reversed, [x, y, z]) = (entered == 1, frame);
             let negated = |x: Point| x.map(|part| -part);
             self.rods[rod as usize] = Some(Rod {
+                kind,
                 is_reversed,
                 frame: if is_reversed { [x, negated(y), negated(z)] } else { frame },
                 reach,
