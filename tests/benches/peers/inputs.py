@@ -85,6 +85,12 @@ def dragon(depth):
     return polyline(np.column_stack([z.real, z.imag]))
 
 
+def spring(turns, steps):
+    """A coil of radius 1, `steps` segments a turn, a third of the radius from one turn to the next."""
+    angle = np.arange(turns * steps + 1) * 2 * np.pi / steps
+    return polyline(np.column_stack([np.cos(angle), np.sin(angle), angle / (6 * np.pi)]))
+
+
 def sierpinski_wire(depth):
     """The edges of the 3^depth triangles of side 2^-depth, with shared vertices."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0]])
@@ -315,6 +321,7 @@ SHAPES = {
     "sierp7turned": lambda: turned(sierpinski_wire(7)),
     "grating": lambda: grating(12, 8),
     "gratingturned": lambda: turned(grating(12, 8)),
+    "spring": lambda: spring(20, 64),
 }
 MAIN = list(SHAPES)[:8]
 

@@ -499,14 +499,16 @@ impl Tubes {
     /// The ends of bends that others are near to than what is before and after them: rings are hidden there in part, and bodies that cannot be changed, as the cells go with them, leave doubts.
     pub(super) fn crowded(&self, sites: &[Figure], near: &Lists, outer: f64) -> Loose {
         let others = |figure: u32| near.of(figure).iter().filter(move |&&other| !self.are_successive(figure, other));
-        let is_crowded = |bend: &&Bend| {
+        let is_crowded = |bend: &Bend| {
             let is_beside = |other: &u32| distance_squared(&sites[*other as usize].closest(&bend.at), &bend.at) <= (2.0 * outer).powi(2);
             bend.rods.iter().any(|&rod| others(rod).count() > MOST_OTHERS || others(rod).any(is_beside))
         };
-        let crowded = self.bends.iter().filter(is_crowded).count();
-        let (left, rods) = (self.bends.len() - crowded, self.rods.iter().flatten().count());
-        let is_worth = left as f64 >= LEAST_BENDS * rods as f64;
-        let all = (0..).zip(&self.bends).filter(|(_, bend)| !is_worth || is_crowded(bend));
+        let mut crowded: Vec<bool> = self.bends.par_iter().map(is_crowded).collect();
+        let left = crowded.iter().filter(|&&is_crowded| !is_crowded).count();
+        if (left as f64) < LEAST_BENDS * self.rods.iter().flatten().count() as f64 {
+            crowded.fill(true);
+        }
+        let all = (0..).zip(crowded).filter(|&(_, is_crowded)| is_crowded);
         all.flat_map(|(number, _)| self.ends_of(number)).collect()
     }
 
