@@ -163,7 +163,7 @@ impl Arrangement {
     /// Makes the first polytopes, with no bends at ends that are loose; false where a lattice serves better.
     fn begin(&mut self, loose: &mut Loose, budget: &Budget) -> Result<bool, Stopped> {
         for _ in 0..ROUNDS_OF_BENDS {
-            match self.begin_with(Some(loose), budget)? {
+            match self.begin_with(Some(&mut *loose), budget)? {
                 Begun::Done => return Ok(true),
                 Begun::Left if self.tubes.bends.is_empty() => return Ok(false),
                 Begun::Left => break,
@@ -174,7 +174,7 @@ impl Arrangement {
     }
 
     /// The same, with no bends at all unless ends are given.
-    fn begin_with(&mut self, loose: Option<&Loose>, budget: &Budget) -> Result<Begun, Stopped> {
+    fn begin_with(&mut self, loose: Option<&mut Loose>, budget: &Budget) -> Result<Begun, Stopped> {
         let Self { setting, sites, forms, tubes, .. } = self;
         // Without the bends of a round before.
         if !tubes.bends.is_empty() {
@@ -194,20 +194,32 @@ impl Arrangement {
         {
             *beyond = Box::new(cut);
         }
-        let of_kind = |kind: Kind| forms.of(setting, &sites.list, kind, State::default());
-        *tubes = match loose {
-            Some(loose) if has_rods => Tubes::of(&sites.list, &mut beyond, loose, of_kind, setting.slack, shell),
-            _ => Tubes::none(sites.list.len()),
-        };
-        if sites.list.len() + tubes.wedges.len() > MOST_POLYTOPES {
-            return Ok(Begun::Left);
+        *tubes = Tubes::none(sites.list.len());
+        let Some(mut near) = few_near(setting, &sites.list, tubes, &beyond, budget)? else { return Ok(Begun::Left) };
+        if let Some(loose) = loose.filter(|_| has_rods) {
+            let of_kind = |kind: Kind| forms.of(setting, &sites.list, kind, State::default());
+            for _ in 0..ROUNDS_OF_BENDS {
+                let mut cut = beyond.clone();
+                let made = Tubes::of(&sites.list, &mut cut, loose, of_kind, setting.slack, shell);
+                let crowded = made.crowded(&sites.list, &near, setting.outer);
+                budget.cancel.check()?;
+                if crowded.is_empty() {
+                    (*tubes, beyond) = (made, cut);
+                    break;
+                }
+                loose.extend(crowded);
+            }
         }
-        sites.list.extend(tubes.points(&sites.list));
-        beyond.resize_with(sites.list.len(), || Box::new([None; 2]));
-        let Some(near) = few_near(setting, &sites.list, tubes, &beyond, budget)? else { return Ok(Begun::Left) };
-        let crowded = tubes.crowded(&sites.list, &near, setting.outer);
-        if !crowded.is_empty() {
-            return Ok(Begun::Bent(crowded));
+        if !tubes.bends.is_empty() {
+            if sites.list.len() + tubes.wedges.len() > MOST_POLYTOPES {
+                return Ok(Begun::Left);
+            }
+            sites.list.extend(tubes.points(&sites.list));
+            beyond.resize_with(sites.list.len(), || Box::new([None; 2]));
+            near = match few_near(setting, &sites.list, tubes, &beyond, budget)? {
+                Some(near) => near,
+                None => return Ok(Begun::Left),
+            };
         }
         self.near = near.of_cells(tubes);
         self.beyond = beyond;

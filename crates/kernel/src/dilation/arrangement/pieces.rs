@@ -524,6 +524,7 @@ impl Arrangement<'_> {
     /// What other polytopes leave of the lines where two meet.
     fn lines(&self, other: u32, scratch: &mut Scratch) {
         let Scratch { found, line, recent, out, .. } = scratch;
+        let joined = self.polytopes.joined(other);
         found.sort_unstable_by_key(|pierced| (pierced.facets, pierced.name));
         // Two facets meet in one line, with two ends; where rounding says otherwise, the boundary is not closed.
         for pair in found.chunk_by(|a, b| a.facets == b.facets).filter(|pair| pair.len() == 2) {
@@ -536,7 +537,7 @@ impl Arrangement<'_> {
             let mut is_gone = false;
             for place in 0..recent.len() {
                 let Third { index: third, ref mut parting } = recent[place];
-                if third == other || self.polytopes.are_joined(other, third) || !self.polytopes.of(third).may_meet(&p.at, &q.at) {
+                if third == other || joined.contains(&third) || !self.polytopes.of(third).may_meet(&p.at, &q.at) {
                     continue;
                 }
                 let Some(cuts) = covered_of_line(self.polytopes, third, [&p.at, &q.at], parting) else { continue };

@@ -308,13 +308,13 @@ impl Polytopes {
             self.of(index).seams.as_ref().is_some_and(|seams| seams.inside.contains(&(facet as u16)))
         };
         let [one, other] = facets.map(|facet| owner(facet).0);
-        facets.iter().all(is_inside) && self.are_joined(one, other)
+        facets.iter().all(is_inside) && self.joined(one).contains(&other)
     }
 
-    /// Whether two cells have facets in common.
+    /// The cells that one has facets in common with.
     #[inline]
-    pub(super) fn are_joined(&self, one: u32, other: u32) -> bool {
-        self.of(one).seams.as_ref().is_some_and(|seams| seams.beside.contains(&other))
+    pub(super) fn joined(&self, index: u32) -> &[u32] {
+        self.of(index).seams.as_ref().map_or(&[], |seams| &seams.beside)
     }
 
     /// The plane of a facet.

@@ -503,10 +503,12 @@ impl Tubes {
             let is_beside = |other: &u32| distance_squared(&sites[*other as usize].closest(&bend.at), &bend.at) <= (2.0 * outer).powi(2);
             bend.rods.iter().any(|&rod| others(rod).count() > MOST_OTHERS || others(rod).any(is_beside))
         };
-        let mut crowded: Vec<bool> = self.bends.par_iter().map(is_crowded).collect();
+        let crowded: Vec<bool> = self.bends.par_iter().map(is_crowded).collect();
         let left = crowded.iter().filter(|&&is_crowded| !is_crowded).count();
         if (left as f64) < LEAST_BENDS * self.rods.iter().flatten().count() as f64 {
-            crowded.fill(true);
+            // Also those that would be instead.
+            let all = (0..).zip(&self.stretches).filter(|(_, stretch)| stretch.is_some());
+            return all.flat_map(|(rod, _)| [(rod, 0), (rod, 1)]).collect();
         }
         let all = (0..).zip(crowded).filter(|&(_, is_crowded)| is_crowded);
         all.flat_map(|(number, _)| self.ends_of(number)).collect()
