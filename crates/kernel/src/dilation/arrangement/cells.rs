@@ -113,6 +113,7 @@ impl Tubes {
             let facets = wedge.planes[wedge.inside.len()..].iter().copied();
             let cuts = bend.cuts();
             let most = shell(&sites[bend.rods[0] as usize]).outer;
+            // Around the body, whose own corners are not needed.
             let corner = |corner: usize| std::array::from_fn(|axis| bend.at[axis] + if corner >> axis & 1 == 1 { most } else { -most });
             let planes = strips.chain(facets).chain(cuts).collect();
             Polytope::with(Arc::default(), planes, cuts.into(), (0..8).map(corner).collect())
@@ -137,8 +138,8 @@ impl Tubes {
             let at = &polytope.corners[place];
             let height = dot(&subtract(at, &bend.at), &out);
             let part = match height {
-                _ if has_wedge && height.abs() <= ON_AXIS[0] * slack => Part::Axis,
-                _ if has_wedge && height.abs() <= ON_AXIS[1] * slack => return None,
+                _ if has_wedge && height.abs() <= ON_AXIS * slack => Part::Axis,
+                _ if has_wedge && height.abs() <= CLEAR * rod.reach => return None,
                 _ if height > 0.0 => Part::Outer,
                 _ => Part::Inner,
             };
@@ -203,7 +204,7 @@ impl Tubes {
         Some(cell)
     }
 
-    /// What stands for the dilation of a segment where its cell does not: it is cut beyond planes that bisect bends, and by the other segment's strips that are there.
+    /// What stands for the dilation of a segment where its cell does not: it is cut beyond planes that bisect bends, and by the other segment's strips that are there. Its corners are those without these strips: they are around it.
     fn body(&self, index: u32, rod: &Rod, polytopes: &[Polytope], form: &Form) -> Option<Polytope> {
         let mitres = [0, 1].map(|side| rod.bends[side].map(|bend| &self.bends[bend]).filter(|bend| bend.wedge.is_none()));
         if mitres.iter().all(Option::is_none) {
@@ -288,8 +289,9 @@ impl Tubes {
     }
 }
 
-/// Corners that are no farther from the axis of a wedge than the first are on it, and none may be as near as the second but farther, in units of the slack.
-const ON_AXIS: [f64; 2] = [4.0, 1e6];
+/// Corners that are no farther from the axis of a wedge than this, in units of the slack, are on it; others are farther than this from it, in units of the ring's radius.
+const ON_AXIS: f64 = 4.0;
+const CLEAR: f64 = 0.01;
 
 /// All of some, or what is told by those that are not.
 fn all<T: Send>(some: impl ParallelIterator<Item = Result<T, u32>>) -> Result<Vec<T>, Vec<u32>> {
@@ -375,11 +377,12 @@ mod tests {
             way = match kind {
                 // Right angles, little by little, in a plane, anyhow; a ring comes below.
                 0 => std::array::from_fn(|axis| if axis == (step + usize::from(any[0] > 0.0)) % 3 { any[1].signum() } else { 0.0 }),
-                1 => unit(&std::array::from_fn(|axis| way[axis] + 0.2 * any[axis])),
+                1 | 5 => unit(&std::array::from_fn(|axis| way[axis] + 0.2 * any[axis])),
                 2 => unit(&[way[0] + 1.5 * any[0], way[1] + 1.5 * any[1], 0.0]),
                 _ => unit(&std::array::from_fn(|axis| way[axis] + 1.2 * any[axis])),
             };
-            let length = number(2.0, 6.0);
+            // Some are as short as may be.
+            let length = if kind == 5 { number(0.6, 1.2) } else { number(2.0, 6.0) };
             at = std::array::from_fn(|axis| at[axis] + length * way[axis]);
             path.push(at);
         }
@@ -399,9 +402,9 @@ mod tests {
     fn cells_and_bodies_are_between_the_dilations() {
         let mut random = Random(37);
         let [mut wedges, mut mitres, mut rings, mut places] = [0; 4];
-        for round in 0..120 {
-            let (corners, is_ring) = path(round % 5, &mut random);
-            let shell = [(0.9, 1.1), (0.975, 1.025), (0.7, 1.4)][round / 5 % 3];
+        for round in 0..160 {
+            let (corners, is_ring) = path(round % 6, &mut random);
+            let shell = [(0.9, 1.1), (0.975, 1.025), (0.7, 1.4), (0.5, 1.5)][round / 6 % 4];
             let shell = Shell { inner: shell.0, outer: shell.1 };
             let count = if is_ring { corners.len() } else { corners.len() - 1 };
             let ends = |k: usize| [corners[k], corners[(k + 1) % corners.len()]];

@@ -82,6 +82,8 @@ pub(super) struct Arrangement {
     near: Lists,
     forms: Forms,
     tubes: Tubes,
+    /// The ends of segments that are found to be in no bend.
+    loose: Loose,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
@@ -152,30 +154,32 @@ impl Arrangement {
             near: Lists::default(),
             forms: Forms::default(),
             tubes: Tubes::default(),
+            loose: Loose::new(),
             polytopes: Polytopes::default(),
             solids,
             inside,
             triangles: 0.0,
         };
-        Ok(arrangement.begin(&mut Loose::new(), budget)?.then_some(arrangement))
+        Ok(arrangement.begin(budget)?.then_some(arrangement))
     }
 
     /// Makes the first polytopes, with no bends at ends that are loose; false where a lattice serves better.
-    fn begin(&mut self, loose: &mut Loose, budget: &Budget) -> Result<bool, Stopped> {
+    fn begin(&mut self, budget: &Budget) -> Result<bool, Stopped> {
         for _ in 0..ROUNDS_OF_BENDS {
-            match self.begin_with(Some(&mut *loose), budget)? {
+            match self.begin_with(true, budget)? {
                 Begun::Done => return Ok(true),
                 Begun::Left if self.tubes.bends.is_empty() => return Ok(false),
                 Begun::Left => break,
-                Begun::Bent(more) => loose.extend(more),
+                Begun::Bent(more) => self.loose.extend(more),
             }
         }
-        Ok(matches!(self.begin_with(None, budget)?, Begun::Done))
+        Ok(matches!(self.begin_with(false, budget)?, Begun::Done))
     }
 
-    /// The same, with no bends at all unless ends are given.
-    fn begin_with(&mut self, loose: Option<&mut Loose>, budget: &Budget) -> Result<Begun, Stopped> {
-        let Self { setting, sites, forms, tubes, .. } = self;
+    /// The same, with no bends at all unless they are wanted.
+    fn begin_with(&mut self, bends: bool, budget: &Budget) -> Result<Begun, Stopped> {
+        self.polytopes = Polytopes::default();
+        let Self { setting, sites, forms, tubes, loose, .. } = self;
         // Without the bends of a round before.
         if !tubes.bends.is_empty() {
             sites.list.truncate(tubes.figures);
@@ -196,7 +200,7 @@ impl Arrangement {
         }
         *tubes = Tubes::none(sites.list.len());
         let Some(mut near) = few_near(setting, &sites.list, tubes, &beyond, budget)? else { return Ok(Begun::Left) };
-        if let Some(loose) = loose.filter(|_| has_rods) {
+        if bends && has_rods {
             let of_kind = |kind: Kind| forms.of(setting, &sites.list, kind, State::default());
             for _ in 0..ROUNDS_OF_BENDS {
                 let mut cut = beyond.clone();
@@ -231,12 +235,14 @@ impl Arrangement {
             budget.cancel.check()?;
             let of_kind = |kind: Kind| forms.of(setting, &sites.list, kind, State::default());
             let shell = |figure: &Figure| setting.shell(figure, State::default());
-            let loose = match tubes.build(&sites.list, &mut polytopes.all, of_kind, setting.slack, shell) {
+            let built = tubes.build(&sites.list, &mut polytopes.all, of_kind, setting.slack, shell);
+            budget.cancel.check()?;
+            let bent = match built {
                 Ok(()) => tubes.crossed(&self.near),
                 Err(figures) => tubes.ends(figures),
             };
-            if !loose.is_empty() {
-                return Ok(Begun::Bent(loose));
+            if !bent.is_empty() {
+                return Ok(Begun::Bent(bent));
             }
         }
         self.triangles = (1.0 - self.inside) * self.expected_triangles();
@@ -267,12 +273,14 @@ impl Arrangement {
     pub(super) fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
         let solids = std::mem::take(&mut self.solids);
         let inside: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
-        let (mut trial, mut loose) = (0, Loose::new());
+        let (mut trial, mut was_bent) = (0, false);
         while trial < TRIALS {
             let (first, cells) = (std::mem::take(&mut self.polytopes), std::mem::take(&mut self.tubes.cells));
             let mut engine = Engine::new(self, trial, &inside);
             engine.polytopes = first;
-            match engine.run(cells, budget)? {
+            let run = engine.run(cells, budget)?;
+            drop(engine);
+            match run {
                 Run::Done(mut arranged) => {
                     if !solids::leave_out(&inside, &mut arranged.surface) {
                         break;
@@ -281,14 +289,15 @@ impl Arrangement {
                     arranged.surface.site_error = self.sites.error;
                     return Ok(Some(*arranged));
                 }
-                Run::Bent(more) if loose.is_empty() => {
-                    loose.extend(more);
-                    if !self.begin(&mut loose, budget)? {
+                Run::Bent(more) if !was_bent => {
+                    was_bent = true;
+                    self.loose.extend(more);
+                    if !self.begin(budget)? {
                         break;
                     }
                 }
                 Run::Bent(_) | Run::Open | Run::Doubtful if !self.tubes.bends.is_empty() => {
-                    if !matches!(self.begin_with(None, budget)?, Begun::Done) {
+                    if !matches!(self.begin_with(false, budget)?, Begun::Done) {
                         break;
                     }
                 }

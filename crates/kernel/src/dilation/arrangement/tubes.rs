@@ -3,14 +3,14 @@
 //! Polytopes of neighbours cross in rings of corners that belong to neither, three to a joint for each that there should be. So the boundary is made of *cells* there, see `cells`: convex polytopes that share whole facets, and nothing else. The topology is told of other polytopes that have the same union, but common interior points.
 //!
 //! Let a segment end at P with the unit vector a along it, another begin there with b, u be the unit vector about which a turns to b, m the unit vector along a + b, and let x be measured from P. Let A and B be prisms around both with strips that the turn takes to each other, no nearer to the segments than the band's inner end, and no
-//! corner farther from them than the outer one. The cells of both are A up to the plane x . m = 0, and B from there on: a *mitre*. Where the tube turns by more, corners of it on the outer side would be too far out: there the cells are A up to x . a = 0, and B from x . b = 0 on, and between them, in x . a >= 0 and x . b <= 0, is a wedge. Segments are long enough for what bends
-//! at both ends take of them, r sin(turn), or r tan(turn / 2) from a right angle on.
+//! corner farther from them than the outer one. The cells of both are A up to the plane x . m = 0, and B from there on: a *mitre*. Where the tube turns by more, corners of it on the outer side would be too far out: there the cells are A up to x . a = 0, and B from x . b = 0 on, and between them, in x . a >= 0 and x . b <= 0, is a wedge. What is
+//! closest to one segment, but beyond the plane x . m = 0, is no farther from P along the other one than r sin(turn), or r tan(turn / 2) from a right angle on: segments are longer than bends at both ends and their bodies take of them, so that this is closest to the other one.
 //!
 //! **Mitres.** The first body is A n {x . m <= c}, below the strips of B that look out of the turn; the second likewise. A strip of A, n . x <= h, is taken to one of B, n' . x = n . x + 2 sin(turn / 2) (n . v) (x . m) <= h, with v = a x u out of the turn. So where x . m <= 0, what is in A is below those strips of B with n . v > 0, and where x . m >= 0, below the others: the bodies' union is that of
 //! the cells. They stand for the dilations of the segments cut by {x . m <= c} and {x . m >= -c}: if the closest point to x on both segments is P, both dilations hold it, and otherwise x is on the side of the segment that is closest.
 //!
 //! **Wedges.** The bodies are A n {x . a <= 0}, B n {x . b >= 0}, and what is below the strips of A and B, the facets of the wedge and in {x . a >= -c} n {x . b <= c}. They stand for the dilations of the segments and of P, cut by those planes: where the closest point is P, x is on neither segment's side. Rings have a corner on the line along u, and as strips beside
-//! it are equally far from the segment, and no strip is much farther than others, all sections of A across u hold places of that line, and reach as far to the inner side of it as the cosine of the largest turn asks for: so what is turned about the line stays in A, and what is beyond x . m = 0 in the first body is in B.
+//! it are equally far from the segment, and no strip is much farther than others, all sections of A across u hold places of that line, and reach to either side of it at least 0.67 times as far as to the other, which is the cosine of the largest turn: so what is turned about the line stays in A, and what is beyond x . m = 0 in the first body is in B.
 
 use super::covering::Covering;
 use super::figure::{Figure, Outline, order};
@@ -27,9 +27,9 @@ use std::ops::Range;
 
 /// Angles by which tubes turn, in radians: where it is less, the axis is up to rounding, and more would take long segments.
 const TURNS: [f64; 2] = [1e-6, 2.3];
-/// Lengths of segments at least, and how much longer they are than what their bends take, in units of the outer radius.
-const LEAST_LENGTH: f64 = 0.3;
-const LEAST_BETWEEN: f64 = 0.1;
+/// Lengths of segments at least, and how much longer they are than what their bends take, in units of the outer radius: bodies reach up to 0.29 of it back beyond a bend, and at a mitre 0.14 more where it takes 0.27.
+const LEAST_LENGTH: f64 = 0.4;
+const LEAST_BETWEEN: f64 = 0.2;
 /// The share of the band that a mitre may take, and that the slab of a bend's body does.
 const MITRE: f64 = 0.05;
 const SLAB: f64 = 0.04;
@@ -370,7 +370,7 @@ impl Tubes {
             return;
         }
         let reach = low + (OWN_SHIFT + (1.0 - 2.0 * OWN_SHIFT) * (1.0 - ALL_SHIFT * shift(SEEDS[0], chain[0].0, 0))) * room;
-        // A facet of the wedge is nearer than the strip that it goes on from by this cosine at most.
+        // A facet of the wedge is nearer than the strip that it goes on from by the cosine of half the angle that it turns by at most; this is the largest half.
         let step = (inner * covering.girth / reach).min(1.0).acos();
         let steps = |turn: f64| if shell.is_mitre(turn) { 0 } else { (0.5 * turn / step * (1.0 + 1e-9)).ceil() as usize };
         if turns.iter().any(|&turn| steps(turn) * covering.belt / 2 + 2 > MOST_FACETS) {
@@ -527,7 +527,7 @@ impl Tubes {
         own.course == theirs.course && gap.min(back) <= own.most
     }
 
-    /// The ends of bends without which no two cells of a tube would meet but where they are joined: where a tube comes back to itself, it is two, which differ.
+    /// The ends of bends without which no two cells of a tube would meet but where they are joined: where a tube comes back to itself, it is two, which differ (a ring after another round).
     pub(super) fn crossed(&self, near: &Lists) -> Loose {
         let mut cells = vec![None; self.figures + self.wedges.len()];
         self.cells.iter().for_each(|(index, cell)| cells[*index as usize] = Some(cell));
