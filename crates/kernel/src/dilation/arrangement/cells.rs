@@ -3,9 +3,10 @@
 //! A *seam* is a corner, or an edge, that cells have in common: it has one name, and an edge lies between a facet of one cell and one of another. Facets in common are inside of the union and none of its boundary. Their planes are the same numbers with other signs, so that what one cell covers of a line ends
 //! where what the other one covers begins, to the last bit.
 
+use super::cubes::Cube;
 use super::figure::Figure;
 use super::form::{Form, Kind};
-use super::polytopes::{Plane, Polytope, Shell, edge_number, facet_number};
+use super::polytopes::{Plane, Polytope, Shell, beyond_place, edge_number, facet_number, normal};
 use super::structure::{Edge, Structure};
 use super::tubes::{Bend, Rod, Tubes};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
@@ -105,26 +106,23 @@ impl Tubes {
             form(rod.kind).and_then(|form| self.cell(index, rod, &rings, &polytopes[index as usize], form)).ok_or(index)
         };
         let mut raw: Vec<Raw> = all(rods.par_iter().map(cell))?;
-        let mut bodies: Vec<(u32, Polytope)> =
+        let bodies: Vec<(u32, Polytope)> =
             rods.iter().filter_map(|&(index, rod)| Some((index, self.body(index, rod, polytopes, form(rod.kind)?)?))).collect();
         let around = |(&number, wedge): (&usize, &Raw)| {
             let bend = &self.bends[number];
             let strips = bend.rods.iter().flat_map(|&rod| self.strips(rod, polytopes)).copied();
             let facets = wedge.planes[wedge.inside.len()..].iter().copied();
             let cuts = bend.cuts();
-            let most = shell(&sites[bend.rods[0] as usize]).outer;
             // Around the body, whose own corners are not needed.
-            let corner = |corner: usize| std::array::from_fn(|axis| bend.at[axis] + if corner >> axis & 1 == 1 { most } else { -most });
+            let cube = Cube { centre: bend.at, half: shell(&sites[bend.rods[0] as usize]).outer };
             let planes = strips.chain(facets).chain(cuts).collect();
-            Polytope::with(Arc::default(), planes, cuts.into(), (0..8).map(corner).collect())
+            Polytope::with(Arc::default(), planes, cuts.into(), cube.corners().collect())
         };
         let added: Vec<Polytope> = self.wedges.iter().zip(&wedges).map(around).collect();
         raw.extend(wedges);
         self.cells = named(raw)?;
         polytopes.extend(added);
-        for (index, body) in &mut bodies {
-            std::mem::swap(&mut polytopes[*index as usize], body);
-        }
+        bodies.into_iter().for_each(|(index, body)| polytopes[index as usize] = body);
         Ok(())
     }
 
@@ -152,8 +150,8 @@ impl Tubes {
         if has_wedge && on_axis != 2 {
             return None;
         }
-        let plane = |normal: Point| [normal[0], normal[1], normal[2], dot(&normal, &bend.at)];
-        Some(Ring { nodes, planes: [bend.ways[0], bend.ways[1], bend.middle()].map(plane) })
+        let planes = [bend.ways[0], bend.ways[1], bend.middle()].map(|normal| beyond_place(normal, &bend.at, 0.0));
+        Some(Ring { nodes, planes })
     }
 
     /// The cell of a segment.
@@ -216,9 +214,7 @@ impl Tubes {
             planes[shape.flats[rod.end(side)]?] = bend.mitre(1 - side);
             let (own, outs) =
                 (bend.ways[1 - side].map(|part| if side == 1 { part } else { -part }), [1 - side, side].map(|which| bend.out(which)));
-            planes.extend(
-                self.strips(bend.rods[side], polytopes).iter().filter(|plane| dot(&[plane[0], plane[1], plane[2]], &outs[1]) > 0.0),
-            );
+            planes.extend(self.strips(bend.rods[side], polytopes).iter().filter(|plane| dot(&normal(plane), &outs[1]) > 0.0));
             for corner in (0..rod.strips.len()).map(|corner| rod.corner(side, corner)) {
                 let height = dot(&subtract(&corners[corner], &bend.at), &outs[0]);
                 let moved = bend.beyond / (0.5 * bend.turn).cos() + height * (0.5 * bend.turn).tan();
@@ -281,7 +277,7 @@ impl Tubes {
                 if offset < inner {
                     return None;
                 }
-                planes.push([normal[0], normal[1], normal[2], offset + dot(&normal, &bend.at)]);
+                planes.push(beyond_place(normal, &bend.at, offset));
                 facets.push(facet);
             }
         }

@@ -12,7 +12,7 @@
 //! So all caps but one are left out, and that one, too, where wires cross or go on nearly straight. The bounds of the union, and those of its topology, hold for bodies that are cut as for whole ones.
 
 use super::figure::{Figure, Outline, order};
-use super::polytopes::{Plane, Shell, ordered};
+use super::polytopes::{Plane, Shell, beyond_place, ordered};
 use crate::attractor::cell::{Point, between, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -29,11 +29,30 @@ const CLEAR: f64 = 1e-3;
 const LEAST_ROOM: f64 = 0.25;
 
 /// An end of a site, or a place on one where others end.
-struct End {
-    at: Point,
-    site: u32,
+pub(super) struct End {
+    pub(super) at: Point,
+    pub(super) site: u32,
     /// Which of the two, in their order; none in the middle, and of a point.
-    end: Option<usize>,
+    pub(super) end: Option<usize>,
+}
+
+/// Points, and the ends of segments, in the order of their places.
+pub(super) fn ends(sites: &[Figure]) -> Vec<End> {
+    let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
+    for (site, figure) in (0..).zip(sites).filter(|(_, figure)| matches!(figure.outline, Outline::Point(_) | Outline::Segment(_))) {
+        let [first, second] = ordered(figure);
+        if first == second {
+            ends.push(End { at: first, site, end: None });
+        } else {
+            ends.extend([first, second].into_iter().enumerate().map(|(end, at)| End { at, site, end: Some(end) }));
+        }
+    }
+    sort(&mut ends);
+    ends
+}
+
+fn sort(ends: &mut [End]) {
+    ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
 }
 
 /// How far beyond its ends, in their order, every site may be cut; none where it is not. What is no farther than `flatness` from a segment is on it. Polytopes that are cut at both ends are around the inner ball where their corners are `girth` times as far, others where they are `reach` times as far.
@@ -47,17 +66,7 @@ pub(super) fn cuts(
     shell: impl Fn(&Figure) -> Shell,
     budget: &Budget,
 ) -> Result<Vec<[Option<f64>; 2]>, Stopped> {
-    let mut ends: Vec<End> = Vec::with_capacity(2 * sites.len());
-    for (site, figure) in (0..).zip(sites).filter(|(_, figure)| matches!(figure.outline, Outline::Point(_) | Outline::Segment(_))) {
-        let [first, second] = ordered(figure);
-        if first == second {
-            ends.push(End { at: first, site, end: None });
-        } else {
-            ends.extend([first, second].into_iter().enumerate().map(|(end, at)| End { at, site, end: Some(end) }));
-        }
-    }
-    let sort = |ends: &mut Vec<End>| ends.sort_unstable_by(|a, b| order(&a.at, &b.at).then(a.site.cmp(&b.site)));
-    sort(&mut ends);
+    let mut ends = ends(sites);
     let through = through(sites, flatness, ends.chunk_by(|a, b| a.at == b.at), &shell, budget)?;
     ends.extend(through);
     sort(&mut ends);
@@ -146,17 +155,16 @@ fn farthest(shell: Shell, times: f64) -> f64 {
 
 /// The planes that a figure's dilations are cut by: beyond the ends of a segment, or the sides of a polygon.
 pub(super) fn planes(figure: &Figure, beyond: &[Option<f64>]) -> Box<[Plane]> {
-    let plane = |normal: Point, at: &Point, beyond: f64| [normal[0], normal[1], normal[2], dot(&normal, at) + beyond];
     let cut = beyond.iter().enumerate().filter_map(|(place, beyond)| beyond.map(|beyond| (place, beyond)));
     if let Some(polygon) = figure.polygon() {
-        return cut.map(|(side, beyond)| plane(polygon.outward[side], &polygon.corners[side], beyond)).collect();
+        return cut.map(|(side, beyond)| beyond_place(polygon.outward[side], &polygon.corners[side], beyond)).collect();
     }
     let ends = ordered(figure);
-    cut.map(|(end, beyond)| plane(unit(&subtract(&ends[end], &ends[1 - end])), &ends[end], beyond)).collect()
+    cut.map(|(end, beyond)| beyond_place(unit(&subtract(&ends[end], &ends[1 - end])), &ends[end], beyond)).collect()
 }
 
 /// The unit vector along a segment, out of one of its ends.
-fn outward(sites: &[Figure], end: &End) -> Point {
+pub(super) fn outward(sites: &[Figure], end: &End) -> Point {
     let ends = ordered(&sites[end.site as usize]);
     let own = end.end.unwrap_or_default();
     unit(&subtract(&ends[own], &ends[1 - own]))

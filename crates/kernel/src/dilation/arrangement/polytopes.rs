@@ -47,6 +47,11 @@ pub(super) fn normal(plane: &Plane) -> Point {
     [plane[0], plane[1], plane[2]]
 }
 
+/// The half-space across a unit normal that ends so far beyond a place.
+pub(super) fn beyond_place(normal: Point, at: &Point, beyond: f64) -> Plane {
+    [normal[0], normal[1], normal[2], dot(&normal, at) + beyond]
+}
+
 /// Bits of a facet's number within its polytope, and of an edge's or a corner's: a polytope with f facets has 3 f - 6 edges at most.
 const FACET_BITS: u32 = MOST_FACETS.trailing_zeros();
 const EDGE_BITS: u32 = FACET_BITS + 2;

@@ -13,11 +13,11 @@
 //! it are equally far from the segment, and no strip is much farther than others, all sections of A across u hold places of that line, and reach to either side of it at least 0.67 times as far as to the other, which is the cosine of the largest turn: so what is turned about the line stays in A, and what is beyond x . m = 0 in the first body is in B.
 
 use super::covering::Covering;
-use super::figure::{Figure, Outline, order};
+use super::figure::{Figure, Outline};
 use super::form::{Form, Kind};
-use super::joints;
+use super::joints::{self, End};
 use super::pieces::{self, Lists};
-use super::polytopes::{ALL_SHIFT, MOST_FACETS, OWN_SHIFT, Plane, Polytope, Shell, frame, kind, ordered, share};
+use super::polytopes::{ALL_SHIFT, MOST_FACETS, OWN_SHIFT, Plane, Polytope, Shell, beyond_place, frame, kind, ordered, share};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
 use crate::dilation::convex::Convex;
 use rayon::prelude::*;
@@ -94,8 +94,8 @@ pub(super) struct Rod {
     pub(super) is_cut: [bool; 2],
     /// The bends where the tube comes and where it goes on.
     pub(super) bends: [Option<usize>; 2],
-    /// The tube, and the segment's place in it.
-    pub(super) tube: usize,
+    /// The tube, by its first segment, and the segment's place in it.
+    pub(super) tube: u32,
     pub(super) place: usize,
 }
 
@@ -111,8 +111,6 @@ pub(super) struct Tubes {
     pub(super) rods: Vec<Option<Rod>>,
     /// What the boundary is made of, instead of the bodies with these numbers.
     pub(super) cells: Vec<(u32, Polytope)>,
-    /// How many there are.
-    tubes: usize,
     /// Of every segment that others follow.
     stretches: Vec<Option<Stretch>>,
 }
@@ -238,16 +236,14 @@ impl Shell {
 impl Bend {
     /// The planes that the wedge's body is cut by.
     pub(super) fn cuts(&self) -> [Plane; 2] {
-        let [[a, b, c], [d, e, f]] = self.ways;
-        let along = self.ways.map(|way| dot(&way, &self.at));
-        [[-a, -b, -c, self.beyond - along[0]], [d, e, f, along[1] + self.beyond]]
+        let [a, b] = self.ways;
+        [a.map(|part| -part), b].map(|normal| beyond_place(normal, &self.at, self.beyond))
     }
 
     /// The plane that the body of one of the segments is cut by at a mitre.
     pub(super) fn mitre(&self, which: usize) -> Plane {
         let middle = self.middle();
-        let [a, b, c] = if which == 0 { middle } else { middle.map(|part| -part) };
-        [a, b, c, dot(&[a, b, c], &self.at) + self.beyond]
+        beyond_place(if which == 0 { middle } else { middle.map(|part| -part) }, &self.at, self.beyond)
     }
 
     /// The unit vector halfway between both ways.
@@ -309,13 +305,14 @@ impl Tubes {
         }
         for (chain, is_ring) in chains(&links) {
             let turns = chain.iter().filter_map(|&(rod, entered)| Some(links[rod as usize][1 - entered]?.turn));
+            let shell = shell(&sites[chain[0].0 as usize]);
             let course = Course {
                 sites,
                 ways: chain.iter().map(|&(rod, entered)| way(&sites[rod as usize], entered)).collect(),
                 turns: turns.collect(),
-                shell: shell(&sites[chain[0].0 as usize]),
+                shell,
                 is_ring,
-                noise: slack / shell(&sites[chain[0].0 as usize]).outer,
+                noise: slack / shell.outer,
                 chain,
             };
             for part in course.parts() {
@@ -385,8 +382,6 @@ impl Tubes {
             strips[(corner + covering.belt - 1) % covering.belt] = strips[corner];
         }
         let mut frame = [*first, cross(&ways[0], first), ways[0]];
-        let tube = self.tubes;
-        self.tubes += 1;
         let first_bend = self.bends.len();
         for (place, &(rod, entered)) in chain.iter().enumerate() {
             let bend = |place: usize| (place < bends).then_some(first_bend + place);
@@ -401,7 +396,7 @@ impl Tubes {
                 strips: if is_reversed { strips.iter().rev().copied().collect() } else { strips.clone().into() },
                 is_cut: [false; 2],
                 bends: [bend(if place > 0 { place - 1 } else { last }), bend(place)],
-                tube,
+                tube: chain[0].0,
                 place: 2 * place,
             });
             if place < bends {
@@ -465,7 +460,7 @@ impl Tubes {
     }
 
     /// The tube of a figure, and its place there: wedges are between segments.
-    fn place(&self, figure: u32) -> Option<(usize, usize)> {
+    fn place(&self, figure: u32) -> Option<(u32, usize)> {
         let place = |rod: &Rod| (rod.tube, rod.place);
         match self.wedge(figure) {
             Some(bend) => self.rod(self.bends[bend].rods[0]).map(place).map(|(tube, place)| (tube, place + 1)),
@@ -538,9 +533,9 @@ impl Tubes {
             let found = near.of(*index).iter().filter(|other| before(other).is_some() && meets(other)).filter_map(before);
             found.map(|(theirs, own)| (own, theirs.1, *index)).collect::<Vec<_>>()
         };
-        let mut crossings: Vec<((usize, usize), usize, u32)> = self.cells.par_iter().flat_map_iter(crossings).collect();
+        let mut crossings: Vec<((u32, usize), usize, u32)> = self.cells.par_iter().flat_map_iter(crossings).collect();
         crossings.sort_unstable();
-        let (mut found, mut last) = (Loose::new(), (usize::MAX, 0));
+        let (mut found, mut last) = (Loose::new(), (u32::MAX, 0));
         for ((tube, place), before, index) in crossings {
             if last.0 == tube && last.1 > before {
                 continue;
@@ -562,22 +557,13 @@ fn way(figure: &Figure, from: usize) -> Point {
 
 /// For both ends of every figure, the place where only one other segment ends, of the same radius, and both are long enough for what bends take.
 fn links(sites: &[Figure], shell: impl Fn(&Figure) -> Shell) -> Vec<[Option<Link>; 2]> {
-    let mut ends: Vec<(Point, u32, Option<usize>)> = Vec::new();
-    for (site, figure) in (0..).zip(sites) {
-        match figure.outline {
-            Outline::Segment(_) if kind(figure) == Kind::Rod => {
-                ends.extend(ordered(figure).into_iter().enumerate().map(|(end, at)| (at, site, Some(end))));
-            }
-            Outline::Point(_) | Outline::Segment(_) => ends.push((figure.corners()[0], site, None)),
-            Outline::Polygon(_) | Outline::Polyhedron(_) => {}
-        }
-    }
-    ends.sort_unstable_by(|a, b| order(&a.0, &b.0).then(a.1.cmp(&b.1)));
+    let ends = joints::ends(sites);
     let mut links = vec![[None; 2]; sites.len()];
-    for joint in ends.chunk_by(|a, b| a.0 == b.0) {
-        let &[(_, one, Some(own)), (_, other, Some(theirs))] = joint else { continue };
-        let rods = [(one, own), (other, theirs)];
-        let [out, back] = rods.map(|(rod, end)| way(&sites[rod as usize], 1 - end));
+    for joint in ends.chunk_by(|a, b| a.at == b.at) {
+        let [first @ End { site: one, end: Some(own), .. }, second @ End { site: other, end: Some(theirs), .. }] = joint else { continue };
+        let (one, other) = (*one, *other);
+        let rods = [(one, *own), (other, *theirs)];
+        let [out, back] = [first, second].map(|end| joints::outward(sites, end));
         let across = cross(&out, &back);
         let turn = dot(&across, &across).sqrt().atan2(-dot(&out, &back));
         let is_one = sites[one as usize].deficit == sites[other as usize].deficit && one != other;
