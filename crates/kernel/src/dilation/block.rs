@@ -19,14 +19,16 @@ use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::star::{Star, Stars, note};
-use super::surface::{BlockSurface, NameMap, Seam, UNNAMED, VertexName};
+use super::star::{Star, Stars, leaf_at, note};
+use super::surface::{BlockSurface, NameHasher, NameMap, Seam, UNNAMED, VertexName};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
 use crate::measure::triangle::{Feature, closest_feature};
 use crate::split_mix::mix;
+use std::collections::HashSet;
+use std::hash::BuildHasherDefault;
 
 /// Cubes along a block's side.
 pub(super) const SIDE: usize = 16;
@@ -137,6 +139,8 @@ pub(super) struct Workshop<'a> {
     corners: Vec<u32>,
     numbers: Vec<u32>,
     critical: Critical,
+    /// Cubes of the block that are to be subdivided.
+    to_subdivide: HashSet<Cube, BuildHasherDefault<NameHasher>>,
     stars: Stars,
     /// The cubes of the sub-block that are looked at, by their offset from its first.
     cubes: Vec<[i64; 3]>,
@@ -180,6 +184,7 @@ impl<'a> Workshop<'a> {
             corners: Vec::new(),
             numbers: Vec::new(),
             critical: Critical::default(),
+            to_subdivide: HashSet::default(),
             stars: Stars::default(),
             cubes: Vec::new(),
             leaves: Vec::new(),
@@ -199,6 +204,7 @@ impl<'a> Workshop<'a> {
     ) {
         self.values.iter_mut().for_each(|values| values.fill(NOTHING));
         self.fine.clear();
+        self.to_subdivide.clear();
         self.names.clear();
         self.names.extend(surface.names.iter().zip(0..).filter(|&(&name, _)| name != UNNAMED).map(|(&name, number)| (name, number)));
         self.seed = None;
@@ -345,6 +351,12 @@ impl<'a> Workshop<'a> {
                 let mut near = std::mem::take(&mut self.near);
                 self.tree.gather(&middle, starts, setting.sight + half, &mut near);
                 self.near = near;
+            }
+            // The triangles of a cube that is to be subdivided will not be there again.
+            if !self.to_subdivide.is_empty()
+                && leaf_at(setting, grading, &surface.vertices[vertex as usize]).is_some_and(|leaf| self.to_subdivide.contains(&leaf))
+            {
+                continue;
             }
             let star = &mut self.stars.star;
             star.reset(setting, surface.vertices[vertex as usize]);
@@ -547,8 +559,13 @@ impl<'a> Workshop<'a> {
             // The solid's other parts lie in what sites cover.
             return;
         }
-        let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
-        self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), &rest, surface);
+        // A tetrahedron of a cube that is to be subdivided will not be there again.
+        if self.to_subdivide.is_empty() || !frame.cubes().any(|cube| self.to_subdivide.contains(&cube)) {
+            let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
+            let known = surface.critical.len();
+            self.critical.search(setting, &self.tree, &frame, smooth, &self.nearby, self.outside.corners(), &rest, surface);
+            self.to_subdivide.extend(&surface.critical[known..]);
+        }
         if frame.covered == 0 {
             return;
         }

@@ -1,6 +1,7 @@
 //! Simplification of a closed surface that no lattice divides: space is halved until few triangles are in each part, the parts are simplified side by side, and then what lies between them, part by part again.
 //!
-//! A part has all triangles whose boxes meet its own. It changes triangles only that are inside with all corners: no other part has these.
+//! A part has all triangles whose boxes meet its own. It changes triangles only that are inside with all corners: no other part has these. Vertices stay where they are, so the course must not lift them: other parts know them by
+//! their numbers.
 
 use super::arrangement::Index;
 use super::plan::Setting;

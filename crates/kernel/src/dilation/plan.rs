@@ -708,6 +708,31 @@ mod tests {
         assert_eq!((made.crossings, made.uncertain, made.solid.topology().components), (0, 0, 3));
     }
 
+    /// Two plates of 4 x 4 mm, about two radii apart, on a lattice: all between them is critical, and decided by levels of cubes where it can be.
+    #[test]
+    fn plates_about_two_radii_apart_are_one_or_two_or_in_doubt() {
+        let made = |gap: f64| {
+            let plate = |z: f64| [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(|[x, y]| DVec3::new(x, y, z + 0.01 * x));
+            let shape = Shape::Mesh(PolygonMesh {
+                vertices: [plate(0.0), plate(gap)].concat(),
+                faces: vec![vec![0, 1, 2], vec![0, 2, 3], vec![4, 5, 6], vec![4, 6, 7]],
+                interior: Interior::Surface,
+            });
+            let attractor = Model { name: None, shape }.lower().unwrap().attractor;
+            let (radius, budget) = (Radius::new(1.0).unwrap().mm(), Budget::default());
+            let plan = Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.1).unwrap(), true, &budget).unwrap();
+            let setting = plan.setting(plan.pitch, &budget);
+            let made = plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap();
+            (made.uncertain > 0, made.topology_exact, made.solid.topology().components)
+        };
+        // The plates are tilted: their distance is gap / sqrt(1 + 0.01^2).
+        let radii = |share: f64| 2.0 * share * (1.0 + 1e-4_f64).sqrt();
+        assert_eq!(made(radii(0.99)), (false, true, 1));
+        assert_eq!(made(radii(1.01)), (false, true, 2));
+        let (in_doubt, is_exact, _) = made(radii(1.0));
+        assert!(in_doubt && !is_exact);
+    }
+
     #[test]
     fn shells_no_larger_than_rounding_go_and_may_be_in_doubt() {
         // Beyond one rod: nothing there could be a void.

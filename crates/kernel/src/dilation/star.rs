@@ -263,11 +263,20 @@ impl Stars {
 
 /// Notes the leaf that holds a place as one to be subdivided, or the place as uncertain where no leaf is smaller.
 pub(super) fn note(setting: &Setting, grading: &Grading, place: &Point, critical: &mut Vec<Cube>, uncertain: &mut Vec<Cube>) {
-    let within = std::array::from_fn(|axis| (place[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
-    match (0..LEVELS).map(|level| Cube::containing(level, within)).find(|&cube| !grading.is_subdivided(cube)) {
+    match leaf_at(setting, grading, place) {
         Some(leaf) => critical.push(leaf),
-        None => uncertain.push(Cube::containing(0, within)),
+        None => uncertain.push(Cube::containing(0, within(setting, place))),
     }
+}
+
+/// The leaf that holds a place, unless it is as small as may be.
+pub(super) fn leaf_at(setting: &Setting, grading: &Grading, place: &Point) -> Option<Cube> {
+    (0..LEVELS).map(|level| Cube::containing(level, within(setting, place))).find(|&cube| !grading.is_subdivided(cube))
+}
+
+/// A place in units of the pitch.
+fn within(setting: &Setting, place: &Point) -> Point {
+    std::array::from_fn(|axis| (place[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch)
 }
 
 impl Scratch {
