@@ -139,7 +139,7 @@ pub(super) struct Workshop<'a> {
     corners: Vec<u32>,
     numbers: Vec<u32>,
     critical: Critical,
-    /// Cubes of the block that are to be subdivided.
+    /// Cubes to subdivide that the search in the block's tetrahedra has noted.
     to_subdivide: HashSet<Cube, BuildHasherDefault<NameHasher>>,
     stars: Stars,
     /// The cubes of the sub-block that are looked at, by their offset from its first.
@@ -352,7 +352,7 @@ impl<'a> Workshop<'a> {
                 self.tree.gather(&middle, starts, setting.sight + half, &mut near);
                 self.near = near;
             }
-            // The triangles of a cube that is to be subdivided will not be there again.
+            // Nor will the triangles in such a cube: see `tetrahedron`.
             if !self.to_subdivide.is_empty()
                 && leaf_at(setting, grading, &surface.vertices[vertex as usize]).is_some_and(|leaf| self.to_subdivide.contains(&leaf))
             {
@@ -559,7 +559,7 @@ impl<'a> Workshop<'a> {
             // The solid's other parts lie in what sites cover.
             return;
         }
-        // A tetrahedron of a cube that is to be subdivided will not be there again.
+        // A tetrahedron of a cube that is to be subdivided will not be there again; or that cube is counted as uncertain.
         if self.to_subdivide.is_empty() || !frame.cubes().any(|cube| self.to_subdivide.contains(&cube)) {
             let rest: Vec<Point> = self.outside.corners().iter().map(|corner| place(&frame.positions, &corner.weights)).collect();
             let known = surface.critical.len();

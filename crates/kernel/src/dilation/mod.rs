@@ -78,7 +78,7 @@ pub struct Dilation {
     pub bounds: AxisBox,
     /// The least radius: the one asked for, unless parts have their own.
     pub least_radius_mm: f64,
-    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain; without a lattice, sets of sites whose dilations may or may not
+    /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain, as far as they were looked at: others beside them are not; without a lattice, sets of sites whose dilations may or may not
     /// have a common point. Not counted where points stand for cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
     /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`): of points, wires, polygons and solids of these, where nothing was uncertain

@@ -412,6 +412,8 @@ impl<'a> Plan<'a> {
         while !critical.is_empty() {
             let (mut finer, mut new) = (grading.clone(), Vec::new());
             critical.iter().for_each(|&cube| finer.subdivide(cube, &mut new));
+            // A place on a face may be taken for one across, which may be subdivided already.
+            uncertain.extend(critical.iter().filter(|&&cube| grading.is_subdivided(cube)));
             refined += new.len();
             if new.is_empty() || (refined > allowed && !setting.dense) {
                 break;
@@ -708,11 +710,11 @@ mod tests {
         assert_eq!((made.crossings, made.uncertain, made.solid.topology().components), (0, 0, 3));
     }
 
-    /// Two plates of 4 x 4 mm, about two radii apart, on a lattice: all between them is critical, and decided by levels of cubes where it can be.
+    /// Two plates of 12 x 4 mm in several blocks of a lattice, about two radii apart: all between them is critical, and decided by levels of cubes where it can be.
     #[test]
     fn plates_about_two_radii_apart_are_one_or_two_or_in_doubt() {
         let made = |gap: f64| {
-            let plate = |z: f64| [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(|[x, y]| DVec3::new(x, y, z + 0.01 * x));
+            let plate = |z: f64| [[0.0, 0.0], [12.0, 0.0], [12.0, 4.0], [0.0, 4.0]].map(|[x, y]| DVec3::new(x, y, z + 0.01 * x));
             let shape = Shape::Mesh(PolygonMesh {
                 vertices: [plate(0.0), plate(gap)].concat(),
                 faces: vec![vec![0, 1, 2], vec![0, 2, 3], vec![4, 5, 6], vec![4, 6, 7]],
