@@ -19,7 +19,7 @@ use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
 use super::plan::{JUNG, Setting};
 use super::smooth::{self, MOST_NOISE, WHOLE};
-use super::star::{Star, Stars, leaf_at, note};
+use super::star::{Star, Stars, note};
 use super::surface::{BlockSurface, NameHasher, NameMap, Seam, UNNAMED, VertexName};
 use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, with_deficit};
 use crate::attractor::Attractor;
@@ -353,9 +353,9 @@ impl<'a> Workshop<'a> {
                 self.near = near;
             }
             // Nor will the triangles in such a cube: see `tetrahedron`.
-            if !self.to_subdivide.is_empty()
-                && leaf_at(setting, grading, &surface.vertices[vertex as usize]).is_some_and(|leaf| self.to_subdivide.contains(&leaf))
-            {
+            let is_noted = |leaf: Cube| self.to_subdivide.contains(&leaf);
+            let place = &surface.vertices[vertex as usize];
+            if !self.to_subdivide.is_empty() && grading.leaf_at(setting.lattice.within(place)).is_some_and(is_noted) {
                 continue;
             }
             let star = &mut self.stars.star;

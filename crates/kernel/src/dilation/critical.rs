@@ -208,7 +208,7 @@ impl Critical {
                 }
                 continue;
             }
-            let within = std::array::from_fn(|axis| (middle[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch);
+            let within = setting.lattice.within(&middle);
             if frame.level < LEVELS {
                 surface.critical.push(Cube::containing(frame.level, within));
             } else {

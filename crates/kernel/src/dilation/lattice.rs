@@ -126,6 +126,11 @@ impl Grading {
         !self.subdivided.is_empty() && self.subdivided.contains(&cube)
     }
 
+    /// The leaf that holds a place, given in units of the pitch, unless it is as small as may be.
+    pub(super) fn leaf_at(&self, place: Point) -> Option<Cube> {
+        (0..LEVELS).map(|level| Cube::containing(level, place)).find(|&cube| !self.is_subdivided(cube))
+    }
+
     /// The cubes of level 0, `side` along each axis from `first` on, that are leaves and touch leaves of their size only.
     pub(super) fn plain(&self, first: [i64; 3], side: usize) -> Plain {
         let mut plain = Plain { side, touched: Vec::new() };
@@ -233,6 +238,12 @@ impl Lattice {
     #[must_use]
     pub fn corner(&self, index: [i64; 3]) -> Point {
         self.position(index.map(|x| (x * UNITS) as i32))
+    }
+
+    /// A place in units of the pitch.
+    #[inline]
+    pub(super) fn within(&self, place: &Point) -> Point {
+        std::array::from_fn(|axis| (place[axis] - self.origin[axis]) / self.pitch)
     }
 
     /// Position of a vertex. A function of the number alone: every block computes the same bits.

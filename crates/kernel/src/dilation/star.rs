@@ -9,7 +9,7 @@
 
 use super::convex::Convex;
 use super::critical::add_closest;
-use super::lattice::{Cube, Grading, LEVELS};
+use super::lattice::{Cube, Grading};
 use super::parting::{avoids_origin, farthest, parting};
 use super::plan::Setting;
 use super::surface::BlockSurface;
@@ -263,20 +263,11 @@ impl Stars {
 
 /// Notes the leaf that holds a place as one to be subdivided, or the place as uncertain where no leaf is smaller.
 pub(super) fn note(setting: &Setting, grading: &Grading, place: &Point, critical: &mut Vec<Cube>, uncertain: &mut Vec<Cube>) {
-    match leaf_at(setting, grading, place) {
+    let within = setting.lattice.within(place);
+    match grading.leaf_at(within) {
         Some(leaf) => critical.push(leaf),
-        None => uncertain.push(Cube::containing(0, within(setting, place))),
+        None => uncertain.push(Cube::containing(0, within)),
     }
-}
-
-/// The leaf that holds a place, unless it is as small as may be.
-pub(super) fn leaf_at(setting: &Setting, grading: &Grading, place: &Point) -> Option<Cube> {
-    (0..LEVELS).map(|level| Cube::containing(level, within(setting, place))).find(|&cube| !grading.is_subdivided(cube))
-}
-
-/// A place in units of the pitch.
-fn within(setting: &Setting, place: &Point) -> Point {
-    std::array::from_fn(|axis| (place[axis] - setting.lattice.origin[axis]) / setting.lattice.pitch)
 }
 
 impl Scratch {
