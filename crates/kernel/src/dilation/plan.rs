@@ -105,7 +105,7 @@ const MOST_REFINED: usize = 2_000;
 /// Bytes of a cell with its control points, nodes and sites.
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
-const BYTES_PER_TRIANGLE: f64 = 120.0;
+pub(super) const BYTES_PER_TRIANGLE: f64 = 120.0;
 
 impl Setting {
     pub(super) fn new(radius: f64, outer: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
@@ -154,6 +154,11 @@ impl Setting {
     /// The same for sites no place of which is farther than `moved` from those that are meant, nor one of these from them, with more slack for rounding. Tetrahedra do not fit it.
     pub(super) fn narrower(&self, moved: f64, slack: f64) -> Self {
         Self { least: self.least + moved, outer: self.outer - moved, slack, ..self.clone() }
+    }
+
+    /// What the surface may be off d = r at least, inwards and outwards.
+    pub(super) fn half_band(&self) -> f64 {
+        (self.outer - self.reach).min(self.reach - self.least)
     }
 
     /// A squared distance less theta as an integer, never 0.
@@ -464,7 +469,7 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         let Some(Arranged { mut surface, uncertain }) = arrangement.run(budget)? else { return Ok(None) };
-        let (index, narrower) = arrangement.into_index();
+        let (index, narrower, copies) = arrangement.into_index();
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
@@ -474,6 +479,10 @@ impl<'a> Plan<'a> {
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
         patches::simplify(&narrower, &index, core, &mut surface, budget)?;
         drop(index);
+        if copies.triangles(&surface) > allowed {
+            return Err(too_many());
+        }
+        copies.put(&mut surface);
         self.finish(setting, space, surface, uncertain, None, budget).map(Some)
     }
 

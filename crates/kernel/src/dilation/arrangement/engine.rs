@@ -10,7 +10,7 @@ use super::nerve::{Change, Doubt, Sets};
 use super::pieces::{self, Lists};
 use super::polytopes::{self, Cut, Plane, Polytope, Polytopes, Shell};
 use super::tubes::{Loose, Tubes};
-use super::{Arranged, Arrangement};
+use super::{Arranged, Arrangement, Copies};
 use super::{facets, hull};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -94,6 +94,7 @@ pub(super) struct Engine<'a> {
     near: &'a Lists,
     forms: &'a Forms,
     tubes: &'a Tubes,
+    copies: &'a Copies,
     solids: &'a [Inside<'a>],
     pub(super) polytopes: Polytopes,
     states: Vec<State>,
@@ -105,7 +106,7 @@ pub(super) struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     pub(super) fn new(arrangement: &'a Arrangement, trial: u64, solids: &'a [Inside<'a>]) -> Self {
-        let Arrangement { setting, sites, beyond, near, forms, tubes, .. } = arrangement;
+        let Arrangement { setting, sites, beyond, near, forms, tubes, copies, .. } = arrangement;
         let sites = &sites.list;
         Self {
             setting,
@@ -114,6 +115,7 @@ impl<'a> Engine<'a> {
             near,
             forms,
             tubes,
+            copies,
             solids,
             polytopes: Polytopes::default(),
             states: vec![State::default(); sites.len()],
@@ -153,7 +155,9 @@ impl<'a> Engine<'a> {
         let pieces = pieces::find(&self.polytopes, self.near, budget)?;
         let Some(boundary) = facets::boundary(&self.polytopes, pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
-        Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().len() as u64 })))
+        // A set is as often there as its part.
+        let times = |doubt: &Doubt| 1 + self.copies.at(&self.sites[doubt.sites[0] as usize].corners()[0]).len() as u64;
+        Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().iter().map(times).sum() })))
     }
 
     pub(super) fn bodies(&self) -> Bodies<'_> {

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod cells;
+mod copies;
 mod covering;
 mod cubes;
 mod ellipsoid;
@@ -31,7 +32,7 @@ mod tests;
 mod triangulate;
 mod tubes;
 
-use super::plan::Setting;
+use super::plan::{self, Setting};
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
 use crate::attractor::cell::{Cell, ControlPoint, child_points};
@@ -39,6 +40,7 @@ use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
+pub(super) use copies::Copies;
 use engine::{Engine, Forms, Run, State, TRIALS};
 use figure::{Figure, Outline};
 use form::Kind;
@@ -62,6 +64,9 @@ const FLATNESS: f64 = 1.0 / 128.0;
 /// How far places may be off planes and lines that is taken for noise, in units of half the band; how many times more slack is left then, as planes are met up to some roundings only; and what must be left of the figures at most for it to be worth while.
 const NOISE: f64 = 1.0 / 256.0;
 const CLEARED: f64 = 1e3;
+/// What rounding alone moves parts that are alike, as a share of the slack, and what rounding to single precision may be of half the band where they are looked for.
+const ROUNDED: f64 = 1.0 / 32.0;
+const CARRIED: f64 = 1.0 / 16.0;
 const WORTH: f64 = 0.9;
 
 /// Rounds in which bends are given up that leave no room for others; then all are.
@@ -84,6 +89,8 @@ pub(super) struct Arrangement {
     tubes: Tubes,
     /// The ends of segments that are found to be in no bend.
     loose: Loose,
+    /// Where parts were that are like others.
+    copies: Copies,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
@@ -119,27 +126,44 @@ impl Arrangement {
             return Ok(None);
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
-        let Some(sites) = Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget)? else { return Ok(None) };
-        let band = (setting.outer - setting.reach).min(setting.reach - setting.least);
-        let slack = CLEARED * setting.slack;
-        let cleared = noise::cleared(&sites.list, NOISE * band, [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
-        let (error, leaves) = (sites.error, sites.leaves);
-        let (plain, left) = sites.joined(setting, budget)?;
+        let sites = || Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget);
+        let Some(mut kinds) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
+        let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
+        let is_steady = |figures: &[Figure], moved: f64| Steady { figures, radius: setting.reach, moved, solids: &solids }.is_shown(budget);
+        let mut copies = Copies::none();
+        if setting.rounding < CARRIED * setting.half_band() {
+            copies = Copies::leave_out(&mut kinds.list, setting, NOISE * setting.half_band(), budget)?;
+            if copies.moved > ROUNDED * setting.slack && !is_steady(&kinds.list, copies.moved + setting.slack)? {
+                let Some(all) = sites()? else { return Ok(None) };
+                (kinds, copies) = (all, Copies::none());
+            }
+        }
+        let put = if copies.is_empty() { 0.0 } else { copies.moved + setting.rounding };
+        let setting = setting.narrower(put, setting.slack);
+        let slack = CLEARED * setting.slack;
+        let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
+        let (error, leaves) = (kinds.error, kinds.leaves);
+        let (plain, left) = kinds.joined(&setting, budget)?;
+        let mut found = None;
         if let Some(Cleared { figures, moved }) = cleared {
             let narrower = setting.narrower(moved, slack);
             let (clear, left) = Sites { list: figures, error, leaves }.joined(&narrower, budget)?;
             if (clear.list.len() as f64) < WORTH * plain.list.len() as f64
                 && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), budget)?
+                && is_steady(&arrangement.sites.list[..arrangement.tubes.figures], moved + slack)?
             {
-                let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
-                let figures = &arrangement.sites.list[..arrangement.tubes.figures];
-                if (Steady { figures, radius: setting.reach, moved: moved + slack, solids: &solids }).is_shown(budget)? {
-                    return Ok(Some(arrangement));
-                }
+                found = Some(arrangement);
             }
         }
-        Self::of(plain, left, setting.clone(), surfaces, budget)
+        drop(solids);
+        if found.is_none() {
+            found = Self::of(plain, left, setting, surfaces, budget)?;
+        }
+        let with_copies = |arrangement: Self| Self { triangles: copies.share * arrangement.triangles, copies, ..arrangement };
+        // What is put elsewhere only has to be held.
+        let fits = |arrangement: &Self| arrangement.triangles * plan::BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
+        Ok(found.map(with_copies).filter(fits))
     }
 
     /// The arrangement of joined sites, with the share of faces that no polyhedron has, and the surfaces of solids; `None` likewise.
@@ -155,6 +179,7 @@ impl Arrangement {
             forms: Forms::default(),
             tubes: Tubes::default(),
             loose: Loose::new(),
+            copies: Copies::none(),
             polytopes: Polytopes::default(),
             solids,
             inside,
@@ -282,7 +307,7 @@ impl Arrangement {
             drop(engine);
             match run {
                 Run::Done(mut arranged) => {
-                    if !solids::leave_out(&inside, &mut arranged.surface) {
+                    if !solids::leave_out(&inside, &self.copies, &mut arranged.surface) {
                         break;
                     }
                     arranged.surface.leaves = self.sites.leaves;
@@ -308,10 +333,10 @@ impl Arrangement {
         Ok(None)
     }
 
-    /// Its figures, for searches, and its setting.
-    pub(super) fn into_index(mut self) -> (Index, Setting) {
+    /// Its figures, for searches, its setting, and where parts were that are like others.
+    pub(super) fn into_index(mut self) -> (Index, Setting, Copies) {
         self.sites.list.truncate(self.tubes.figures);
-        (Index::new(self.sites.list, self.setting.slack), self.setting)
+        (Index::new(self.sites.list, self.setting.slack), self.setting, self.copies)
     }
 }
 

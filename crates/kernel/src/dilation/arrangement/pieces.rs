@@ -121,7 +121,7 @@ impl Body<'_> {
 }
 
 /// Whether a plane shows that figures are farther from each other than a distance. Alternating projections converge to a closest pair, and the plane across it parts them best.
-fn are_apart(one: &Figure, other: &Figure, distance: f64) -> bool {
+pub(super) fn are_apart(one: &Figure, other: &Figure, distance: f64) -> bool {
     let mut x = one.corners()[0];
     for _ in 0..MOST_PROJECTIONS {
         let y = other.closest(&x);

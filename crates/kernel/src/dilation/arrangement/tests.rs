@@ -504,7 +504,7 @@ fn tetrahedra_are_one_body_each() {
 }
 
 /// The six faces of a block between two corners, outwards, with its corners from a number on.
-fn block(first: u32, low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+pub(super) fn block(first: u32, low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<Vec<u32>>) {
     let corner = |k: u32| low + (high - low) * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     ((0..8).map(corner).collect(), sides.map(|side| side.map(|k| first + k).to_vec()).to_vec())

@@ -1,0 +1,410 @@
+//! Parts of a shape that are alike but for where they are, as those of dusts and of plates full of pieces: one of each kind is thickened, and its surface put where the others are.
+//!
+//! Two figures belong to one part where their dilations by the band's outer end may meet. So no surface depends on what another part has, and none of two parts meet. Let part B have the figures of A, each moved by t but for e at most: then |d_B(x + t) - d_A(x)| <= e, and a surface of A between d = s and d = outer is one
+//! of B, moved by t, between s - e and outer + e. Rounding to single precision adds what it moves. The topology is that of B where rounding alone makes e, or where that of A's dilation does not change by as much, see `steady`.
+
+use super::figure::{self, Figure};
+use super::pieces::are_apart;
+use crate::attractor::cell::{Point, distance_squared, subtract};
+use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex;
+use crate::dilation::plan::Setting;
+use crate::dilation::surface::{BlockSurface, NameMap};
+use crate::groups::Groups;
+use crate::solid::box_tree::{Box32, BoxTree};
+
+/// Parts with as many figures, about as long, that one is held against.
+const MOST_COMPARED: usize = 64;
+/// How long parts are is told in units of so many allowed deviations: few of those that are alike are told apart.
+const LENGTH_UNIT: f64 = 1024.0;
+/// An offset in these units, as lengths that are given are often round.
+const LENGTH_OFFSET: f64 = 0.318_309_886_183_790_7;
+
+/// Where parts like those that are left were.
+#[derive(Default)]
+pub(in crate::dilation) struct Copies {
+    /// The figures of parts that there were others like, and of each its part, and the box of its dilation.
+    figures: Vec<Figure>,
+    parts: Vec<u32>,
+    boxes: BoxTree,
+    /// The band's outer end, and what is added for rounding.
+    reach: f64,
+    slack: f64,
+    /// Of each of these parts, how far from it the others are.
+    shifts: Vec<Vec<Point>>,
+    /// How far a place of one of them is from that of the part that stands for it, at most.
+    pub(super) moved: f64,
+    /// How many times as many figures there were.
+    pub(super) share: f64,
+}
+
+impl Copies {
+    /// No copies.
+    pub(super) fn none() -> Self {
+        Self { share: 1.0, ..Self::default() }
+    }
+
+    /// Leaves out figures of parts that are like others but for a deviation.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn leave_out(figures: &mut Vec<Figure>, setting: &Setting, deviation: f64, budget: &Budget) -> Result<Self, Stopped> {
+        let (reach, slack) = (setting.outer, setting.slack);
+        let Some(parts) = parts(figures, |figure| figure.in_space(reach) + slack, budget)? else { return Ok(Self::none()) };
+        let mut kinds: NameMap<[i64; 4], Vec<u32>> = NameMap::default();
+        let mut shifts: Vec<Vec<Point>> = vec![Vec::new(); parts.len()];
+        let (mut moved, mut gone) = (0.0_f64, vec![false; figures.len()]);
+        for (number, part) in (0..).zip(&parts) {
+            budget.cancel.check()?;
+            let kind = kinds.entry(kind(figures, part, LENGTH_UNIT * deviation)).or_default();
+            let like = kind.iter().find_map(|&other| {
+                let (shift, off) = shift(figures, &parts[other as usize], part)?;
+                (off <= deviation).then_some((other, shift, off))
+            });
+            if let Some((other, shift, off)) = like {
+                shifts[other as usize].push(shift);
+                moved = moved.max(off);
+                part.iter().for_each(|&figure| gone[figure as usize] = true);
+            } else if kind.len() < MOST_COMPARED {
+                kind.push(number);
+            }
+        }
+        let mut copies = Self { reach, slack, moved, share: figures.len() as f64, ..Self::none() };
+        for (part, shifts) in parts.iter().zip(shifts).filter(|(_, shifts)| !shifts.is_empty()) {
+            copies.figures.extend(part.iter().map(|&figure| figures[figure as usize].clone()));
+            copies.parts.resize(copies.figures.len(), copies.shifts.len() as u32);
+            copies.shifts.push(shifts);
+        }
+        figure::leave_out(figures, gone);
+        copies.share /= figures.len() as f64;
+        let mut boxes = BoxTree::default();
+        boxes.build(copies.figures.len(), |index| Some(copies.figures[index as usize].box_within(copies.reach_of(index))), false);
+        Ok(Self { boxes, ..copies })
+    }
+
+    /// Whether no part is like another.
+    pub(super) fn is_empty(&self) -> bool {
+        self.shifts.is_empty()
+    }
+
+    fn reach_of(&self, figure: u32) -> f64 {
+        self.figures[figure as usize].in_space(self.reach) + self.slack
+    }
+
+    /// How far the parts are that are like the one whose dilation has a place.
+    pub(super) fn at(&self, x: &Point) -> &[Point] {
+        let mut found: &[Point] = &[];
+        if !self.is_empty() {
+            let place = Box32::of(&[*x]);
+            self.boxes.query(&place, 0, |leaf| {
+                let near = self.boxes.items(leaf).iter().zip(self.boxes.boxes(leaf)).filter(|(_, own)| own.meets(&place));
+                for (&index, _) in near {
+                    let reach = self.reach_of(index);
+                    if distance_squared(x, &self.figures[index as usize].closest(x)) <= reach * reach {
+                        found = &self.shifts[self.parts[index as usize] as usize];
+                    }
+                }
+                found.is_empty()
+            });
+        }
+        found
+    }
+
+    /// Of every vertex of a surface the group that it hangs together with, and of every group, by its least vertex, how far the parts are that are like its own.
+    fn surfaces(&self, surface: &BlockSurface) -> (Vec<u32>, Vec<&[Point]>) {
+        let groups = Groups::of_triangles(surface.vertices.len(), &surface.triangles).all();
+        let of = |(vertex, &group): (u32, &u32)| if vertex == group { self.at(&surface.vertices[vertex as usize]) } else { &[] };
+        let shifts = (0..).zip(&groups).map(of).collect();
+        (groups, shifts)
+    }
+
+    /// How many triangles a surface has with those of the parts that were left out.
+    pub(in crate::dilation) fn triangles(&self, surface: &BlockSurface) -> u64 {
+        if self.is_empty() {
+            return surface.triangles.len() as u64;
+        }
+        let (groups, shifts) = self.surfaces(surface);
+        surface.triangles.iter().map(|triangle| 1 + shifts[groups[triangle[0] as usize] as usize].len() as u64).sum()
+    }
+
+    /// Puts the surfaces of parts where the others like them are, too, with coordinates in single precision.
+    pub(in crate::dilation) fn put(&self, surface: &mut BlockSurface) {
+        if self.is_empty() {
+            return;
+        }
+        let (groups, shifts) = self.surfaces(surface);
+        let group = |vertex: u32| groups[vertex as usize];
+        let has_others = |vertex: u32| !shifts[group(vertex) as usize].is_empty();
+        let mut vertices: Vec<u32> = (0..groups.len() as u32).filter(|&vertex| has_others(vertex)).collect();
+        let mut triangles: Vec<[u32; 3]> = surface.triangles.iter().copied().filter(|triangle| has_others(triangle[0])).collect();
+        vertices.sort_by_key(|&vertex| group(vertex));
+        triangles.sort_by_key(|triangle| group(triangle[0]));
+        let (mut numbers, mut rest) = (vec![0; groups.len()], &triangles[..]);
+        for own in vertices.chunk_by(|&a, &b| group(a) == group(b)) {
+            (0..).zip(own).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
+            let (now, later) = rest.split_at(rest.partition_point(|triangle| group(triangle[0]) <= group(own[0])));
+            rest = later;
+            for shift in shifts[group(own[0]) as usize] {
+                let first = surface.vertices.len() as u32;
+                for &vertex in own {
+                    let from = surface.vertices[vertex as usize];
+                    surface.vertices.push(std::array::from_fn(|axis| f64::from((from[axis] + shift[axis]) as f32)));
+                }
+                surface.triangles.extend(now.iter().map(|triangle| triangle.map(|corner| first + numbers[corner as usize])));
+            }
+        }
+    }
+}
+
+/// The figures of every part, each in ascending order, given how far their dilations reach; none where there is one part only.
+fn parts(figures: &[Figure], reach: impl Fn(&Figure) -> f64, budget: &Budget) -> Result<Option<Vec<Vec<u32>>>, Stopped> {
+    let mut groups = Groups::new(figures.len());
+    let mut left = figures.len();
+    // Most shapes hang together by their corners.
+    let mut corners: NameMap<[u64; 3], usize> = NameMap::default();
+    for (index, figure) in figures.iter().enumerate() {
+        for corner in figure.corners() {
+            let first = *corners.entry(corner.map(f64::to_bits)).or_insert(index);
+            left -= usize::from(groups.join(first, index));
+        }
+    }
+    if left < 2 {
+        return Ok(None);
+    }
+    let boxes: Vec<Box32> = figures.iter().map(|figure| figure.box_within(reach(figure))).collect();
+    let mut tree = BoxTree::default();
+    tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
+    for (index, (figure, own)) in figures.iter().zip(&boxes).enumerate() {
+        budget.cancel.check()?;
+        tree.query(own, 0, |leaf| {
+            for (&item, theirs) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
+                let (item, other) = (item as usize, &figures[item as usize]);
+                if item < index
+                    && own.meets(theirs)
+                    && groups.of(item) != groups.of(index)
+                    && !are_apart(figure, other, reach(figure) + reach(other))
+                {
+                    left -= usize::from(groups.join(item, index));
+                }
+            }
+            true
+        });
+    }
+    if left < 2 {
+        return Ok(None);
+    }
+    let mut parts: Vec<Vec<u32>> = Vec::with_capacity(left);
+    let mut numbers = vec![0; figures.len()];
+    for (index, group) in groups.all().into_iter().enumerate() {
+        // The least of a group comes first.
+        if group as usize == index {
+            numbers[index] = parts.len();
+            parts.push(Vec::new());
+        }
+        parts[numbers[group as usize]].push(index as u32);
+    }
+    Ok(Some(parts))
+}
+
+/// What parts that are alike have in common, with lengths in units of `unit`.
+fn kind(figures: &[Figure], part: &[u32], unit: f64) -> [i64; 4] {
+    let corners = |&figure: &u32| figures[figure as usize].corners();
+    let (first, last) = (part.first().map(corners).unwrap_or_default(), part.last().map(corners).unwrap_or_default());
+    let way = |axis: usize| last.last().zip(first.first()).map_or(0.0, |(to, from)| to[axis] - from[axis]);
+    let length = |axis: usize| (way(axis) / unit + LENGTH_OFFSET).floor() as i64;
+    [part.len() as i64, length(0), length(1), length(2)]
+}
+
+/// How far a part is from another with figures like its own, one by one, and how far corners of both are from each other then, at most.
+fn shift(figures: &[Figure], from: &[u32], to: &[u32]) -> Option<(Point, f64)> {
+    let pairs = from.iter().zip(to).map(|(&own, &theirs)| (&figures[own as usize], &figures[theirs as usize]));
+    let shift = pairs.clone().next().map(|(own, theirs)| subtract(&theirs.corners()[0], &own.corners()[0]))?;
+    let mut square = 0.0_f64;
+    for (own, theirs) in pairs {
+        let (own, deficits) = (own.corners(), [own.deficit, theirs.deficit].map(f64::to_bits));
+        if own.len() != theirs.corners().len() || deficits[0] != deficits[1] {
+            return None;
+        }
+        for (own, theirs) in own.iter().zip(theirs.corners()) {
+            square = square.max(distance_squared(&subtract(theirs, &shift), own));
+        }
+    }
+    (from.len() == to.len()).then_some((shift, square.sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Arrangement;
+    use super::super::tests::{arranged, block, lowered_as, plan, topology};
+    use super::*;
+    use crate::dilation::{Dilation, DilationError, dilate};
+    use crate::model::{self, Group, Interior, Model, Part, PolygonMesh};
+    use crate::solid::Inside;
+    use crate::split_mix::Random;
+    use crate::tolerance::{Radius, Tolerance};
+    use glam::DVec3;
+
+    const RADIUS: f64 = 1.0;
+
+    /// Cells over vertices of their own.
+    #[derive(Clone, Default)]
+    struct Shape {
+        vertices: Vec<DVec3>,
+        faces: Vec<Vec<u32>>,
+        interior: Interior,
+    }
+
+    impl Shape {
+        /// Some points, segments or triangles in a cube of 3 mm, or a block.
+        fn random(random: &mut Random) -> Self {
+            let mut shape = Self::default();
+            let kind = random.next() % 4;
+            if kind == 3 {
+                let high = DVec3::from_array(std::array::from_fn(|_| 1.0 + 2.0 * random.share()));
+                let (vertices, faces) = block(0, DVec3::ZERO, high);
+                return Self { vertices, faces, interior: Interior::Solid };
+            }
+            for _ in 0..1 + random.next() % 5 {
+                let first = shape.vertices.len() as u32;
+                shape.faces.push((0..=kind as u32).map(|corner| first + corner).collect());
+                shape.vertices.extend((0..=kind).map(|_| 3.0 * DVec3::from_array(std::array::from_fn(|_| random.share()))));
+            }
+            shape
+        }
+
+        fn add(&mut self, other: &Self, mut to: impl FnMut(DVec3) -> DVec3) {
+            let first = self.vertices.len() as u32;
+            self.vertices.extend(other.vertices.iter().map(|&vertex| to(vertex)));
+            self.faces.extend(other.faces.iter().map(|face| face.iter().map(|corner| first + corner).collect()));
+        }
+
+        fn attractor(&self) -> crate::attractor::Attractor {
+            lowered_as(self.interior, &self.vertices, self.faces.clone()).unwrap()
+        }
+
+        /// How many sites are left without copies, and how far these are from each other.
+        fn left(&self) -> (usize, f64) {
+            let attractor = self.attractor();
+            let (plan, budget) = (plan(&attractor, RADIUS, 0.1), Budget::default());
+            let setting = plan.setting(plan.pitch(), &budget);
+            let made = Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap();
+            (made.sites.list.len(), made.copies.moved)
+        }
+
+        fn distance(&self, x: &Point) -> f64 {
+            let corner = |&corner: &u32| self.vertices[corner as usize].to_array();
+            let of = |face: &Vec<u32>| {
+                let corners: Vec<Point> = face.iter().map(corner).collect();
+                // Faces of blocks are rectangles.
+                (2..corners.len().max(3))
+                    .map(|k| {
+                        let triangle = [0, k - 1, k].map(|k| corners[k.min(corners.len() - 1)]);
+                        let [a, b, c] = &triangle;
+                        distance_squared(x, &crate::measure::triangle::closest_on_triangle(x, a, b, c))
+                    })
+                    .fold(f64::INFINITY, f64::min)
+            };
+            self.faces.iter().map(of).fold(f64::INFINITY, f64::min).sqrt()
+        }
+    }
+
+    /// Asserts that vertices and places near the sites are where the bounds say.
+    fn assert_bounds(case: &str, shape: &Shape, made: &Dilation, random: &mut Random) {
+        let (least, most) = (RADIUS - made.inner_mm, RADIUS + made.outer_mm);
+        for vertex in &made.solid.mesh().vertices {
+            let d = shape.distance(&vertex.to_array());
+            assert!(least <= d && d <= most, "{case}: {vertex} is {d} from the sites");
+        }
+        let inside = Inside::new(made.solid.mesh());
+        for _ in 0..200 {
+            let near = shape.vertices[(random.next() % shape.vertices.len() as u64) as usize];
+            let x = near + 2.0 * DVec3::from_array(std::array::from_fn(|_| 2.0 * random.share() - 1.0));
+            let d = shape.distance(&x.to_array());
+            assert!(d > least || inside.winding(x) == 1, "{case}: {x} is {d} from the sites");
+            assert!(d < most || shape.interior == Interior::Solid || inside.winding(x) == 0, "{case}: {x} is {d} from the sites");
+        }
+    }
+
+    /// Points, wires, panels and blocks, several times each: exactly, rounded to single precision, and with noise. As many pieces, handles and voids as all of them alone, within the bounds of what was given; one of each is thickened but where noise is more than may be taken for it.
+    #[test]
+    fn parts_that_are_alike_are_thickened_once() {
+        let mut random = Random(5);
+        let (mut left_out, mut noisy) = (0, 0);
+        for round in 0..40 {
+            let (mut all, mut expected, mut sites) = (Shape::default(), (0, 0, 0), 0);
+            for kind in 0..2 {
+                let one = Shape::random(&mut random);
+                if kind > 0 && one.interior != all.interior {
+                    continue;
+                }
+                all.interior = one.interior;
+                let (components, cavities, euler) = topology(&arranged(&one.attractor(), RADIUS, 0.1));
+                sites += one.left().0;
+                for _ in 0..2 + random.next() % 4 {
+                    let number = (all.vertices.len() + kind) as f64;
+                    let to = DVec3::new(6.0 * number, 3.0 * random.share(), 5.0 * random.share()) + 0.1;
+                    let mut by = |most: f64| most * (2.0 * random.share() - 1.0);
+                    all.add(&one, |x| match round % 4 {
+                        0 => x + to,
+                        1 => (x + to).as_vec3().as_dvec3(),
+                        2 => x + to + DVec3::new(by(3e-5), by(3e-5), by(3e-5)),
+                        _ => x + to + DVec3::new(by(0.01), by(0.01), by(0.01)),
+                    });
+                    expected = (expected.0 + components, expected.1 + cavities, expected.2 + euler);
+                }
+            }
+            let made = arranged(&all.attractor(), RADIUS, 0.1);
+            if round % 4 < 3 {
+                assert_eq!((topology(&made), made.topology_exact, made.crossings), (expected, true, 0), "{round}");
+                let (left, moved) = all.left();
+                left_out += usize::from(left == sites);
+                noisy += usize::from(moved > 1e-8);
+                assert!(moved < 2e-4, "{round}: {moved}");
+            } else {
+                assert!(all.left().1 < 2e-4, "{round}");
+            }
+            assert!(made.inner_mm.max(made.outer_mm) <= 0.1);
+            assert_bounds(&round.to_string(), &all, &made, &mut random);
+        }
+        assert!(left_out > 25 && noisy > 12, "{left_out} of 30 left out, {noisy} with noise");
+    }
+
+    /// A wire inside of a block, and one like it beside: what is inside is filled, and what is beside stays.
+    #[test]
+    fn parts_inside_of_others_are_no_copies() {
+        let part = |interior: Interior, (vertices, faces): (Vec<DVec3>, Vec<Vec<u32>>)| {
+            let shape = model::Shape::Mesh(PolygonMesh { vertices, faces, interior });
+            Part { name: None, transform: None, shape, radius: None }
+        };
+        let wire = |at: DVec3| part(Interior::Surface, (vec![at, at + DVec3::X], vec![vec![0, 1]]));
+        for (places, expected) in [([[6.0; 3], [30.0; 3]], (2, 0, 4)), ([[20.0; 3], [30.0; 3]], (3, 0, 6))] {
+            let [first, second] = places.map(|at| wire(DVec3::from_array(at)));
+            let parts = vec![first, second, part(Interior::Solid, block(0, DVec3::ZERO, DVec3::splat(12.0)))];
+            let shape = model::Shape::Group(Group { parts, joins: Vec::new() });
+            let attractor = Model { name: None, shape }.lower().unwrap().attractor;
+            let budget = Budget::default();
+            let made = dilate(&attractor, Radius::new(RADIUS).unwrap(), Tolerance::new(0.1).unwrap(), &budget).unwrap();
+            assert_eq!((topology(&made), made.topology_exact, made.crossings), (expected, true, 0));
+        }
+    }
+
+    /// What is put elsewhere counts.
+    #[test]
+    fn copies_count_against_the_limit() {
+        let mut shape = Shape::default();
+        let one = Shape { vertices: vec![DVec3::ZERO], faces: vec![vec![0]], ..Shape::default() };
+        (0..100).for_each(|k| shape.add(&one, |_| DVec3::new(f64::from(k % 10), f64::from(k / 10), 0.0) * 4.0));
+        let attractor = shape.attractor();
+        let mut budget = Budget::default();
+        let made = arranged(&attractor, RADIUS, 0.1);
+        assert_eq!(topology(&made), (100, 0, 200));
+        let triangles = made.solid.mesh().triangles.len() as u64;
+        let limited = |allowed: u64| {
+            budget.limits.triangles = allowed;
+            let plan = plan(&attractor, RADIUS, 0.1);
+            let setting = plan.setting(plan.pitch(), &budget);
+            plan.arranged(&setting, &plan.space(&setting), &budget).map(|made| made.is_some())
+        };
+        assert!(matches!([triangles - 1, triangles].map(limited), [Err(DilationError::Triangles { .. }), Ok(true)]));
+    }
+}
