@@ -1,6 +1,6 @@
 //! Pitch, thresholds and bounds of a dilation.
 
-use super::arrangement::{self, Arranged, Arrangement};
+use super::arrangement::{self, Arranged, Arrangement, Copies};
 use super::assemble::Assembly;
 use super::block::{self, WITNESS};
 use super::dust;
@@ -20,7 +20,7 @@ use crate::attractor::sites::{SiteError, SiteRule};
 use crate::automaton::LeafPrimitive;
 use crate::budget::Budget;
 use crate::measure::bounds::{AxisBox, bounding_box};
-use crate::solid::mend::mend;
+use crate::solid::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
 use crate::tolerance::Tolerance;
 use glam::DVec3;
@@ -159,6 +159,12 @@ impl Setting {
     /// What the surface may be off d = r at least, inwards and outwards.
     pub(super) fn half_band(&self) -> f64 {
         (self.outer - self.reach).min(self.reach - self.least)
+    }
+
+    /// What all coordinates in single precision are multiples of that are as large as the shape's: half of it along each axis is no more than `rounding`.
+    pub(super) fn unit(&self) -> f64 {
+        let extent = self.rounding / rounding(1.0);
+        extent.log2().ceil().exp2() / f64::from(1 << f32::MANTISSA_DIGITS)
     }
 
     /// A squared distance less theta as an integer, never 0.
@@ -437,7 +443,7 @@ impl<'a> Plan<'a> {
         }
         self.prove(setting, site_error, triangles, budget);
         let surface = self.assemble(setting, space, &grading, blocks, budget)?;
-        self.finish(setting, space, surface, uncertain as u64, Some(setting.lattice.pitch), budget)
+        self.finish(setting, space, surface, &Copies::none(), uncertain as u64, Some(setting.lattice.pitch), budget)
     }
 
     /// Holds all blocks against the limits.
@@ -474,7 +480,7 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         self.prove(setting, surface.site_error, surface.triangles.len() as u64, budget);
-        surface.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
+        copies.round(&mut surface);
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };
         patches::simplify(&narrower, &index, core, &mut surface, budget)?;
@@ -482,27 +488,51 @@ impl<'a> Plan<'a> {
         if copies.triangles(&surface) > allowed {
             return Err(too_many());
         }
-        copies.put(&mut surface);
-        self.finish(setting, space, surface, uncertain, None, budget).map(Some)
+        self.finish(setting, space, surface, &copies, uncertain, None, budget).map(Some)
     }
 
-    /// Removes what is no more than rounding, mends what rounding breaks, and proves what is left.
+    /// Removes what is no more than rounding, mends what rounding breaks, puts parts where others like them are, and proves what is left.
     fn finish(
         &self,
         setting: &Setting,
         space: &Space,
-        mut surface: BlockSurface,
+        surface: BlockSurface,
+        copies: &Copies,
         uncertain: u64,
         pitch_mm: Option<f64>,
         budget: &Budget,
     ) -> Result<Dilation, DilationError> {
         let is_proven = !setting.dense && uncertain == 0;
-        let uncertain = uncertain + dust::remove(setting, &self.rule, &space.candidates, is_proven, &mut surface) as u64;
+        let whole = if copies.is_empty() { None } else { Some(surface.alone()) };
+        let mut mended = self.mended(setting, space, is_proven, surface, budget)?;
+        if let Some(mut whole) = whole {
+            if mended.doubtful == 0 && mended.crossings == 0 && copies.are_whole(&mended.surface) {
+                copies.put(&mut mended.surface);
+            } else {
+                // What was moved by steps of single precision is not congruent elsewhere.
+                copies.put(&mut whole);
+                mended = self.mended(setting, space, is_proven, whole, budget)?;
+            }
+        }
+        let Mended { surface, doubtful, crossings } = mended;
+        budget.report("dilate", 1.0, surface.triangles.len() as u64);
+        self.certify(setting, surface, crossings, uncertain + doubtful, pitch_mm, budget)
+    }
+
+    /// A surface without what is no more than rounding, with what rounding broke mended.
+    fn mended(
+        &self,
+        setting: &Setting,
+        space: &Space,
+        is_proven: bool,
+        mut surface: BlockSurface,
+        budget: &Budget,
+    ) -> Result<Mended, DilationError> {
+        let doubtful = dust::remove(setting, &self.rule, &space.candidates, is_proven, &mut surface) as u64;
         let (vertices, triangles) = (std::mem::take(&mut surface.vertices), std::mem::take(&mut surface.triangles));
-        let mended = mend(vertices, triangles, setting.rounding, budget)?;
-        budget.report("dilate", 1.0, mended.triangles.len() as u64);
-        surface = BlockSurface { vertices: mended.points, triangles: mended.triangles, ..surface };
-        self.certify(setting, surface, mended.crossings, uncertain, pitch_mm, budget)
+        let made = mend::mend(vertices, triangles, setting.rounding, budget)?;
+        surface = BlockSurface { vertices: made.points, triangles: made.triangles, ..surface };
+        Ok(Mended { surface, doubtful, crossings: made.crossings })
     }
 
     fn surfaces(
@@ -621,6 +651,15 @@ impl<'a> Plan<'a> {
             topology_exact: !setting.dense && uncertain == 0 && crossings == 0 && site.is_zero(),
         })
     }
+}
+
+/// A surface that was mended.
+struct Mended {
+    surface: BlockSurface,
+    /// Shells that went and may have been the dilation's, see `dust`.
+    doubtful: u64,
+    /// Pairs of triangles that meet elsewhere than they should.
+    crossings: u64,
 }
 
 /// Adds surfaces to those of blocks, in the place of what was there; returns the cubes to subdivide, and adds those where no level tells it to `uncertain`.

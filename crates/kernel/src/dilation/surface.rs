@@ -71,6 +71,12 @@ impl BlockSurface {
         self.pieces.shrink_to_fit();
     }
 
+    /// The same without what only a lattice needs.
+    pub(super) fn alone(&self) -> Self {
+        let (vertices, triangles) = (self.vertices.clone(), self.triangles.clone());
+        Self { vertices, triangles, leaves: self.leaves, site_error: self.site_error, ..Self::default() }
+    }
+
     /// The number of a vertex that other blocks may have, by its name; `shared` is sorted.
     pub(super) fn number_of(&self, name: VertexName) -> Option<u32> {
         let at = self.shared.partition_point(|&(other, _)| other < name);

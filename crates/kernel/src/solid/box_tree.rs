@@ -42,7 +42,7 @@ impl Box32 {
 }
 
 /// Triangles of a leaf at most.
-pub(super) const LEAF: usize = 4;
+const LEAF: usize = 4;
 
 /// The tree: node 1 is the root, 2 i and 2 i + 1 are the children of i, nodes from `leaves` on hold triangles.
 #[derive(Debug, Default)]

@@ -1,13 +1,14 @@
 //! Self-intersections of a triangle mesh, exactly.
 
 use super::TriMesh;
-use super::box_tree::{Box32, BoxTree, LEAF};
+use super::box_tree::{Box32, BoxTree};
 use super::contact;
 use super::mend::Facet;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, CancelToken, Stopped};
 use rayon::prelude::*;
 use std::collections::HashSet;
+use std::ops::Range;
 
 /// Pairs of triangles that meet elsewhere than in corners and edges they share.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -20,8 +21,11 @@ pub struct Crossings {
 
 /// Pairs that are kept.
 const KEPT: usize = 16;
-/// Leaves handled together.
+/// Leaves handled together: by a thread, and with what is near to them.
 const CHUNK: usize = 256;
+const BLOCK: usize = 8;
+/// Others near to these that are looked at at once.
+const MOST_NEAR: usize = 4_096;
 
 impl Crossings {
     /// Looks at all pairs of triangles whose boxes meet: overlaps in a plane and mere contacts count, and so do vertices of different
@@ -51,10 +55,10 @@ impl Crossings {
         }
         let chunks: Vec<Self> = (0..tree.leaves().div_ceil(CHUNK))
             .into_par_iter()
-            .map(|chunk| {
+            .map_init(Near::default, |near, chunk| {
                 let mut found = Self::default();
-                for leaf in chunk * CHUNK..((chunk + 1) * CHUNK).min(tree.leaves()) {
-                    of_leaf(mesh, &tree, leaf, kept, &corners, &mut found, &budget.cancel);
+                for first in (chunk * CHUNK..((chunk + 1) * CHUNK).min(tree.leaves())).step_by(BLOCK) {
+                    near.compare(mesh, &tree, first..(first + BLOCK).min(tree.leaves()), kept, &mut found, &budget.cancel);
                 }
                 found
             })
@@ -70,51 +74,90 @@ impl Crossings {
     }
 }
 
-/// Adds the crossings of a leaf's triangles with those of this and all later leaves, until it is stopped.
-fn of_leaf(
-    mesh: &TriMesh,
-    tree: &BoxTree,
-    leaf: usize,
-    kept: usize,
-    corners: &impl Fn(u32) -> [Point; 3],
-    found: &mut Crossings,
-    cancel: &CancelToken,
-) {
-    if cancel.check().is_err() {
-        return;
+/// Triangles of some leaves, and then others that they may meet, one after the other: most are near to several of the leaves.
+#[derive(Default)]
+struct Near {
+    triangles: Vec<u32>,
+    boxes: Vec<Box32>,
+    corners: Vec<([u32; 3], [Point; 3])>,
+    /// Those near to a leaf.
+    met: Vec<usize>,
+}
+
+impl Near {
+    /// Adds the crossings of some leaves' triangles with those of these and all later leaves, until it is stopped.
+    fn compare(&mut self, mesh: &TriMesh, tree: &BoxTree, leaves: Range<usize>, kept: usize, found: &mut Crossings, cancel: &CancelToken) {
+        let whole = leaves.clone().fold(Box32::EMPTY, |all, leaf| all.union(tree.leaf_box(leaf)));
+        self.keep(0);
+        let mut own: Vec<Range<usize>> = Vec::with_capacity(BLOCK);
+        for leaf in leaves.clone() {
+            let first = self.triangles.len();
+            tree.items(leaf).iter().zip(tree.boxes(leaf)).for_each(|(&triangle, bounds)| self.add(mesh, triangle, bounds));
+            own.push(first..self.triangles.len());
+        }
+        let (count, mut from) = (self.triangles.len(), 0);
+        let mut is_stopped = false;
+        tree.query(&whole, leaves.end, |leaf| {
+            if leaf >= leaves.end {
+                let near = tree.items(leaf).iter().zip(tree.boxes(leaf)).filter(|(_, bounds)| whole.meets(bounds));
+                near.for_each(|(&triangle, bounds)| self.add(mesh, triangle, bounds));
+            }
+            // Where everything overlaps, some leaves have as many others as there are.
+            if self.triangles.len() >= count + MOST_NEAR {
+                is_stopped = cancel.check().is_err();
+                self.look(tree, leaves.start, &own, from, kept, found);
+                self.keep(count);
+                from = count;
+            }
+            !is_stopped
+        });
+        if !is_stopped && cancel.check().is_ok() {
+            self.look(tree, leaves.start, &own, from, kept, found);
+        }
     }
-    let mut note = |a: u32, b: u32| {
-        found.count += 1;
-        if found.first.len() < kept {
-            found.first.push([a.min(b), a.max(b)]);
-        }
-    };
-    for &triangle in tree.items(leaf) {
-        if contact::is_flat(&corners(triangle)) {
-            note(triangle, triangle);
-        }
+
+    /// Forgets all but some.
+    fn keep(&mut self, count: usize) {
+        self.triangles.truncate(count);
+        self.boxes.truncate(count);
+        self.corners.truncate(count);
     }
-    // Most pairs are neighbours that a plane parts, which is found faster than the signs of determinants.
-    let facets: [Option<Facet>; LEAF] =
-        std::array::from_fn(|k| tree.items(leaf).get(k).map(|&own| Facet::new(mesh.triangles[own as usize], corners(own))));
-    tree.query(tree.leaf_box(leaf), leaf, |other| {
-        if other < leaf {
-            return true;
-        }
-        for (place, ((&a, own_box), facet)) in tree.items(leaf).iter().zip(tree.boxes(leaf)).zip(facets.iter().flatten()).enumerate() {
-            let first = if other == leaf { place + 1 } else { 0 };
-            for (&b, b_box) in tree.items(other).iter().zip(tree.boxes(other)).skip(first) {
-                if !own_box.meets(b_box) {
-                    continue;
+
+    fn add(&mut self, mesh: &TriMesh, triangle: u32, bounds: &Box32) {
+        let corners = mesh.triangles[triangle as usize];
+        self.triangles.push(triangle);
+        self.boxes.push(*bounds);
+        self.corners.push((corners, corners.map(|corner| mesh.vertices[corner as usize].to_array())));
+    }
+
+    /// Adds the crossings of the leaves' own triangles, leaf by leaf, with later ones that are there from some place on.
+    fn look(&mut self, tree: &BoxTree, first: usize, own: &[Range<usize>], from: usize, kept: usize, found: &mut Crossings) {
+        let Self { triangles, boxes, corners, met } = self;
+        let mut note = |a: usize, b: usize| {
+            found.count += 1;
+            if found.first.len() < kept {
+                let pair = [triangles[a], triangles[b]];
+                found.first.push([pair[0].min(pair[1]), pair[0].max(pair[1])]);
+            }
+        };
+        for (leaf, own) in (first..).zip(own) {
+            let whole = tree.leaf_box(leaf);
+            met.clear();
+            met.extend((from.max(own.start)..triangles.len()).filter(|&other| whole.meets(&boxes[other])));
+            for a in own.clone() {
+                if from == 0 && contact::is_flat(&corners[a].1) {
+                    note(a, a);
                 }
-                let (names, points) = ([&mesh.triangles[a as usize], &mesh.triangles[b as usize]], corners(b));
-                let is_copy = names[1].iter().all(|corner| names[0].contains(corner));
-                if is_copy || (!facet.parts(names[1], &points) && contact::meet(names, [&corners(a), &points])) {
-                    note(a, b);
+                // Most pairs are neighbours that a plane parts, which is found faster than the signs of determinants.
+                let facet = Facet::new(corners[a].0, corners[a].1);
+                for &b in met.iter().filter(|&&b| b > a && boxes[a].meets(&boxes[b])) {
+                    let (names, points) = &corners[b];
+                    let is_copy = names.iter().all(|corner| corners[a].0.contains(corner));
+                    if is_copy || (!facet.parts(names, points) && contact::meet([&corners[a].0, names], [&corners[a].1, points])) {
+                        note(a, b);
+                    }
                 }
             }
         }
-        // Where everything overlaps, a leaf alone has as many others as there are.
-        cancel.check().is_ok()
-    });
+    }
 }

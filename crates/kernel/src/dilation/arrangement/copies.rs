@@ -1,7 +1,9 @@
 //! Parts of a shape that are alike but for where they are, as those of dusts and of plates full of pieces: one of each kind is thickened, and its surface put where the others are.
 //!
 //! Two figures belong to one part where their dilations by the band's outer end may meet. So no surface depends on what another part has, and none of two parts meet. Let part B have the figures of A, each moved by t but for e at most: then |d_B(x + t) - d_A(x)| <= e, and a surface of A between d = s and d = outer is one
-//! of B, moved by t, between s - e and outer + e. Rounding to single precision adds what it moves. The topology is that of B where rounding alone makes e, or where that of A's dilation does not change by as much, see `steady`.
+//! of B, moved by t, between s - e and outer + e. The topology is that of B where rounding alone makes e, or where that of A's dilation does not change by as much, see `steady`.
+//!
+//! All coordinates are whole multiples of one unit, and so are ways between parts, but for half a unit that e has, too: up to the shape's extent single precision holds such numbers exactly. So what is put elsewhere is congruent with what was made, and meets itself where that does.
 
 use super::figure::{self, Figure};
 use super::pieces::are_apart;
@@ -32,7 +34,9 @@ pub(in crate::dilation) struct Copies {
     slack: f64,
     /// Of each of these parts, how far from it the others are.
     shifts: Vec<Vec<Point>>,
-    /// How far a place of one of them is from that of the part that stands for it, at most.
+    /// What coordinates and ways are multiples of.
+    unit: f64,
+    /// How far a place of one of them is from that of the part that stands for it, at most, but for this unit.
     pub(super) moved: f64,
     /// How many times as many figures there were.
     pub(super) share: f64,
@@ -40,7 +44,7 @@ pub(in crate::dilation) struct Copies {
 
 impl Copies {
     /// No copies.
-    pub(super) fn none() -> Self {
+    pub(in crate::dilation) fn none() -> Self {
         Self { share: 1.0, ..Self::default() }
     }
 
@@ -49,7 +53,7 @@ impl Copies {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn leave_out(figures: &mut Vec<Figure>, setting: &Setting, deviation: f64, budget: &Budget) -> Result<Self, Stopped> {
-        let (reach, slack) = (setting.outer, setting.slack);
+        let (reach, slack, unit) = (setting.outer, setting.slack, setting.unit());
         let Some(parts) = parts(figures, |figure| figure.in_space(reach) + slack, budget)? else { return Ok(Self::none()) };
         let mut kinds: NameMap<[i64; 4], Vec<u32>> = NameMap::default();
         let mut shifts: Vec<Vec<Point>> = vec![Vec::new(); parts.len()];
@@ -62,14 +66,14 @@ impl Copies {
                 (off <= deviation).then_some((other, shift, off))
             });
             if let Some((other, shift, off)) = like {
-                shifts[other as usize].push(shift);
+                shifts[other as usize].push(shift.map(|x| whole(x, unit)));
                 moved = moved.max(off);
                 part.iter().for_each(|&figure| gone[figure as usize] = true);
             } else if kind.len() < MOST_COMPARED {
                 kind.push(number);
             }
         }
-        let mut copies = Self { reach, slack, moved, share: figures.len() as f64, ..Self::none() };
+        let mut copies = Self { reach, slack, unit, moved, share: figures.len() as f64, ..Self::none() };
         for (part, shifts) in parts.iter().zip(shifts).filter(|(_, shifts)| !shifts.is_empty()) {
             copies.figures.extend(part.iter().map(|&figure| figures[figure as usize].clone()));
             copies.parts.resize(copies.figures.len(), copies.shifts.len() as u32);
@@ -83,7 +87,7 @@ impl Copies {
     }
 
     /// Whether no part is like another.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(in crate::dilation) fn is_empty(&self) -> bool {
         self.shifts.is_empty()
     }
 
@@ -118,6 +122,21 @@ impl Copies {
         (groups, shifts)
     }
 
+    /// Rounds coordinates to single precision, and to multiples of the unit where surfaces are put elsewhere.
+    pub(in crate::dilation) fn round(&self, surface: &mut BlockSurface) {
+        let coordinates = surface.vertices.iter_mut().flatten();
+        if self.is_empty() {
+            coordinates.for_each(|x| *x = f64::from(*x as f32));
+        } else {
+            coordinates.for_each(|x| *x = whole(*x, self.unit));
+        }
+    }
+
+    /// Whether all coordinates still are multiples of the unit.
+    pub(in crate::dilation) fn are_whole(&self, surface: &BlockSurface) -> bool {
+        surface.vertices.iter().flatten().all(|&x| x == whole(x, self.unit))
+    }
+
     /// How many triangles a surface has with those of the parts that were left out.
     pub(in crate::dilation) fn triangles(&self, surface: &BlockSurface) -> u64 {
         if self.is_empty() {
@@ -127,7 +146,7 @@ impl Copies {
         surface.triangles.iter().map(|triangle| 1 + shifts[groups[triangle[0] as usize] as usize].len() as u64).sum()
     }
 
-    /// Puts the surfaces of parts where the others like them are, too, with coordinates in single precision.
+    /// Puts the surfaces of parts where the others like them are, too.
     pub(in crate::dilation) fn put(&self, surface: &mut BlockSurface) {
         if self.is_empty() {
             return;
@@ -154,6 +173,11 @@ impl Copies {
             }
         }
     }
+}
+
+/// The nearest multiple of a unit.
+fn whole(x: f64, unit: f64) -> f64 {
+    (x / unit).round() * unit
 }
 
 /// The figures of every part, each in ascending order, given how far their dilations reach; none where there is one part only.
