@@ -91,6 +91,15 @@ def spring(turns, steps):
     return polyline(np.column_stack([np.cos(angle), np.sin(angle), angle / (6 * np.pi)]))
 
 
+def tray(columns, rows, steps=24):
+    """Rings of radius 1 that rise and fall three times, side by side as parts on a plate, 3.4 from one to the next."""
+    angle = np.arange(steps) * 2 * np.pi / steps
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0.3 * np.sin(3 * angle)])
+    places = [[3.4 * i, 3.4 * j, 0] for i, j in product(range(columns), range(rows))]
+    sides = np.column_stack([np.arange(steps), np.roll(np.arange(steps), -1)])
+    return np.concatenate([ring + place for place in places]), np.concatenate([sides + steps * k for k in range(len(places))])
+
+
 def sierpinski_wire(depth):
     """The edges of the 3^depth triangles of side 2^-depth, with shared vertices."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0]])
@@ -322,6 +331,7 @@ SHAPES = {
     "grating": lambda: grating(12, 8),
     "gratingturned": lambda: turned(grating(12, 8)),
     "spring": lambda: spring(20, 64),
+    "tray": lambda: turned(tray(8, 8)),
 }
 MAIN = list(SHAPES)[:8]
 

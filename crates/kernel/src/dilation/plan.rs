@@ -1,6 +1,6 @@
 //! Pitch, thresholds and bounds of a dilation.
 
-use super::arrangement::{self, Arranged, Arrangement, Copies};
+use super::arrangement::{Arranged, Arrangement, Copies};
 use super::assemble::Assembly;
 use super::block::{self, WITNESS};
 use super::dust;
@@ -375,7 +375,7 @@ impl<'a> Plan<'a> {
             return Ok(Prediction {
                 counted_triangles: triangles,
                 triangles,
-                memory_bytes: triangles * arrangement::BYTES_PER_TRIANGLE,
+                memory_bytes: arrangement.memory_bytes(),
                 leaf_cells: arrangement.leaves() as f64,
                 simplifying_bytes: 0.0,
                 looked_at_bytes: 0.0,
@@ -443,7 +443,8 @@ impl<'a> Plan<'a> {
         }
         self.prove(setting, site_error, triangles, budget);
         let surface = self.assemble(setting, space, &grading, blocks, budget)?;
-        self.finish(setting, space, surface, &Copies::none(), uncertain as u64, Some(setting.lattice.pitch), budget)
+        let mended = self.mended(setting, space, surface, uncertain as u64, budget)?;
+        self.certify(setting, mended, Some(setting.lattice.pitch), budget)
     }
 
     /// Holds all blocks against the limits.
@@ -488,35 +489,32 @@ impl<'a> Plan<'a> {
         if copies.triangles(&surface) > allowed {
             return Err(too_many());
         }
-        self.finish(setting, space, surface, &copies, uncertain, None, budget).map(Some)
+        let mended = self.put(setting, space, surface, &copies, uncertain, budget)?;
+        self.certify(setting, mended, None, budget).map(Some)
     }
 
-    /// Removes what is no more than rounding, mends what rounding breaks, puts parts where others like them are, and proves what is left.
-    fn finish(
+    /// A surface that was mended, with parts that are like others where they are.
+    fn put(
         &self,
         setting: &Setting,
         space: &Space,
         surface: BlockSurface,
         copies: &Copies,
         uncertain: u64,
-        pitch_mm: Option<f64>,
         budget: &Budget,
-    ) -> Result<Dilation, DilationError> {
-        let is_proven = !setting.dense && uncertain == 0;
-        let whole = if copies.is_empty() { None } else { Some(surface.alone()) };
-        let mut mended = self.mended(setting, space, is_proven, surface, budget)?;
-        if let Some(mut whole) = whole {
-            if mended.doubtful == 0 && mended.crossings == 0 && copies.are_whole(&mended.surface) {
-                copies.put(&mut mended.surface);
-            } else {
-                // What was moved by steps of single precision is not congruent elsewhere.
-                copies.put(&mut whole);
-                mended = self.mended(setting, space, is_proven, whole, budget)?;
-            }
+    ) -> Result<Mended, DilationError> {
+        let mut whole = if copies.is_empty() { BlockSurface::default() } else { surface.alone() };
+        let mut mended = self.mended(setting, space, surface, uncertain, budget)?;
+        if copies.is_empty() {
+            return Ok(mended);
         }
-        let Mended { surface, doubtful, crossings } = mended;
-        budget.report("dilate", 1.0, surface.triangles.len() as u64);
-        self.certify(setting, surface, crossings, uncertain + doubtful, pitch_mm, budget)
+        if mended.uncertain == uncertain && mended.crossings == 0 && copies.are_whole(&mended.surface) {
+            copies.put(&mut mended.surface);
+            return Ok(mended);
+        }
+        // What is in doubt is so for each of them, and what was moved by steps of single precision is not congruent elsewhere.
+        copies.put(&mut whole);
+        self.mended(setting, space, whole, uncertain, budget)
     }
 
     /// A surface without what is no more than rounding, with what rounding broke mended.
@@ -524,15 +522,16 @@ impl<'a> Plan<'a> {
         &self,
         setting: &Setting,
         space: &Space,
-        is_proven: bool,
         mut surface: BlockSurface,
+        uncertain: u64,
         budget: &Budget,
     ) -> Result<Mended, DilationError> {
-        let doubtful = dust::remove(setting, &self.rule, &space.candidates, is_proven, &mut surface) as u64;
+        let is_proven = !setting.dense && uncertain == 0;
+        let uncertain = uncertain + dust::remove(setting, &self.rule, &space.candidates, is_proven, &mut surface) as u64;
         let (vertices, triangles) = (std::mem::take(&mut surface.vertices), std::mem::take(&mut surface.triangles));
         let made = mend::mend(vertices, triangles, setting.rounding, budget)?;
         surface = BlockSurface { vertices: made.points, triangles: made.triangles, ..surface };
-        Ok(Mended { surface, doubtful, crossings: made.crossings })
+        Ok(Mended { surface, uncertain, crossings: made.crossings })
     }
 
     fn surfaces(
@@ -617,15 +616,9 @@ impl<'a> Plan<'a> {
         budget.report("stitch", 0.0, triangles);
     }
 
-    fn certify(
-        &self,
-        setting: &Setting,
-        surface: BlockSurface,
-        crossings: u64,
-        uncertain: u64,
-        pitch_mm: Option<f64>,
-        budget: &Budget,
-    ) -> Result<Dilation, DilationError> {
+    /// The dilation of which a surface bounds the solid, with what is proven of it.
+    fn certify(&self, setting: &Setting, mended: Mended, pitch_mm: Option<f64>, budget: &Budget) -> Result<Dilation, DilationError> {
+        let Mended { surface, uncertain, crossings } = mended;
         let site = surface.site_error;
         let [inner_mm, outer_mm] = self.proven(setting, site);
         let leaf_cells = surface.leaves;
@@ -656,8 +649,8 @@ impl<'a> Plan<'a> {
 /// A surface that was mended.
 struct Mended {
     surface: BlockSurface,
-    /// Shells that went and may have been the dilation's, see `dust`.
-    doubtful: u64,
+    /// Places where the topology is not certain, shells included that went and may have been the dilation's, see `dust`.
+    uncertain: u64,
     /// Pairs of triangles that meet elsewhere than they should.
     crossings: u64,
 }

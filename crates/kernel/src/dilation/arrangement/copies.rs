@@ -15,12 +15,14 @@ use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
 use crate::solid::box_tree::{Box32, BoxTree};
 
-/// Parts with as many figures, about as long, that one is held against.
+/// Parts with as many figures, about as long, that one is held against at most.
 const MOST_COMPARED: usize = 64;
+/// Pairs of figures with dilations whose boxes meet that are looked at on average: where there are more, hardly anything is apart.
+const MOST_PAIRS: usize = 256;
 /// How long parts are is told in units of so many allowed deviations: few of those that are alike are told apart.
 const LENGTH_UNIT: f64 = 1024.0;
 /// An offset in these units, as lengths that are given are often round.
-const LENGTH_OFFSET: f64 = 0.318_309_886_183_790_7;
+const LENGTH_OFFSET: f64 = std::f64::consts::FRAC_1_PI;
 
 /// Where parts like those that are left were.
 #[derive(Default)]
@@ -60,8 +62,8 @@ impl Copies {
         let (mut moved, mut gone) = (0.0_f64, vec![false; figures.len()]);
         for (number, part) in (0..).zip(&parts) {
             budget.cancel.check()?;
-            let kind = kinds.entry(kind(figures, part, LENGTH_UNIT * deviation)).or_default();
-            let like = kind.iter().find_map(|&other| {
+            let others = kinds.entry(kind(figures, part, LENGTH_UNIT * deviation)).or_default();
+            let like = others.iter().find_map(|&other| {
                 let (shift, off) = shift(figures, &parts[other as usize], part)?;
                 (off <= deviation).then_some((other, shift, off))
             });
@@ -69,8 +71,8 @@ impl Copies {
                 shifts[other as usize].push(shift.map(|x| whole(x, unit)));
                 moved = moved.max(off);
                 part.iter().for_each(|&figure| gone[figure as usize] = true);
-            } else if kind.len() < MOST_COMPARED {
-                kind.push(number);
+            } else if others.len() < MOST_COMPARED {
+                others.push(number);
             }
         }
         let mut copies = Self { reach, slack, unit, moved, share: figures.len() as f64, ..Self::none() };
@@ -180,7 +182,7 @@ fn whole(x: f64, unit: f64) -> f64 {
     (x / unit).round() * unit
 }
 
-/// The figures of every part, each in ascending order, given how far their dilations reach; none where there is one part only.
+/// The figures of every part, each in ascending order, given how far their dilations reach; none where there is one part only, or it would take long to tell.
 fn parts(figures: &[Figure], reach: impl Fn(&Figure) -> f64, budget: &Budget) -> Result<Option<Vec<Vec<u32>>>, Stopped> {
     let mut groups = Groups::new(figures.len());
     let mut left = figures.len();
@@ -198,24 +200,25 @@ fn parts(figures: &[Figure], reach: impl Fn(&Figure) -> f64, budget: &Budget) ->
     let boxes: Vec<Box32> = figures.iter().map(|figure| figure.box_within(reach(figure))).collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
+    let mut pairs = MOST_PAIRS * figures.len();
     for (index, (figure, own)) in figures.iter().zip(&boxes).enumerate() {
         budget.cancel.check()?;
         tree.query(own, 0, |leaf| {
             for (&item, theirs) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
                 let (item, other) = (item as usize, &figures[item as usize]);
-                if item < index
-                    && own.meets(theirs)
-                    && groups.of(item) != groups.of(index)
-                    && !are_apart(figure, other, reach(figure) + reach(other))
-                {
+                if item >= index || !own.meets(theirs) {
+                    continue;
+                }
+                pairs = pairs.saturating_sub(1);
+                if groups.of(item) != groups.of(index) && !are_apart(figure, other, reach(figure) + reach(other)) {
                     left -= usize::from(groups.join(item, index));
                 }
             }
-            true
+            pairs > 0
         });
-    }
-    if left < 2 {
-        return Ok(None);
+        if left < 2 || pairs == 0 {
+            return Ok(None);
+        }
     }
     let mut parts: Vec<Vec<u32>> = Vec::with_capacity(left);
     let mut numbers = vec![0; figures.len()];

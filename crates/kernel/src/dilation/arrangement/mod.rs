@@ -75,7 +75,7 @@ const ROUNDS_OF_BENDS: usize = 6;
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: usize = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
-pub(super) const BYTES_PER_TRIANGLE: f64 = 600.0;
+const BYTES_PER_TRIANGLE: f64 = 600.0;
 
 /// The sites of an attractor, few of them near to each other.
 pub(super) struct Arrangement {
@@ -161,8 +161,7 @@ impl Arrangement {
             found = Self::of(plain, left, setting, surfaces, budget)?;
         }
         let with_copies = |arrangement: Self| Self { triangles: copies.share * arrangement.triangles, copies, ..arrangement };
-        // What is put elsewhere only has to be held.
-        let fits = |arrangement: &Self| arrangement.triangles * plan::BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
+        let fits = |arrangement: &Self| arrangement.memory_bytes() < budget.limits.memory_bytes as f64;
         Ok(found.map(with_copies).filter(fits))
     }
 
@@ -271,13 +270,17 @@ impl Arrangement {
             }
         }
         self.triangles = (1.0 - self.inside) * self.expected_triangles();
-        let fits = self.triangles * BYTES_PER_TRIANGLE < budget.limits.memory_bytes as f64;
-        Ok(if fits { Begun::Done } else { Begun::Left })
+        Ok(if self.memory_bytes() < budget.limits.memory_bytes as f64 { Begun::Done } else { Begun::Left })
     }
 
     /// Leaf cells of the attractor.
     pub(super) fn leaves(&self) -> u64 {
         self.sites.leaves
+    }
+
+    /// Bytes held at most: for what is made, and for what is put elsewhere, too.
+    pub(super) fn memory_bytes(&self) -> f64 {
+        (self.triangles / self.copies.share * BYTES_PER_TRIANGLE).max(self.triangles * plan::BYTES_PER_TRIANGLE)
     }
 
     /// About how many triangles will be made, from a sample of the polytopes.
