@@ -63,6 +63,8 @@ pub(crate) struct Setting {
     pub(super) slack: f64,
     /// How far a position moves when it becomes a single-precision number.
     pub(super) rounding: f64,
+    /// A power of two: coordinates in single precision may be multiples of it, and those at the shape's extent are.
+    pub(super) unit: f64,
     /// Whether sites are too many to be told apart: all tetrahedra are marched, and refined where what that fills is not near a site, see `block`.
     pub(super) dense: bool,
     /// Radius of the ball that closes gaps among dense sites, and how wide a neck the lattice sees there.
@@ -140,6 +142,7 @@ impl Setting {
             most: integer(largest),
             slack: 1e-13 * extent,
             rounding: rounding(self::extent(bounds, 3.0 * radius)),
+            unit: unit(self::extent(bounds, 3.0 * radius)),
             dense: false,
             gap: 0.0,
             neck: 0.0,
@@ -159,12 +162,6 @@ impl Setting {
     /// What the surface may be off d = r at least, inwards and outwards.
     pub(super) fn half_band(&self) -> f64 {
         (self.outer - self.reach).min(self.reach - self.least)
-    }
-
-    /// What all coordinates in single precision are multiples of that are as large as the shape's: half of it along each axis is no more than `rounding`.
-    pub(super) fn unit(&self) -> f64 {
-        let extent = self.rounding / rounding(1.0);
-        extent.log2().ceil().exp2() / f64::from(1 << f32::MANTISSA_DIGITS)
     }
 
     /// A squared distance less theta as an integer, never 0.
@@ -196,6 +193,12 @@ fn least(radius: f64, pitch: f64) -> f64 {
 /// Largest coordinate of the box grown by `margin`.
 fn extent(bounds: &AxisBox, margin: f64) -> f64 {
     (0..3).map(|axis| bounds.low[axis].low.abs().max(bounds.high[axis].high.abs()) + margin).fold(0.0, f64::max)
+}
+
+/// The largest step between single-precision numbers below the least power of two above an extent, which is a normal number: half of it is no more than the extent's half unit in the last place.
+fn unit(extent: f64) -> f64 {
+    let power = f64::from_bits((extent.to_bits() >> 52) << 52);
+    2.0 * power / f64::from(1 << f32::MANTISSA_DIGITS)
 }
 
 /// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
@@ -774,6 +777,34 @@ mod tests {
         assert_eq!(made(radii(1.01)), (false, true, 2));
         let (in_doubt, is_exact, _) = made(radii(1.0));
         assert!(in_doubt && !is_exact);
+    }
+
+    /// Two rods that are alike, and what is made of one of them in coordinates that are not congruent elsewhere: both are looked at where they are.
+    #[test]
+    fn what_is_not_congruent_is_mended_where_it_is() {
+        let at = |x: f64, y: f64| DVec3::new(x, y, 0.1);
+        let vertices = vec![at(0.3, 0.0), at(20.3, 0.0), at(0.3, 40.0), at(20.3, 40.0)];
+        let shape = Shape::Mesh(PolygonMesh { vertices, faces: vec![vec![0, 1], vec![2, 3]], interior: Interior::Surface });
+        let attractor = Model { name: None, shape }.lower().unwrap().attractor;
+        let budget = Budget::default();
+        let plan = Plan::new(&attractor, Balls { least: 1.0, most: 1.0 }, Tolerance::new(0.1).unwrap(), true, &budget).unwrap();
+        let setting = plan.setting(plan.pitch, &budget);
+        let space = plan.space(&setting);
+        let mut arrangement = Arrangement::new(&setting, &plan.rule, &space.candidates, &budget).unwrap().unwrap();
+        let surface = arrangement.run(&budget).unwrap().unwrap().surface;
+        let (_, _, copies) = arrangement.into_index();
+        for is_congruent in [true, false] {
+            let mut surface = surface.alone();
+            copies.round(&mut surface);
+            if !is_congruent {
+                surface.vertices.iter_mut().for_each(|vertex| vertex[1] = f64::from((vertex[1] + 1e-7 * vertex[0]) as f32));
+            }
+            let triangles = surface.triangles.len();
+            assert_eq!(copies.are_whole(&surface), is_congruent);
+            let mended = plan.put(&setting, &space, surface, &copies, 0, &budget).unwrap();
+            assert_eq!((mended.surface.triangles.len(), mended.uncertain, mended.crossings), (2 * triangles, 0, 0));
+            assert_eq!(plan.certify(&setting, mended, None, &budget).unwrap().solid.topology().components, 2);
+        }
     }
 
     #[test]

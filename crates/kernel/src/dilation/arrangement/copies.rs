@@ -1,9 +1,10 @@
 //! Parts of a shape that are alike but for where they are, as those of dusts and of plates full of pieces: one of each kind is thickened, and its surface put where the others are.
 //!
-//! Two figures belong to one part where their dilations by the band's outer end may meet. So no surface depends on what another part has, and none of two parts meet. Let part B have the figures of A, each moved by t but for e at most: then |d_B(x + t) - d_A(x)| <= e, and a surface of A between d = s and d = outer is one
-//! of B, moved by t, between s - e and outer + e. The topology is that of B where rounding alone makes e, or where that of A's dilation does not change by as much, see `steady`.
+//! Two figures belong to one part where what stands for their dilations may meet, after all rounding and mending. So no surface depends on what another part has, and none of two parts meet. Let part B have the figures of A, each moved by t but for e at most: then |d_B(x + t) - d_A(x)| <= e, and a surface of A between
+//! d = s and d = outer is one of B, moved by t, between s - e and outer + e. The topology is that of B where rounding alone makes e, or where that of A's dilation does not change by as much, see `steady`. Of both the same faces belong to solids, and as many solids are around them: those do not end anywhere near, so that they are
+//! around all of it.
 //!
-//! All coordinates are whole multiples of one unit, and so are ways between parts, but for half a unit that e has, too: up to the shape's extent single precision holds such numbers exactly. So what is put elsewhere is congruent with what was made, and meets itself where that does.
+//! All coordinates are whole multiples of one unit, and so are ways between parts, but for half a unit along each axis that e has, too: up to the shape's extent single precision holds such numbers exactly. So what is put elsewhere is congruent with what was made, and meets itself where that does.
 
 use super::figure::{self, Figure};
 use super::pieces::are_apart;
@@ -14,11 +15,16 @@ use crate::dilation::plan::Setting;
 use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
 use crate::solid::box_tree::{Box32, BoxTree};
+use crate::solid::{Inside, mend};
+use glam::DVec3;
 
 /// Parts with as many figures, about as long, that one is held against at most.
 const MOST_COMPARED: usize = 64;
-/// Pairs of figures with dilations whose boxes meet that are looked at on average: where there are more, hardly anything is apart.
-const MOST_PAIRS: usize = 256;
+/// Looks at boxes of figures on average, and for how many of them a look at two figures counts: where it takes more, hardly anything is apart.
+const MOST_LOOKS: usize = 1_024;
+const LOOKS_OF_A_PAIR: usize = 32;
+/// What rounding to single precision may move, and mending, and once more to be put elsewhere, where a part may have noise, too: in units of rounding, with one to spare.
+const MARGIN: f64 = mend::NUDGE + 4.0;
 /// How long parts are is told in units of so many allowed deviations: few of those that are alike are told apart.
 const LENGTH_UNIT: f64 = 1024.0;
 /// An offset in these units, as lengths that are given are often round.
@@ -28,44 +34,59 @@ const LENGTH_OFFSET: f64 = std::f64::consts::FRAC_1_PI;
 #[derive(Default)]
 pub(in crate::dilation) struct Copies {
     /// The figures of parts that there were others like, and of each its part, and the box of its dilation.
-    figures: Vec<Figure>,
+    pub(super) figures: Vec<Figure>,
     parts: Vec<u32>,
     boxes: BoxTree,
-    /// The band's outer end, and what is added for rounding.
-    reach: f64,
-    slack: f64,
+    reach: Reach,
     /// Of each of these parts, how far from it the others are.
     shifts: Vec<Vec<Point>>,
     /// What coordinates and ways are multiples of.
     unit: f64,
     /// How far a place of one of them is from that of the part that stands for it, at most, but for this unit.
     pub(super) moved: f64,
-    /// How many times as many figures there were.
-    pub(super) share: f64,
+}
+
+/// How far surfaces may be from the figures that they are around.
+#[derive(Clone, Copy, Default)]
+struct Reach {
+    /// The band's outer end, and what is added for rounding, mending and being put elsewhere.
+    outer: f64,
+    margin: f64,
+}
+
+impl Reach {
+    fn of(self, figure: &Figure) -> f64 {
+        figure.in_space(self.outer) + self.margin
+    }
+}
+
+/// What parts are looked for in.
+pub(super) struct Given<'a> {
+    pub(super) figures: Vec<Figure>,
+    /// Of every figure, whether it belongs to the surface of a solid.
+    pub(super) is_of_solid: Vec<bool>,
+    pub(super) solids: &'a [Inside<'a>],
 }
 
 impl Copies {
-    /// No copies.
-    pub(in crate::dilation) fn none() -> Self {
-        Self { share: 1.0, ..Self::default() }
-    }
-
     /// Leaves out figures of parts that are like others but for a deviation.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn leave_out(figures: &mut Vec<Figure>, setting: &Setting, deviation: f64, budget: &Budget) -> Result<Self, Stopped> {
-        let (reach, slack, unit) = (setting.outer, setting.slack, setting.unit());
-        let Some(parts) = parts(figures, |figure| figure.in_space(reach) + slack, budget)? else { return Ok(Self::none()) };
-        let mut kinds: NameMap<[i64; 4], Vec<u32>> = NameMap::default();
+    pub(super) fn leave_out(given: &mut Given<'_>, setting: &Setting, deviation: f64, budget: &Budget) -> Result<Self, Stopped> {
+        let reach = Reach { outer: setting.outer, margin: setting.slack + MARGIN * setting.rounding };
+        let Some(parts) = parts(&given.figures, reach, budget)? else { return Ok(Self::default()) };
+        let unit = setting.unit;
+        let mut kinds: NameMap<[i64; 5], Vec<u32>> = NameMap::default();
         let mut shifts: Vec<Vec<Point>> = vec![Vec::new(); parts.len()];
-        let (mut moved, mut gone) = (0.0_f64, vec![false; figures.len()]);
+        let (mut moved, mut gone) = (0.0_f64, vec![false; given.figures.len()]);
         for (number, part) in (0..).zip(&parts) {
             budget.cancel.check()?;
-            let others = kinds.entry(kind(figures, part, LENGTH_UNIT * deviation)).or_default();
+            let Some(kind) = given.kind(part, reach, LENGTH_UNIT * deviation) else { continue };
+            let others = kinds.entry(kind).or_default();
             let like = others.iter().find_map(|&other| {
-                let (shift, off) = shift(figures, &parts[other as usize], part)?;
-                (off <= deviation).then_some((other, shift, off))
+                let (shift, off) = given.shift(&parts[other as usize], part, deviation)?;
+                Some((other, shift, off))
             });
             if let Some((other, shift, off)) = like {
                 shifts[other as usize].push(shift.map(|x| whole(x, unit)));
@@ -75,16 +96,16 @@ impl Copies {
                 others.push(number);
             }
         }
-        let mut copies = Self { reach, slack, unit, moved, share: figures.len() as f64, ..Self::none() };
+        let mut copies = Self { reach, unit, moved, ..Self::default() };
         for (part, shifts) in parts.iter().zip(shifts).filter(|(_, shifts)| !shifts.is_empty()) {
-            copies.figures.extend(part.iter().map(|&figure| figures[figure as usize].clone()));
+            copies.figures.extend(part.iter().map(|&figure| given.figures[figure as usize].clone()));
             copies.parts.resize(copies.figures.len(), copies.shifts.len() as u32);
             copies.shifts.push(shifts);
         }
-        figure::leave_out(figures, gone);
-        copies.share /= figures.len() as f64;
+        figure::leave_out(&mut given.figures, gone);
         let mut boxes = BoxTree::default();
-        boxes.build(copies.figures.len(), |index| Some(copies.figures[index as usize].box_within(copies.reach_of(index))), false);
+        let box_of = |figure: &Figure| figure.box_within(reach.of(figure));
+        boxes.build(copies.figures.len(), |index| Some(box_of(&copies.figures[index as usize])), false);
         Ok(Self { boxes, ..copies })
     }
 
@@ -93,20 +114,21 @@ impl Copies {
         self.shifts.is_empty()
     }
 
-    fn reach_of(&self, figure: u32) -> f64 {
-        self.figures[figure as usize].in_space(self.reach) + self.slack
+    /// How often there is a part that has a figure.
+    pub(super) fn times(&self, figure: &Figure) -> u64 {
+        1 + figure.corners().first().map_or(0, |corner| self.at(corner).len() as u64)
     }
 
     /// How far the parts are that are like the one whose dilation has a place.
-    pub(super) fn at(&self, x: &Point) -> &[Point] {
+    fn at(&self, x: &Point) -> &[Point] {
         let mut found: &[Point] = &[];
         if !self.is_empty() {
             let place = Box32::of(&[*x]);
             self.boxes.query(&place, 0, |leaf| {
                 let near = self.boxes.items(leaf).iter().zip(self.boxes.boxes(leaf)).filter(|(_, own)| own.meets(&place));
                 for (&index, _) in near {
-                    let reach = self.reach_of(index);
-                    if distance_squared(x, &self.figures[index as usize].closest(x)) <= reach * reach {
+                    let figure = &self.figures[index as usize];
+                    if distance_squared(x, &figure.closest(x)).sqrt() <= self.reach.of(figure) {
                         found = &self.shifts[self.parts[index as usize] as usize];
                     }
                 }
@@ -182,8 +204,8 @@ fn whole(x: f64, unit: f64) -> f64 {
     (x / unit).round() * unit
 }
 
-/// The figures of every part, each in ascending order, given how far their dilations reach; none where there is one part only, or it would take long to tell.
-fn parts(figures: &[Figure], reach: impl Fn(&Figure) -> f64, budget: &Budget) -> Result<Option<Vec<Vec<u32>>>, Stopped> {
+/// The figures of every part, each in ascending order; none where there is one part only, or it would take long to tell.
+fn parts(figures: &[Figure], reach: Reach, budget: &Budget) -> Result<Option<Vec<Vec<u32>>>, Stopped> {
     let mut groups = Groups::new(figures.len());
     let mut left = figures.len();
     // Most shapes hang together by their corners.
@@ -197,26 +219,27 @@ fn parts(figures: &[Figure], reach: impl Fn(&Figure) -> f64, budget: &Budget) ->
     if left < 2 {
         return Ok(None);
     }
-    let boxes: Vec<Box32> = figures.iter().map(|figure| figure.box_within(reach(figure))).collect();
+    let boxes: Vec<Box32> = figures.iter().map(|figure| figure.box_within(reach.of(figure))).collect();
     let mut tree = BoxTree::default();
     tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
-    let mut pairs = MOST_PAIRS * figures.len();
+    let mut looks = MOST_LOOKS * figures.len();
     for (index, (figure, own)) in figures.iter().zip(&boxes).enumerate() {
         budget.cancel.check()?;
-        tree.query(own, 0, |leaf| {
+        // Those of leaves before have asked already.
+        tree.query(own, tree.leaf_with(index as u32), |leaf| {
             for (&item, theirs) in tree.items(leaf).iter().zip(tree.boxes(leaf)) {
+                looks = looks.saturating_sub(1);
                 let (item, other) = (item as usize, &figures[item as usize]);
-                if item >= index || !own.meets(theirs) {
-                    continue;
-                }
-                pairs = pairs.saturating_sub(1);
-                if groups.of(item) != groups.of(index) && !are_apart(figure, other, reach(figure) + reach(other)) {
-                    left -= usize::from(groups.join(item, index));
+                if own.meets(theirs) && groups.of(item) != groups.of(index) {
+                    looks = looks.saturating_sub(LOOKS_OF_A_PAIR);
+                    if !are_apart(figure, other, reach.of(figure) + reach.of(other)) {
+                        left -= usize::from(groups.join(item, index));
+                    }
                 }
             }
-            pairs > 0
+            looks > 0
         });
-        if left < 2 || pairs == 0 {
+        if left < 2 || looks == 0 {
             return Ok(None);
         }
     }
@@ -233,30 +256,57 @@ fn parts(figures: &[Figure], reach: impl Fn(&Figure) -> f64, budget: &Budget) ->
     Ok(Some(parts))
 }
 
-/// What parts that are alike have in common, with lengths in units of `unit`.
-fn kind(figures: &[Figure], part: &[u32], unit: f64) -> [i64; 4] {
-    let corners = |&figure: &u32| figures[figure as usize].corners();
-    let (first, last) = (part.first().map(corners).unwrap_or_default(), part.last().map(corners).unwrap_or_default());
-    let way = |axis: usize| last.last().zip(first.first()).map_or(0.0, |(to, from)| to[axis] - from[axis]);
-    let length = |axis: usize| (way(axis) / unit + LENGTH_OFFSET).floor() as i64;
-    [part.len() as i64, length(0), length(1), length(2)]
-}
-
-/// How far a part is from another with figures like its own, one by one, and how far corners of both are from each other then, at most.
-fn shift(figures: &[Figure], from: &[u32], to: &[u32]) -> Option<(Point, f64)> {
-    let pairs = from.iter().zip(to).map(|(&own, &theirs)| (&figures[own as usize], &figures[theirs as usize]));
-    let shift = pairs.clone().next().map(|(own, theirs)| subtract(&theirs.corners()[0], &own.corners()[0]))?;
-    let mut square = 0.0_f64;
-    for (own, theirs) in pairs {
-        let (own, deficits) = (own.corners(), [own.deficit, theirs.deficit].map(f64::to_bits));
-        if own.len() != theirs.corners().len() || deficits[0] != deficits[1] {
-            return None;
-        }
-        for (own, theirs) in own.iter().zip(theirs.corners()) {
-            square = square.max(distance_squared(&subtract(theirs, &shift), own));
-        }
+impl Given<'_> {
+    fn corners(&self, figure: u32) -> &[Point] {
+        self.figures[figure as usize].corners()
     }
-    (from.len() == to.len()).then_some((shift, square.sqrt()))
+
+    /// What parts that are alike have in common: their number of figures, how many solids are around them, and how far it is from their first corner to their last, in units of `unit`. None where a solid's surface crosses itself.
+    fn kind(&self, part: &[u32], reach: Reach, unit: f64) -> Option<[i64; 5]> {
+        let (&first, &last) = part.first().zip(part.last())?;
+        let way = self.corners(first).first().zip(self.corners(last).last()).map(|(from, to)| subtract(to, from))?;
+        let length = |axis: usize| (way[axis] / unit + LENGTH_OFFSET).floor() as i64;
+        Some([part.len() as i64, self.around(part, reach)?, length(0), length(1), length(2)])
+    }
+
+    /// How many solids are around a part: of the place beside its lowest corner along the first axis, which is as far from it as its surface may be.
+    fn around(&self, part: &[u32], reach: Reach) -> Option<i64> {
+        if self.solids.is_empty() {
+            return Some(0);
+        }
+        let low = |&figure: &u32| {
+            let far = reach.of(&self.figures[figure as usize]);
+            self.corners(figure).iter().map(move |&[x, y, z]| DVec3::new(x - far, y, z))
+        };
+        let beside = part.iter().flat_map(low).min_by(|a, b| a.x.total_cmp(&b.x))?;
+        self.solids.iter().try_fold(0, |number, solid| match solid.winding(beside) {
+            winding @ (0 | 1) => Some(number + winding),
+            _ => None,
+        })
+    }
+
+    /// How far a part is from another with as many figures, like its own one by one but for a deviation, and for what deviation.
+    fn shift(&self, from: &[u32], to: &[u32], deviation: f64) -> Option<(Point, f64)> {
+        let way = |from: u32, to: u32| Some(subtract(self.corners(to).first()?, self.corners(from).first()?));
+        let shift = from.first().zip(to.first()).and_then(|(&from, &to)| way(from, to))?;
+        let mut off = 0.0_f64;
+        for (&own, &theirs) in from.iter().zip(to) {
+            let traits = |figure: u32| {
+                let index = figure as usize;
+                (self.corners(figure).len(), self.figures[index].deficit.to_bits(), self.is_of_solid[index])
+            };
+            if traits(own) != traits(theirs) {
+                return None;
+            }
+            for (own, theirs) in self.corners(own).iter().zip(self.corners(theirs)) {
+                off = off.max(distance_squared(&subtract(theirs, &shift), own).sqrt());
+            }
+            if off > deviation {
+                return None;
+            }
+        }
+        Some((shift, off))
+    }
 }
 
 #[cfg(test)]
@@ -265,7 +315,7 @@ mod tests {
     use super::super::tests::{arranged, block, lowered_as, plan, topology};
     use super::*;
     use crate::dilation::{Dilation, DilationError, dilate};
-    use crate::model::{self, Group, Interior, Model, Part, PolygonMesh};
+    use crate::model::{self, Group, Interior, Model, Part, PartRadius, PolygonMesh};
     use crate::solid::Inside;
     use crate::split_mix::Random;
     use crate::tolerance::{Radius, Tolerance};
@@ -359,6 +409,7 @@ mod tests {
         let (mut left_out, mut noisy) = (0, 0);
         for round in 0..40 {
             let (mut all, mut expected, mut sites) = (Shape::default(), (0, 0, 0), 0);
+            let origin = [0.0, -200.0, 60.0][round / 4 % 3];
             for kind in 0..2 {
                 let one = Shape::random(&mut random);
                 if kind > 0 && one.interior != all.interior {
@@ -369,7 +420,7 @@ mod tests {
                 sites += one.left().0;
                 for _ in 0..2 + random.next() % 4 {
                     let number = (all.vertices.len() + kind) as f64;
-                    let to = DVec3::new(6.0 * number, 3.0 * random.share(), 5.0 * random.share()) + 0.1;
+                    let to = DVec3::new(6.0 * number, 3.0 * random.share(), 5.0 * random.share()) + 0.1 + origin;
                     let mut by = |most: f64| most * (2.0 * random.share() - 1.0);
                     all.add(&one, |x| match round % 4 {
                         0 => x + to,
@@ -396,22 +447,83 @@ mod tests {
         assert!(left_out > 25 && noisy > 12, "{left_out} of 30 left out, {noisy} with noise");
     }
 
-    /// A wire inside of a block, and one like it beside: what is inside is filled, and what is beside stays.
+    fn part(interior: Interior, (vertices, faces): (Vec<DVec3>, Vec<Vec<u32>>), radius: Option<f64>) -> Part {
+        let shape = model::Shape::Mesh(PolygonMesh { vertices, faces, interior });
+        Part { name: None, transform: None, shape, radius: radius.map(PartRadius::Constant) }
+    }
+
+    fn dilated(parts: Vec<Part>) -> Dilation {
+        let shape = model::Shape::Group(Group { parts, joins: Vec::new() });
+        let attractor = Model { name: None, shape }.lower().unwrap().attractor;
+        dilate(&attractor, Radius::new(RADIUS).unwrap(), Tolerance::new(0.1).unwrap(), &Budget::default()).unwrap()
+    }
+
+    fn wire(at: DVec3) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+        (vec![at, at + DVec3::X], vec![vec![0, 1]])
+    }
+
+    /// A wire inside of a block, and others like it beside: what is inside is filled, what is beside stays, and no lattice is needed.
     #[test]
     fn parts_inside_of_others_are_no_copies() {
-        let part = |interior: Interior, (vertices, faces): (Vec<DVec3>, Vec<Vec<u32>>)| {
-            let shape = model::Shape::Mesh(PolygonMesh { vertices, faces, interior });
-            Part { name: None, transform: None, shape, radius: None }
-        };
-        let wire = |at: DVec3| part(Interior::Surface, (vec![at, at + DVec3::X], vec![vec![0, 1]]));
-        for (places, expected) in [([[6.0; 3], [30.0; 3]], (2, 0, 4)), ([[20.0; 3], [30.0; 3]], (3, 0, 6))] {
-            let [first, second] = places.map(|at| wire(DVec3::from_array(at)));
-            let parts = vec![first, second, part(Interior::Solid, block(0, DVec3::ZERO, DVec3::splat(12.0)))];
-            let shape = model::Shape::Group(Group { parts, joins: Vec::new() });
-            let attractor = Model { name: None, shape }.lower().unwrap().attractor;
-            let budget = Budget::default();
-            let made = dilate(&attractor, Radius::new(RADIUS).unwrap(), Tolerance::new(0.1).unwrap(), &budget).unwrap();
-            assert_eq!((topology(&made), made.topology_exact, made.crossings), (expected, true, 0));
+        for (places, expected) in [([6.0, 30.0, 40.0], 3), ([30.0, 6.0, 40.0], 3), ([20.0, 30.0, -40.0], 4)] {
+            let wires = places.map(|x| part(Interior::Surface, wire(DVec3::splat(x)), None));
+            let around = part(Interior::Solid, block(0, DVec3::ZERO, DVec3::splat(12.0)), None);
+            let made = dilated(wires.into_iter().chain([around]).collect());
+            assert_eq!((topology(&made), made.topology_exact, made.crossings), ((expected, 0, 2 * expected as i64), true, 0));
+            assert_eq!(made.pitch_mm, None);
+        }
+    }
+
+    /// A block that is filled and the same faces that are not, in either order, and thin ones: the void is there once.
+    #[test]
+    fn solids_are_no_copies_of_surfaces() {
+        for height in [2.0001, 2.002, 2.006, 2.2, 3.0] {
+            for order in [[Interior::Solid, Interior::Surface], [Interior::Surface, Interior::Solid]] {
+                let parts = [0.0, 30.0].into_iter().zip(order).map(|(x, interior)| {
+                    let low = DVec3::new(x, 0.0, 0.0);
+                    part(interior, block(0, low, low + DVec3::new(12.0, 12.0, height)), None)
+                });
+                let made = dilated(parts.collect());
+                let expected = if made.topology_exact { vec![(2, 1, 6)] } else { vec![(2, 0, 4), (2, 1, 6)] };
+                assert!(expected.contains(&topology(&made)), "{height}, {order:?}: {:?}", topology(&made));
+                assert!(made.topology_exact || height < 2.1);
+            }
+        }
+    }
+
+    /// Wires that are alike, one of which is thicker.
+    #[test]
+    fn parts_of_other_radii_are_no_copies() {
+        let wires = [(0.0, None), (10.0, Some(0.5)), (20.0, None), (30.0, Some(0.5))];
+        let made = dilated(wires.map(|(y, radius)| part(Interior::Surface, wire(DVec3::Y * y), radius)).to_vec());
+        assert_eq!((topology(&made), made.crossings), ((4, 0, 8), 0));
+        for (y, radius) in wires {
+            let own = made.solid.mesh().vertices.iter().filter(|vertex| (vertex.y - y).abs() < 5.0);
+            let far = own.map(|vertex| vertex.distance(DVec3::new(vertex.x.clamp(0.0, 1.0), y, 0.0)));
+            let [low, high] = far.fold([f64::INFINITY, 0.0_f64], |[low, high], d| [low.min(d), high.max(d)]);
+            let radius = radius.unwrap_or(RADIUS);
+            assert!(radius - 0.1 <= low && high <= radius + 0.1, "{y}: {low} to {high}");
+        }
+    }
+
+    /// Parts that are hardly farther apart than dilations reach, far from the origin, where positions are rounded by as much: none meet, for any number of threads.
+    #[test]
+    fn parts_that_nearly_touch_do_not_meet() {
+        for origin in [-16_500.0, 0.0, 1_023.0, 16_380.0] {
+            for gap in [2.2, 2.2002, 2.201, 2.21, 2.4] {
+                let mut shape = Shape::default();
+                let one = Shape { vertices: vec![DVec3::ZERO], faces: vec![vec![0]], ..Shape::default() };
+                (0..27)
+                    .for_each(|k| shape.add(&one, |_| DVec3::new(f64::from(k % 3), f64::from(k / 3 % 3), f64::from(k / 9)) * gap + origin));
+                let attractor = shape.attractor();
+                let of = |threads: usize| {
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                    pool.install(|| arranged(&attractor, RADIUS, 0.1))
+                };
+                let made = of(1);
+                assert_eq!((topology(&made), made.topology_exact, made.crossings), ((27, 0, 54), true, 0), "{origin}, {gap}");
+                assert_eq!(made.solid.mesh(), of(3).solid.mesh());
+            }
         }
     }
 

@@ -156,7 +156,7 @@ impl<'a> Engine<'a> {
         let Some(boundary) = facets::boundary(&self.polytopes, pieces, budget)? else { return Ok(Run::Open) };
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
         // A set is as often there as its part.
-        let times = |doubt: &Doubt| 1 + self.copies.at(&self.sites[doubt.sites[0] as usize].corners()[0]).len() as u64;
+        let times = |doubt: &Doubt| self.copies.times(&self.sites[doubt.sites[0] as usize]);
         Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().iter().map(times).sum() })))
     }
 

@@ -41,6 +41,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 pub(super) use copies::Copies;
+use copies::Given;
 use engine::{Engine, Forms, Run, State, TRIALS};
 use figure::{Figure, Outline};
 use form::Kind;
@@ -48,6 +49,7 @@ pub(super) use index::Index;
 use noise::Cleared;
 use pieces::{Body, Lists};
 use polytopes::{MOST_POLYTOPES, Polytopes};
+use std::sync::Arc;
 use steady::Steady;
 use tubes::{Loose, Tubes};
 
@@ -64,16 +66,16 @@ const FLATNESS: f64 = 1.0 / 128.0;
 /// How far places may be off planes and lines that is taken for noise, in units of half the band; how many times more slack is left then, as planes are met up to some roundings only; and what must be left of the figures at most for it to be worth while.
 const NOISE: f64 = 1.0 / 256.0;
 const CLEARED: f64 = 1e3;
+const WORTH: f64 = 0.9;
 /// What rounding alone moves parts that are alike, as a share of the slack, and what rounding to single precision may be of half the band where they are looked for.
 const ROUNDED: f64 = 1.0 / 32.0;
 const CARRIED: f64 = 1.0 / 16.0;
-const WORTH: f64 = 0.9;
 
 /// Rounds in which bends are given up that leave no room for others; then all are.
 const ROUNDS_OF_BENDS: usize = 6;
 
 /// Polytopes that tell how many triangles there will be.
-const SAMPLE: usize = 64;
+const SAMPLE: u64 = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
 const BYTES_PER_TRIANGLE: f64 = 600.0;
 
@@ -90,13 +92,14 @@ pub(super) struct Arrangement {
     /// The ends of segments that are found to be in no bend.
     loose: Loose,
     /// Where parts were that are like others.
-    copies: Copies,
+    copies: Arc<Copies>,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
     solids: Vec<TriMesh>,
     inside: f64,
-    /// About how many triangles will be made.
+    /// About how many triangles will be made, and how many there will be with those that are put elsewhere.
+    made: f64,
     pub(super) triangles: f64,
 }
 
@@ -127,16 +130,18 @@ impl Arrangement {
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
         let sites = || Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget);
-        let Some(mut kinds) = sites()? else { return Ok(None) };
+        let Some((mut kinds, is_of_solid)) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
         let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
         let is_steady = |figures: &[Figure], moved: f64| Steady { figures, radius: setting.reach, moved, solids: &solids }.is_shown(budget);
-        let mut copies = Copies::none();
+        let mut copies = Copies::default();
         if setting.rounding < CARRIED * setting.half_band() {
-            copies = Copies::leave_out(&mut kinds.list, setting, NOISE * setting.half_band(), budget)?;
-            if copies.moved > ROUNDED * setting.slack && !is_steady(&kinds.list, copies.moved + setting.slack)? {
-                let Some(all) = sites()? else { return Ok(None) };
-                (kinds, copies) = (all, Copies::none());
+            let mut given = Given { figures: kinds.list, is_of_solid, solids: &solids };
+            copies = Copies::leave_out(&mut given, setting, NOISE * setting.half_band(), budget)?;
+            kinds.list = given.figures;
+            if copies.moved > ROUNDED * setting.slack && !is_steady(&copies.figures, copies.moved + setting.slack)? {
+                let Some((all, _)) = sites()? else { return Ok(None) };
+                (kinds, copies) = (all, Copies::default());
             }
         }
         let put = if copies.is_empty() { 0.0 } else { copies.moved + setting.rounding };
@@ -145,28 +150,30 @@ impl Arrangement {
         let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
         let (error, leaves) = (kinds.error, kinds.leaves);
         let (plain, left) = kinds.joined(&setting, budget)?;
-        let mut found = None;
+        let copies = Arc::new(copies);
         if let Some(Cleared { figures, moved }) = cleared {
             let narrower = setting.narrower(moved, slack);
             let (clear, left) = Sites { list: figures, error, leaves }.joined(&narrower, budget)?;
             if (clear.list.len() as f64) < WORTH * plain.list.len() as f64
-                && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), budget)?
+                && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), copies.clone(), budget)?
                 && is_steady(&arrangement.sites.list[..arrangement.tubes.figures], moved + slack)?
             {
-                found = Some(arrangement);
+                return Ok(Some(arrangement));
             }
         }
         drop(solids);
-        if found.is_none() {
-            found = Self::of(plain, left, setting, surfaces, budget)?;
-        }
-        let with_copies = |arrangement: Self| Self { triangles: copies.share * arrangement.triangles, copies, ..arrangement };
-        let fits = |arrangement: &Self| arrangement.memory_bytes() < budget.limits.memory_bytes as f64;
-        Ok(found.map(with_copies).filter(fits))
+        Self::of(plain, left, setting, surfaces, copies, budget)
     }
 
     /// The arrangement of joined sites, with the share of faces that no polyhedron has, and the surfaces of solids; `None` likewise.
-    fn of(sites: Sites, left: f64, setting: Setting, solids: Vec<TriMesh>, budget: &Budget) -> Result<Option<Self>, Stopped> {
+    fn of(
+        sites: Sites,
+        left: f64,
+        setting: Setting,
+        solids: Vec<TriMesh>,
+        copies: Arc<Copies>,
+        budget: &Budget,
+    ) -> Result<Option<Self>, Stopped> {
         // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
         let faces: usize = solids.iter().map(|solid| solid.triangles.len()).sum();
         let inside = 0.5 * left * faces as f64 / sites.leaves as f64;
@@ -178,10 +185,11 @@ impl Arrangement {
             forms: Forms::default(),
             tubes: Tubes::default(),
             loose: Loose::new(),
-            copies: Copies::none(),
+            copies,
             polytopes: Polytopes::default(),
             solids,
             inside,
+            made: 0.0,
             triangles: 0.0,
         };
         Ok(arrangement.begin(budget)?.then_some(arrangement))
@@ -269,7 +277,7 @@ impl Arrangement {
                 return Ok(Begun::Bent(bent));
             }
         }
-        self.triangles = (1.0 - self.inside) * self.expected_triangles();
+        [self.made, self.triangles] = self.expected_triangles().map(|triangles| (1.0 - self.inside) * triangles);
         Ok(if self.memory_bytes() < budget.limits.memory_bytes as f64 { Begun::Done } else { Begun::Left })
     }
 
@@ -280,18 +288,36 @@ impl Arrangement {
 
     /// Bytes held at most: for what is made, and for what is put elsewhere, too.
     pub(super) fn memory_bytes(&self) -> f64 {
-        (self.triangles / self.copies.share * BYTES_PER_TRIANGLE).max(self.triangles * plan::BYTES_PER_TRIANGLE)
+        (self.made * BYTES_PER_TRIANGLE).max(self.triangles * plan::BYTES_PER_TRIANGLE)
     }
 
-    /// About how many triangles will be made, from a sample of the polytopes.
-    fn expected_triangles(&mut self) -> f64 {
-        let count = self.sites.list.len();
-        let step = count.div_ceil(SAMPLE).max(1);
-        let sample: Vec<u32> = (0..count as u32).step_by(step).collect();
+    /// About how many triangles will be made, and how many there will be, from a sample of the polytopes: of those that are there more often, more.
+    fn expected_triangles(&mut self) -> [f64; 2] {
+        let times: Vec<u64> = self.sites.list.iter().map(|figure| self.copies.times(figure)).collect();
+        let total: u64 = times.iter().sum();
+        let step = total.div_ceil(SAMPLE).max(1);
+        let (mut sample, mut next) = (Vec::new(), 0);
+        let mut end = 0;
+        for (index, &own) in (0..).zip(&times) {
+            end += own;
+            if next < end {
+                sample.push((index, ((end - next).div_ceil(step) * step) as f64));
+                next += (end - next).div_ceil(step) * step;
+            }
+        }
         self.polytopes.exchange(&mut self.tubes.cells);
-        let triangles = pieces::count(&self.polytopes, &self.near, &sample);
+        let indices: Vec<u32> = sample.iter().map(|&(index, _)| index).collect();
+        let triangles = pieces::count(&self.polytopes, &self.near, &indices);
         self.polytopes.exchange(&mut self.tubes.cells);
-        triangles as f64 * count as f64 / sample.len() as f64
+        // Each stands for as many polytopes, those that are put elsewhere counted, as there are to the next.
+        let mut expected = [0.0_f64; 2];
+        for (&(index, weight), triangles) in sample.iter().zip(triangles) {
+            expected[0] += weight * triangles / times[index as usize] as f64;
+            expected[1] += weight * triangles;
+        }
+        // The last may stand for more than there are.
+        let counted: f64 = sample.iter().map(|&(_, weight)| weight).sum();
+        expected.map(|triangles| (triangles * total as f64 / counted).max(0.0))
     }
 
     /// The boundary of the union of polytopes; `None` where none could be found.
@@ -310,7 +336,7 @@ impl Arrangement {
             drop(engine);
             match run {
                 Run::Done(mut arranged) => {
-                    if !solids::leave_out(&inside, &self.copies, &mut arranged.surface) {
+                    if !solids::leave_out(&inside, &mut arranged.surface) {
                         break;
                     }
                     arranged.surface.leaves = self.sites.leaves;
@@ -337,7 +363,7 @@ impl Arrangement {
     }
 
     /// Its figures, for searches, its setting, and where parts were that are like others.
-    pub(super) fn into_index(mut self) -> (Index, Setting, Copies) {
+    pub(super) fn into_index(mut self) -> (Index, Setting, Arc<Copies>) {
         self.sites.list.truncate(self.tubes.figures);
         (Index::new(self.sites.list, self.setting.slack), self.setting, self.copies)
     }
@@ -392,10 +418,10 @@ impl Sites {
         Ok((Self { list: figure::joined(list, flatness, hull::CORNER_SHARE * band, budget)?, ..self }, left))
     }
 
-    /// The sites below some candidates, if there are at least one and at most `most`.
-    fn of(rule: &SiteRule<'_>, candidates: &Candidates, most: usize, budget: &Budget) -> Result<Option<Self>, Stopped> {
+    /// The sites below some candidates, if there are at least one and at most `most`; and of each, whether it belongs to the surface of a solid.
+    fn of(rule: &SiteRule<'_>, candidates: &Candidates, most: usize, budget: &Budget) -> Result<Option<(Self, Vec<bool>)>, Stopped> {
         let attractor = rule.attractor();
-        let mut found = Self::default();
+        let (mut found, mut is_of_solid) = (Self::default(), Vec::new());
         let mut open: Vec<(Cell, Vec<ControlPoint>)> = Vec::new();
         for candidate in &candidates.cells {
             open.push((candidate.cell, candidates.points_of(attractor, candidate).to_vec()));
@@ -403,6 +429,7 @@ impl Sites {
                 if let Some(error) = rule.leaf(&cell, &points) {
                     let deficit = rule.deficit(cell.root);
                     rule.emit(&cell, &points, &mut |site| found.list.push(Weighted { site, deficit }.into()));
+                    is_of_solid.resize(found.list.len(), attractor.roots()[cell.root as usize].solid.is_some());
                     found.error = found.error.max(error);
                     found.leaves += 1;
                     if found.list.len() > most {
@@ -418,6 +445,6 @@ impl Sites {
                 }
             }
         }
-        Ok((!found.list.is_empty()).then_some(found))
+        Ok((!found.list.is_empty()).then_some((found, is_of_solid)))
     }
 }

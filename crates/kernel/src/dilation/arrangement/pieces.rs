@@ -189,8 +189,8 @@ fn beside(polytopes: &Polytopes, near: &[u32], index: u32, beyond: &mut Beyond) 
     (beside, hidden)
 }
 
-/// How many triangles of the union some polytopes, in ascending order, have, about: a facet with k edges has k - 2, and each edge is on two.
-pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
+/// How many triangles of the union each of some polytopes, in ascending order, adds, about: a facet with k edges has k - 2, and each edge is on two.
+pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> Vec<f64> {
     let total = polytopes.all.len();
     let (mut met, mut hidden, mut seen) = (vec![Vec::new(); total], vec![Mask::default(); total], Vec::new());
     seen.resize_with(total, Seen::default);
@@ -208,12 +208,19 @@ pub(super) fn count(polytopes: &Polytopes, near: &Lists, of: &[u32]) -> usize {
     }
     let arrangement = Arrangement { polytopes, met: &met, hidden: &hidden, seen: &seen };
     let mut scratch = Scratch::default();
-    of.iter().for_each(|&index| arrangement.of(index, &mut scratch));
-    let mut facets: Vec<u32> =
-        scratch.out.iter().flat_map(|piece| piece.facets).filter(|&facet| of.binary_search(&owner(facet).0).is_ok()).collect();
+    let mut triangles = Vec::with_capacity(of.len());
+    for &index in of {
+        let before = scratch.out.len();
+        arrangement.of(index, &mut scratch);
+        triangles.push(2.0 * (scratch.out.len() - before) as f64);
+    }
+    let mut facets: Vec<u32> = scratch.out.iter().flat_map(|piece| piece.facets).collect();
     facets.sort_unstable();
     facets.dedup();
-    2 * scratch.out.len().saturating_sub(facets.len())
+    for place in facets.into_iter().filter_map(|facet| of.binary_search(&owner(facet).0).ok()) {
+        triangles[place] -= 2.0;
+    }
+    triangles
 }
 
 /// Whether a facet of one of two polytopes parts the other from it.

@@ -4,15 +4,13 @@
 //! outside: without those inside, the rest bounds the dilation of M. While the dilations of the sites become the polytopes (see `nerve`) no surface meets S, so each is on one side of it all the time, and what is proven of the topology of both
 //! unions holds for what is left of them.
 
-use super::Copies;
 use crate::dilation::surface::BlockSurface;
 use crate::groups::Groups;
 use crate::solid::Inside;
 use glam::DVec3;
 
-/// Leaves out the surfaces inside of solids. False, with nothing changed, where a solid's own surface winds around one otherwise than once: then it crosses itself; and where parts that are alike lie inside of others, and
-/// outside.
-pub(super) fn leave_out(solids: &[Inside<'_>], copies: &Copies, surface: &mut BlockSurface) -> bool {
+/// Leaves out the surfaces inside of solids. False, with nothing changed, where a solid's own surface winds around one otherwise than once: then it crosses itself.
+pub(super) fn leave_out(solids: &[Inside<'_>], surface: &mut BlockSurface) -> bool {
     if solids.is_empty() {
         return true;
     }
@@ -20,21 +18,14 @@ pub(super) fn leave_out(solids: &[Inside<'_>], copies: &Copies, surface: &mut Bl
     let mut is_inside = vec![false; groups.len()];
     // A group is called by the least of its vertices.
     for (vertex, _) in (0..).zip(&groups).filter(|&(vertex, &group)| vertex == group) {
-        let place = &surface.vertices[vertex as usize];
-        // How many solids it is inside of, if no surface winds around it otherwise.
-        let around = |x: DVec3| {
-            solids.iter().try_fold(0, |number, solid| match solid.winding(x) {
-                0 => Some(number),
-                1 => Some(number + 1),
-                _ => None,
-            })
-        };
-        let x = DVec3::from_array(*place);
-        let number = around(x);
-        if number.is_none() || copies.at(place).iter().any(|shift| around(x + DVec3::from_array(*shift)) != number) {
-            return false;
+        let x = DVec3::from_array(surface.vertices[vertex as usize]);
+        for solid in solids {
+            match solid.winding(x) {
+                0 => {}
+                1 => is_inside[vertex as usize] = true,
+                _ => return false,
+            }
         }
-        is_inside[vertex as usize] = number != Some(0);
     }
     surface.triangles.retain(|triangle| !is_inside[groups[triangle[0] as usize] as usize]);
     surface.drop_unused();
