@@ -30,7 +30,7 @@ impl Overlaps {
     /// # Errors
     /// [`Stopped`].
     pub fn of(mesh: &TriMesh, budget: &Budget) -> Result<Self, Stopped> {
-        let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize].to_array());
+        let corners = |triangle: u32| mesh.points_of(triangle);
         let mut tree = BoxTree::default();
         if mesh.triangles.is_empty() {
             return Ok(Self::default());

@@ -46,9 +46,8 @@ impl Crossings {
     /// As [`Crossings::of`], keeping up to `most` pairs.
     pub(crate) fn among(mesh: &TriMesh, most: usize, budget: &Budget) -> Result<Self, Stopped> {
         let kept = if most == usize::MAX { KEPT } else { most };
-        let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize].to_array());
         let mut tree = BoxTree::default();
-        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(triangle))), true);
+        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&mesh.points_of(triangle))), true);
         budget.cancel.check()?;
         if mesh.triangles.is_empty() {
             return Ok(Self::default());
@@ -124,10 +123,9 @@ impl Near {
     }
 
     fn add(&mut self, mesh: &TriMesh, triangle: u32, bounds: &Box32) {
-        let corners = mesh.triangles[triangle as usize];
         self.triangles.push(triangle);
         self.boxes.push(*bounds);
-        self.corners.push((corners, corners.map(|corner| mesh.vertices[corner as usize].to_array())));
+        self.corners.push((mesh.triangles[triangle as usize], mesh.points_of(triangle)));
     }
 
     /// Adds the crossings of the leaves' own triangles, leaf by leaf, with later ones that are there from some place on.
@@ -181,8 +179,7 @@ mod tests {
             mesh.triangles.push([shared, first + 1, first + 2]);
         }
         mesh.triangles.extend_from_within(7..12);
-        let corners: Vec<[Point; 3]> =
-            mesh.triangles.iter().map(|triangle| triangle.map(|corner| mesh.vertices[corner as usize].to_array())).collect();
+        let corners: Vec<[Point; 3]> = (0..mesh.triangles.len() as u32).map(|triangle| mesh.points_of(triangle)).collect();
         let meet = |a: usize, b: usize| {
             if a == b {
                 contact::is_flat(&corners[a])

@@ -25,8 +25,7 @@ impl<'a> Inside<'a> {
     #[must_use]
     pub fn new(mesh: &'a TriMesh) -> Self {
         let mut tree = BoxTree::default();
-        let corners = |triangle: u32| mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize].to_array());
-        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(triangle))), true);
+        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&mesh.points_of(triangle))), true);
         Self { mesh, tree }
     }
 
@@ -53,7 +52,7 @@ impl<'a> Inside<'a> {
         };
         self.tree.nearest(f64::INFINITY, entry, |leaf| {
             for &triangle in self.tree.items(leaf) {
-                let [a, b, c] = self.mesh.triangles[triangle as usize].map(|corner| self.mesh.vertices[corner as usize].to_array());
+                let [a, b, c] = self.mesh.points_of(triangle);
                 nearest = nearest.min(x.distance(closest_on_triangle(&x.to_array(), &a, &b, &c).into()));
             }
             nearest

@@ -14,6 +14,7 @@ mod repair;
 mod shells;
 pub(crate) mod topology;
 
+use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::measure::mass::{volume, volume_within};
 pub use crossings::Crossings;
@@ -34,6 +35,12 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
+    /// Where the corners of a triangle are.
+    #[inline]
+    pub(crate) fn points_of(&self, triangle: u32) -> [Point; 3] {
+        self.triangles[triangle as usize].map(|corner| self.vertices[corner as usize].to_array())
+    }
+
     /// Adds another mesh, with vertices of its own.
     pub fn append(&mut self, other: &Self) {
         let first = self.vertices.len() as u32;

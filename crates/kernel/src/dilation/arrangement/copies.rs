@@ -15,7 +15,7 @@ use crate::dilation::plan::Setting;
 use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
 use crate::solid::box_tree::{Box32, BoxTree};
-use crate::solid::{Inside, mend};
+use crate::solid::{Inside, TriMesh, mend};
 use glam::DVec3;
 
 /// Parts with as many figures, about as long, that one is held against at most.
@@ -61,22 +61,30 @@ impl Reach {
 }
 
 /// What parts are looked for in.
-pub(super) struct Given<'a> {
-    pub(super) figures: Vec<Figure>,
+struct Given<'a> {
+    figures: &'a [Figure],
     /// Of every figure, whether it belongs to the surface of a solid.
-    pub(super) is_of_solid: Vec<bool>,
-    pub(super) solids: &'a [Inside<'a>],
+    is_of_solid: &'a [bool],
+    solids: Vec<Inside<'a>>,
 }
 
 impl Copies {
-    /// Leaves out figures of parts that are like others but for a deviation.
+    /// Leaves out figures of parts that are like others but for a deviation; of every figure it is told whether it belongs to the surface of a solid, and these are given.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn leave_out(given: &mut Given<'_>, setting: &Setting, deviation: f64, budget: &Budget) -> Result<Self, Stopped> {
+    pub(super) fn leave_out(
+        figures: &mut Vec<Figure>,
+        is_of_solid: &[bool],
+        surfaces: &[TriMesh],
+        setting: &Setting,
+        deviation: f64,
+        budget: &Budget,
+    ) -> Result<Self, Stopped> {
         let reach = Reach { outer: setting.outer, margin: setting.slack + MARGIN * setting.rounding };
-        let Some(parts) = parts(&given.figures, reach, budget)? else { return Ok(Self::default()) };
+        let Some(parts) = parts(figures, reach, budget)? else { return Ok(Self::default()) };
         let unit = setting.unit;
+        let given = Given { figures, is_of_solid, solids: surfaces.iter().map(Inside::new).collect() };
         let mut kinds: NameMap<[i64; 5], Vec<u32>> = NameMap::default();
         let mut shifts: Vec<Vec<Point>> = vec![Vec::new(); parts.len()];
         let (mut moved, mut gone) = (0.0_f64, vec![false; given.figures.len()]);
@@ -102,7 +110,7 @@ impl Copies {
             copies.parts.resize(copies.figures.len(), copies.shifts.len() as u32);
             copies.shifts.push(shifts);
         }
-        figure::leave_out(&mut given.figures, gone);
+        figure::leave_out(figures, gone);
         let mut boxes = BoxTree::default();
         let box_of = |figure: &Figure| figure.box_within(reach.of(figure));
         boxes.build(copies.figures.len(), |index| Some(box_of(&copies.figures[index as usize])), false);

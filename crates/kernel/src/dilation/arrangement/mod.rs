@@ -41,7 +41,6 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 pub(super) use copies::Copies;
-use copies::Given;
 use engine::{Engine, Forms, Run, State, TRIALS};
 use figure::{Figure, Outline};
 use form::Kind;
@@ -132,13 +131,13 @@ impl Arrangement {
         let sites = || Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget);
         let Some((mut kinds, is_of_solid)) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
-        let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
-        let is_steady = |figures: &[Figure], moved: f64| Steady { figures, radius: setting.reach, moved, solids: &solids }.is_shown(budget);
+        let is_steady = |figures: &[Figure], moved: f64| {
+            let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
+            Steady { figures, radius: setting.reach, moved, solids: &solids }.is_shown(budget)
+        };
         let mut copies = Copies::default();
         if setting.rounding < CARRIED * setting.half_band() {
-            let mut given = Given { figures: kinds.list, is_of_solid, solids: &solids };
-            copies = Copies::leave_out(&mut given, setting, NOISE * setting.half_band(), budget)?;
-            kinds.list = given.figures;
+            copies = Copies::leave_out(&mut kinds.list, &is_of_solid, &surfaces, setting, NOISE * setting.half_band(), budget)?;
             if copies.moved > ROUNDED * setting.slack && !is_steady(&copies.figures, copies.moved + setting.slack)? {
                 let Some((all, _)) = sites()? else { return Ok(None) };
                 (kinds, copies) = (all, Copies::default());
@@ -161,7 +160,6 @@ impl Arrangement {
                 return Ok(Some(arrangement));
             }
         }
-        drop(solids);
         Self::of(plain, left, setting, surfaces, copies, budget)
     }
 
@@ -296,28 +294,27 @@ impl Arrangement {
         let times: Vec<u64> = self.sites.list.iter().map(|figure| self.copies.times(figure)).collect();
         let total: u64 = times.iter().sum();
         let step = total.div_ceil(SAMPLE).max(1);
-        let (mut sample, mut next) = (Vec::new(), 0);
-        let mut end = 0;
+        // Each stands for as many polytopes, those that are put elsewhere counted, as there are to the next; the last may stand for more than there are.
+        let (mut sample, mut weights): (Vec<u32>, Vec<f64>) = (Vec::new(), Vec::new());
+        let (mut counted, mut end) = (0, 0);
         for (index, &own) in (0..).zip(&times) {
             end += own;
-            if next < end {
-                sample.push((index, ((end - next).div_ceil(step) * step) as f64));
-                next += (end - next).div_ceil(step) * step;
+            if counted < end {
+                let weight = (end - counted).next_multiple_of(step);
+                sample.push(index);
+                weights.push(weight as f64);
+                counted += weight;
             }
         }
         self.polytopes.exchange(&mut self.tubes.cells);
-        let indices: Vec<u32> = sample.iter().map(|&(index, _)| index).collect();
-        let triangles = pieces::count(&self.polytopes, &self.near, &indices);
+        let triangles = pieces::count(&self.polytopes, &self.near, &sample);
         self.polytopes.exchange(&mut self.tubes.cells);
-        // Each stands for as many polytopes, those that are put elsewhere counted, as there are to the next.
         let mut expected = [0.0_f64; 2];
-        for (&(index, weight), triangles) in sample.iter().zip(triangles) {
+        for ((&index, weight), triangles) in sample.iter().zip(weights).zip(triangles) {
             expected[0] += weight * triangles / times[index as usize] as f64;
             expected[1] += weight * triangles;
         }
-        // The last may stand for more than there are.
-        let counted: f64 = sample.iter().map(|&(_, weight)| weight).sum();
-        expected.map(|triangles| (triangles * total as f64 / counted).max(0.0))
+        expected.map(|triangles| (triangles * total as f64 / counted as f64).max(0.0))
     }
 
     /// The boundary of the union of polytopes; `None` where none could be found.

@@ -17,7 +17,7 @@ impl<'a> Facing<'a> {
     /// Prepares a mesh. Cost: n log n.
     pub(super) fn new(mesh: &'a TriMesh) -> Self {
         let mut tree = BoxTree::default();
-        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&corners(mesh, triangle))), true);
+        tree.build(mesh.triangles.len(), |triangle| Some(Box32::of(&mesh.points_of(triangle))), true);
         Self { mesh, tree }
     }
 
@@ -25,7 +25,7 @@ impl<'a> Facing<'a> {
     /// neighbours never count a line twice, as an edge belongs to those points of the projection whose ray it meets from its lower end up to below its upper one.
     /// `None` where double precision knows no point within the triangle's projection. Cost: that of the triangles whose boxes the line meets.
     pub(super) fn looks_outward(&self, triangle: u32) -> Option<bool> {
-        let own = corners(self.mesh, triangle);
+        let own = self.mesh.points_of(triangle);
         let turned = |axis: usize, x: &Point| {
             (0..3)
                 .map(|k| turn(axis, &own[k], &own[(k + 1) % 3], x))
@@ -43,7 +43,7 @@ impl<'a> Facing<'a> {
         self.tree.query(&line, 0, |leaf| {
             for (&other, bounds) in self.tree.items(leaf).iter().zip(self.tree.boxes(leaf)) {
                 if other != triangle && bounds.meets(&line) {
-                    let others = corners(self.mesh, other);
+                    let others = self.mesh.points_of(other);
                     before += u64::from(is_crossed(axis, &others, &middle) && is_farther(axis, &others, &own, &middle));
                 }
             }
@@ -51,10 +51,6 @@ impl<'a> Facing<'a> {
         });
         Some(before.is_multiple_of(2) == faces_along)
     }
-}
-
-fn corners(mesh: &TriMesh, triangle: u32) -> [Point; 3] {
-    mesh.triangles[triangle as usize].map(|corner| mesh.vertices[corner as usize].to_array())
 }
 
 /// Whether the line along an axis through x crosses a triangle: whether a ray in the projection crosses its edges an odd number of times.
