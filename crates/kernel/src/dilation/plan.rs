@@ -478,12 +478,19 @@ impl<'a> Plan<'a> {
         if arrangement.triangles > 2.0 * allowed as f64 {
             return Err(too_many());
         }
-        let Some(Arranged { mut surface, uncertain }) = arrangement.run(budget)? else { return Ok(None) };
+        let Some(Arranged { mut surface, uncertain, is_done }) = arrangement.run(budget)? else { return Ok(None) };
         let (index, narrower, copies) = arrangement.into_index();
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
         self.prove(setting, surface.site_error, surface.triangles.len() as u64, budget);
+        if is_done {
+            if copies.triangles(&surface) > allowed {
+                return Err(too_many());
+            }
+            copies.put(&mut surface);
+            return self.certify(setting, Mended { surface, uncertain, crossings: 0 }, None, budget).map(Some);
+        }
         copies.round(&mut surface);
         let bounds = self.bounds.grown(2.0 * self.radius);
         let core = Core { low: bounds.low.map(|x| x.low), high: bounds.high.map(|x| x.high) };

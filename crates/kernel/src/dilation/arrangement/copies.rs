@@ -156,12 +156,12 @@ impl Copies {
 
     /// Rounds coordinates to single precision, and to multiples of the unit where surfaces are put elsewhere.
     pub(in crate::dilation) fn round(&self, surface: &mut BlockSurface) {
-        let coordinates = surface.vertices.iter_mut().flatten();
-        if self.is_empty() {
-            coordinates.for_each(|x| *x = f64::from(*x as f32));
-        } else {
-            coordinates.for_each(|x| *x = whole(*x, self.unit));
-        }
+        surface.vertices.iter_mut().flatten().for_each(|x| *x = self.rounded(*x));
+    }
+
+    /// A coordinate, rounded so.
+    pub(super) fn rounded(&self, x: f64) -> f64 {
+        if self.is_empty() { f64::from(x as f32) } else { whole(x, self.unit) }
     }
 
     /// Whether all coordinates still are multiples of the unit.

@@ -157,7 +157,7 @@ impl<'a> Engine<'a> {
         let surface = BlockSurface { vertices: boundary.points, triangles: boundary.triangles, ..BlockSurface::default() };
         // A set is as often there as its part.
         let times = |doubt: &Doubt| self.copies.times(&self.sites[doubt.sites[0] as usize]);
-        Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().iter().map(times).sum() })))
+        Ok(Run::Done(Box::new(Arranged { surface, uncertain: sets.doubts().iter().map(times).sum(), is_done: false })))
     }
 
     pub(super) fn bodies(&self) -> Bodies<'_> {

@@ -22,6 +22,7 @@ mod joints;
 mod nerve;
 mod noise;
 mod pieces;
+mod planar;
 mod polyhedron;
 mod polytopes;
 mod solids;
@@ -92,6 +93,8 @@ pub(super) struct Arrangement {
     loose: Loose,
     /// Where parts were that are like others.
     copies: Arc<Copies>,
+    /// The surface, where all lies in a plane.
+    flat: Option<BlockSurface>,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
@@ -116,6 +119,8 @@ pub(super) struct Arranged {
     pub(super) surface: BlockSurface,
     /// Sets of sites of which it is not proven that their polytopes have a common point exactly where their dilations have.
     pub(super) uncertain: u64,
+    /// Whether it has few triangles, in coordinates that can be written, and crosses nothing.
+    pub(super) is_done: bool,
 }
 
 impl Arrangement {
@@ -145,6 +150,14 @@ impl Arrangement {
         }
         let put = if copies.is_empty() { 0.0 } else { copies.moved + setting.rounding };
         let setting = setting.narrower(put, setting.slack);
+        if let Some(flat) = planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
+            let mut arrangement = Self::empty(kinds, setting, surfaces, Arc::new(copies));
+            let (leaves, site_error) = (arrangement.sites.leaves, arrangement.sites.error);
+            arrangement.made = flat.triangles.len() as f64;
+            arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
+            arrangement.flat = Some(BlockSurface { leaves, site_error, ..flat });
+            return Ok(Some(arrangement));
+        }
         let slack = CLEARED * setting.slack;
         let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
         let (error, leaves) = (kinds.error, kinds.leaves);
@@ -172,10 +185,17 @@ impl Arrangement {
         copies: Arc<Copies>,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
+        let mut arrangement = Self::empty(sites, setting, solids, copies);
         // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
-        let faces: usize = solids.iter().map(|solid| solid.triangles.len()).sum();
-        let inside = 0.5 * left * faces as f64 / sites.leaves as f64;
-        let mut arrangement = Self {
+        let faces: usize = arrangement.solids.iter().map(|solid| solid.triangles.len()).sum();
+        let inside = 0.5 * left * faces as f64 / arrangement.sites.leaves as f64;
+        arrangement.inside = inside;
+        Ok(arrangement.begin(budget)?.then_some(arrangement))
+    }
+
+    /// One without polytopes.
+    fn empty(sites: Sites, setting: Setting, solids: Vec<TriMesh>, copies: Arc<Copies>) -> Self {
+        Self {
             setting,
             sites,
             beyond: Vec::new(),
@@ -184,13 +204,13 @@ impl Arrangement {
             tubes: Tubes::default(),
             loose: Loose::new(),
             copies,
+            flat: None,
             polytopes: Polytopes::default(),
             solids,
-            inside,
+            inside: 0.0,
             made: 0.0,
             triangles: 0.0,
-        };
-        Ok(arrangement.begin(budget)?.then_some(arrangement))
+        }
     }
 
     /// Makes the first polytopes, with no bends at ends that are loose; false where a lattice serves better.
@@ -322,6 +342,9 @@ impl Arrangement {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
+        if let Some(surface) = self.flat.take() {
+            return Ok(Some(Arranged { surface, uncertain: 0, is_done: true }));
+        }
         let solids = std::mem::take(&mut self.solids);
         let inside: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
         let (mut trial, mut was_bent) = (0, false);
@@ -361,7 +384,9 @@ impl Arrangement {
 
     /// Its figures, for searches, its setting, and where parts were that are like others.
     pub(super) fn into_index(mut self) -> (Index, Setting, Arc<Copies>) {
-        self.sites.list.truncate(self.tubes.figures);
+        if self.tubes.figures > 0 {
+            self.sites.list.truncate(self.tubes.figures);
+        }
         (Index::new(self.sites.list, self.setting.slack), self.setting, self.copies)
     }
 }

@@ -1,0 +1,382 @@
+//! The upper half of a surface around bodies in a plane: a sheet over it, of triangles between rings at several heights.
+//!
+//! Rings, and lines along creases between them, are the constraints of a Delaunay triangulation of the plane (Chew, "Constrained Delaunay triangulations", 1989). What is within the lowest rings, the rim, is the sheet's base. Above it the sheet has a height everywhere but at the rim: so it
+//! crosses nothing, nor does it meet its mirror image, which closes it. Every triangle is held against all bodies; where it is too near to one, or too far from all, places are added.
+
+use super::rings::Ring;
+use super::valleys::Lines;
+use super::wires::{Body, Wires, dot, plus};
+use super::{Limits, Place};
+use crate::attractor::cell::{Point, cross, distance_squared, dot as dot_in_space, subtract, unit};
+use crate::budget::{Budget, Stopped};
+use crate::dilation::surface::NameMap;
+use crate::groups::Groups;
+use crate::measure::triangle::closest_on_triangle;
+use crate::solid::box_tree::Box32;
+use rayon::prelude::*;
+use spade::handles::{DirectedEdgeHandle, FixedVertexHandle};
+use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+/// Rounds in which places are added.
+const ROUNDS: usize = 12;
+/// Steps towards the closest places of a triangle and a body.
+const STEPS: usize = 8;
+/// How often a triangle is halved at most that no one body is near to, and how much wider than the reach what is that is not asked for.
+const DEPTH: u32 = 24;
+const WIDE: f64 = 4.0;
+/// How far out in the band a place is added where the surface is too near, and where it is too far.
+const OUT: [f64; 2] = [0.98, 0.4];
+/// What is lower than this, in units of the band's inner end, is at the rim.
+const LOW: f64 = 0.05;
+/// Triangles that are looked at in a row.
+const IN_A_ROW: usize = 64;
+
+/// A vertex of the sheet: over a place of the plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vertex {
+    pub(super) at: Place,
+    /// 0 at the rim alone.
+    pub(super) height: f64,
+}
+
+impl HasPosition for Vertex {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        Point2::new(self.at[0], self.at[1])
+    }
+}
+
+/// A sheet with as many components and holes as its base.
+pub(super) struct Sheet {
+    pub(super) vertices: Vec<Vertex>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) components: u64,
+    pub(super) holes: u64,
+}
+
+/// A place where a triangle is too near to a body, or too far from all.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    Near(Point),
+    Far(Point),
+}
+
+type Mesh = ConstrainedDelaunayTriangulation<Vertex>;
+
+/// The sheet over rings and lines between them, between the ends of the band from all bodies; none where rings cross, or places do not make it so.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn sheet(
+    wires: &Wires,
+    rings: &[Ring],
+    lines: &Lines,
+    limits: &Limits<impl Fn(f64) -> f64 + Sync>,
+    budget: &Budget,
+) -> Result<Option<Sheet>, Stopped> {
+    let Some(mut plane) = Plane::new(rings, lines) else { return Ok(None) };
+    let mut known: NameMap<u128, ()> = NameMap::default();
+    for _ in 0..ROUNDS {
+        let Some(triangles) = plane.base() else { return Ok(None) };
+        let new: Vec<[u32; 3]> = triangles.iter().copied().filter(|triangle| !known.contains_key(&key(triangle))).collect();
+        let check = |some: &[[u32; 3]]| -> Result<Vec<Option<Fault>>, Stopped> {
+            budget.cancel.check()?;
+            Ok(some.iter().map(|triangle| fault(wires, &triangle.map(|vertex| plane.point(vertex)), [limits.inner, limits.outer])).collect())
+        };
+        let faults: Vec<Option<Fault>> = new.par_chunks(IN_A_ROW).map(check).collect::<Result<Vec<_>, Stopped>>()?.concat();
+        if faults.iter().all(Option::is_none) {
+            return Ok(plane.finish(wires, triangles));
+        }
+        for (triangle, fault) in new.iter().zip(faults) {
+            let is_mended = match fault {
+                None => known.insert(key(triangle), ()).is_none(),
+                Some(fault) => plane.mend(wires, triangle, fault, limits).is_some(),
+            };
+            if !is_mended {
+                return Ok(None);
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// What a triangle is called.
+fn key(triangle: &[u32; 3]) -> u128 {
+    let mut sorted = *triangle;
+    sorted.sort_unstable();
+    sorted.iter().fold(0, |key, &vertex| key << 32 | u128::from(vertex))
+}
+
+/// Whether an edge is one of the rim.
+fn is_rim(edge: &DirectedEdgeHandle<'_, Vertex, (), CdtEdge<()>, ()>) -> bool {
+    edge.is_constraint_edge() && edge.from().data().height == 0.0 && edge.to().data().height == 0.0
+}
+
+/// The triangulated plane, and the places where it has vertices.
+struct Plane {
+    mesh: Mesh,
+    numbers: NameMap<[u64; 2], FixedVertexHandle>,
+}
+
+impl Plane {
+    fn new(rings: &[Ring], lines: &Lines) -> Option<Self> {
+        let mut plane = Self { mesh: Mesh::new(), numbers: NameMap::default() };
+        let mut own: Vec<FixedVertexHandle> = Vec::new();
+        for ring in rings {
+            own.clear();
+            for corner in &ring.corners {
+                own.push(plane.add(Vertex { at: corner.at, height: ring.height })?);
+            }
+            for (k, &from) in own.iter().enumerate() {
+                // What is above the rim is led along rings, and need not follow them.
+                let is_joined = plane.join(from, own[(k + 1) % own.len()]);
+                if !is_joined && ring.height == 0.0 {
+                    return None;
+                }
+            }
+        }
+        for &joint in &lines.joints {
+            plane.add(joint)?;
+        }
+        for line in &lines.all {
+            if let [Some(&from), Some(&to)] = line.map(|at| plane.numbers.get(&at.map(f64::to_bits))) {
+                plane.join(from, to);
+            }
+        }
+        Some(plane)
+    }
+
+    /// Adds a vertex; none where there is one.
+    fn add(&mut self, vertex: Vertex) -> Option<FixedVertexHandle> {
+        let count = self.mesh.num_vertices();
+        let handle = self.mesh.insert(vertex).ok()?;
+        self.numbers.insert(vertex.at.map(f64::to_bits), handle);
+        (handle.index() == count).then_some(handle)
+    }
+
+    /// Makes an edge between vertices, unless it would cross another.
+    fn join(&mut self, from: FixedVertexHandle, to: FixedVertexHandle) -> bool {
+        self.mesh.can_add_constraint(from, to) && self.mesh.add_constraint(from, to)
+    }
+
+    fn vertex(&self, number: u32) -> Vertex {
+        *self.mesh.vertex(FixedVertexHandle::from_index(number as usize)).data()
+    }
+
+    fn point(&self, number: u32) -> Point {
+        let Vertex { at, height } = self.vertex(number);
+        [at[0], at[1], height]
+    }
+
+    /// The triangles within an odd number of rims; none where a rim is not closed.
+    fn base(&self) -> Option<Vec<[u32; 3]>> {
+        let mesh = &self.mesh;
+        let mut sides: Vec<Option<bool>> = vec![None; mesh.num_all_faces()];
+        let mut open = vec![mesh.outer_face().fix()];
+        sides[open[0].index()] = Some(false);
+        let hull: Vec<_> = mesh.convex_hull().collect();
+        while let Some(face) = open.pop() {
+            let own = sides[face.index()] == Some(true);
+            let inner = mesh.face(face).as_inner().map(|inner| inner.adjacent_edges());
+            for edge in inner.as_ref().map_or(&hull[..], |edges| &edges[..]) {
+                let (other, theirs) = (edge.rev().face().fix(), own != is_rim(edge));
+                match sides[other.index()] {
+                    None => {
+                        sides[other.index()] = Some(theirs);
+                        open.push(other);
+                    }
+                    Some(known) if known != theirs => return None,
+                    Some(_) => {}
+                }
+            }
+        }
+        let inside = mesh.inner_faces().filter(|face| sides[face.fix().index()] == Some(true));
+        Some(inside.map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect())
+    }
+
+    /// Adds a place where a triangle has a fault, or moves an edge of the rim out or in there; none where that is not possible.
+    fn mend(&mut self, wires: &Wires, triangle: &[u32; 3], fault: Fault, limits: &Limits<impl Fn(f64) -> f64>) -> Option<()> {
+        let (x, out) = match fault {
+            Fault::Near(x) => (x, OUT[0]),
+            Fault::Far(x) => (x, OUT[1]),
+        };
+        let (at, wanted) = ([x[0], x[1]], limits.inner + out * (limits.outer - limits.inner));
+        if x[2] < LOW * limits.inner {
+            let edges = (0..3).map(|k| [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize)));
+            let edge = edges.filter_map(|[from, to]| self.mesh.get_edge_from_neighbors(from, to)).find(is_rim);
+            if let Some(edge) = edge {
+                let (ends, edge) = ([edge.from().fix(), edge.to().fix()], edge.as_undirected().fix());
+                let (distance, away) = wires.away(at)?;
+                let at = plus(at, wanted - distance, away).map(&limits.round);
+                self.mesh.remove_constraint_edge(edge);
+                let new = self.add(Vertex { at, height: 0.0 })?;
+                return (self.join(ends[0], new) && self.join(new, ends[1])).then_some(());
+            }
+        }
+        let crease = if matches!(fault, Fault::Far(_)) { wires.crease(at, limits.outer) } else { None };
+        for at in crease.into_iter().chain([at]).map(|at| at.map(&limits.round)) {
+            let (distance, _) = wires.away(at)?;
+            let square = wanted * wanted - distance * distance;
+            if square > 0.0 && !self.numbers.contains_key(&at.map(f64::to_bits)) {
+                return self.add(Vertex { at, height: limits.height(square.sqrt()) }).map(|_| ());
+            }
+        }
+        // A neighbour's fault may have been there.
+        Some(())
+    }
+
+    /// The sheet, if nothing but the rim is as low as the plane, and all bodies are below it.
+    fn finish(&self, wires: &Wires, triangles: Vec<[u32; 3]>) -> Option<Sheet> {
+        let vertices: Vec<Vertex> = self.mesh.vertices().map(|vertex| *vertex.data()).collect();
+        let is_low = |vertex: u32| vertices[vertex as usize].height == 0.0;
+        let (mut low_edges, mut is_used) = (0, vec![false; vertices.len()]);
+        for triangle in &triangles {
+            triangle.iter().for_each(|&vertex| is_used[vertex as usize] = true);
+            let low = (0..3).filter(|&k| is_low(triangle[k]) && is_low(triangle[(k + 1) % 3])).count();
+            low_edges += low;
+            if low == 3 {
+                return None;
+            }
+        }
+        // A rim's edge has one triangle, and a vertex of it two such edges; others between them have two.
+        let rim = vertices.iter().zip(&is_used).filter(|(vertex, used)| **used && vertex.height == 0.0).count();
+        let mut groups = Groups::of_triangles(vertices.len(), &triangles);
+        let components = (0..vertices.len()).filter(|&vertex| is_used[vertex] && groups.of(vertex) as usize == vertex).count() as u64;
+        let edges = (3 * triangles.len() + rim) / 2;
+        let euler = is_used.iter().filter(|used| **used).count() as i64 - edges as i64 + triangles.len() as i64;
+        let is_closed = low_edges == rim;
+        (is_closed && self.is_above(wires, &triangles)).then_some(())?;
+        Some(Sheet { vertices, triangles, components, holes: (components as i64 - euler).try_into().ok()? })
+    }
+
+    /// Whether all bodies are in the base. No edge of the rim is near to one: so that is so if one vertex of those that hang together is.
+    fn is_above(&self, wires: &Wires, triangles: &[[u32; 3]]) -> bool {
+        let inside: NameMap<u128, ()> = triangles.iter().map(|triangle| (key(triangle), ())).collect();
+        let mut groups = Groups::new(wires.places.len());
+        wires.bodies.iter().for_each(|body| {
+            groups.join(body.ends[0] as usize, body.ends[1] as usize);
+        });
+        let is_within = |place: &Place| {
+            use spade::PositionInTriangulation::{OnEdge, OnFace, OnVertex};
+            let faces: Vec<[u32; 3]> = match self.mesh.locate(Point2::new(place[0], place[1])) {
+                OnFace(face) => vec![self.mesh.face(face).vertices().map(|vertex| vertex.fix().index() as u32)],
+                OnEdge(edge) => {
+                    let edge = self.mesh.directed_edge(edge);
+                    let faces = [edge.face(), edge.rev().face()].into_iter().filter_map(|face| face.as_inner());
+                    faces.map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect()
+                }
+                OnVertex(vertex) => {
+                    let edges = self.mesh.vertex(vertex).out_edges();
+                    edges.filter_map(|edge| edge.face().as_inner()).map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect()
+                }
+                _ => Vec::new(),
+            };
+            !faces.is_empty() && faces.iter().all(|face| inside.contains_key(&key(face)))
+        };
+        (0..wires.places.len()).all(|vertex| groups.of(vertex) as usize != vertex || is_within(&wires.places[vertex]))
+    }
+}
+
+/// Where a triangle is nearer to a body than the first, or farther from all of them than the second of two ends.
+fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Option<Fault> {
+    let flat = triangle.map(|corner| [corner[0], corner[1], 0.0]);
+    let within = Box32::of(&flat);
+    let mut near: Vec<u32> = Vec::new();
+    let longest = (0..3).map(|k| distance_squared(&triangle[k], &triangle[(k + 1) % 3])).fold(0.0, f64::max);
+    // Nothing is nearer to what is so high.
+    let is_high = triangle.iter().all(|corner| corner[2] >= inner);
+    let edge = |k: usize| subtract(&triangle[k], &triangle[0]);
+    let normal = unit(&cross(&edge(1), &edge(2)));
+    let height = dot_in_space(&normal, &triangle[0]);
+    let (mut is_covered, mut found) = (false, None);
+    wires.tree.query(&within, 0, |leaf| {
+        for (&item, theirs) in wires.tree.items(leaf).iter().zip(wires.tree.boxes(leaf)) {
+            if !within.meets(theirs) {
+                continue;
+            }
+            let body = &wires.bodies[item as usize];
+            let squares = triangle.map(|[x, y, z]| body.square([x, y]) + z * z);
+            is_covered |= squares.iter().all(|&square| square <= outer * outer);
+            near.push(item);
+            // The square of the distance, less that from any point, is concave: on the triangle it is no less than the least at a corner less the square of the radius of a ball around it.
+            let least = squares.iter().copied().fold(f64::INFINITY, f64::min);
+            if found.is_none() && !is_high && least - longest / 3.0 < inner * inner && height - body.highest(normal) < inner {
+                found = too_near(triangle, body, inner).map(Fault::Near);
+            }
+        }
+        found.is_none() && !(is_covered && is_high)
+    });
+    if found.is_some() || is_covered {
+        return found;
+    }
+    Cover { wires, most: outer }.far(&near, triangle, DEPTH).map(Fault::Far)
+}
+
+/// A place of a triangle that is nearer to a body than `least`, unless a plane parts them by as much. Alternating projections converge to the closest places.
+fn too_near(triangle: &[Point; 3], body: &Body, least: f64) -> Option<Point> {
+    let mut q = middle(triangle);
+    for _ in 0..STEPS {
+        let p = body.closest([q[0], q[1]]);
+        let way = [q[0] - p[0], q[1] - p[1], q[2]];
+        let length = dot_in_space(&way, &way).sqrt();
+        if length <= least {
+            return Some(q);
+        }
+        let unit = way.map(|part| part / length);
+        let lowest = triangle.iter().map(|corner| dot_in_space(corner, &unit)).fold(f64::INFINITY, f64::min);
+        if lowest - body.highest(unit) > least {
+            return None;
+        }
+        q = closest_on_triangle(&[p[0], p[1], 0.0], &triangle[0], &triangle[1], &triangle[2]);
+    }
+    Some(q)
+}
+
+fn middle(triangle: &[Point; 3]) -> Point {
+    std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0)
+}
+
+impl Body {
+    /// The largest value of its places along a direction in space.
+    fn highest(&self, direction: Point) -> f64 {
+        let across = [direction[0], direction[1]];
+        dot(across, self.from) + (self.length * dot(across, self.along)).max(0.0)
+    }
+}
+
+/// Whether bodies are near to all of a triangle.
+struct Cover<'a> {
+    wires: &'a Wires,
+    most: f64,
+}
+
+impl Cover<'_> {
+    /// A place of a triangle that may be farther from all of some bodies. The distance grows by no more than the way; and that from a convex body is convex, so that one that is near to all corners is near to all.
+    fn far(&self, near: &[u32], triangle: &[Point; 3], depth: u32) -> Option<Point> {
+        let square = |body: u32, [x, y, z]: &Point| self.wires.bodies[body as usize].square([*x, *y]) + z * z;
+        let centre = middle(triangle);
+        let wide = triangle.iter().map(|corner| distance_squared(corner, &centre)).fold(0.0, f64::max).sqrt();
+        let reach = (self.most + wide).powi(2);
+        let (mut least, mut left) = (f64::INFINITY, Vec::new());
+        for &body in near {
+            let square = square(body, &centre);
+            if square <= reach {
+                least = least.min(square);
+                left.push(body);
+            }
+        }
+        let least = least.sqrt();
+        if least > self.most || depth == 0 {
+            return Some(centre);
+        }
+        let covers = |&body: &u32| triangle.iter().all(|corner| square(body, corner) <= self.most * self.most);
+        if least + wide <= self.most || (wide < WIDE * self.most && left.iter().any(covers)) {
+            return None;
+        }
+        let long = |k: usize| distance_squared(&triangle[k], &triangle[(k + 1) % 3]);
+        let k = (0..3).max_by(|&a, &b| long(a).total_cmp(&long(b)))?;
+        let (a, b, c) = (triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+        let half: Point = std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]));
+        self.far(&left, &[a, half, c], depth - 1).or_else(|| self.far(&left, &[half, b, c], depth - 1))
+    }
+}
