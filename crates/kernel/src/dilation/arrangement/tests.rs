@@ -40,7 +40,7 @@ fn points(vertices: &[DVec3]) -> Attractor {
     lowered(vertices, (0..vertices.len() as u32).map(|k| vec![k]).collect())
 }
 
-fn wires(segments: &[[DVec3; 2]]) -> Attractor {
+pub(super) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
     let vertices: Vec<DVec3> = segments.iter().flatten().copied().collect();
     lowered(&vertices, (0..segments.len() as u32).map(|k| vec![2 * k, 2 * k + 1]).collect())
 }
@@ -60,7 +60,7 @@ pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'
     Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
 }
 
-fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
+pub(super) fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
     let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
     let setting = plan.setting(plan.pitch(), &budget);
     plan.arranged(&setting, &plan.space(&setting), &budget).unwrap()
@@ -123,7 +123,7 @@ fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: imp
 }
 
 /// Whether all places deeper than the bounds are inside and all beyond are not.
-fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, size: f64, random: &mut Random) {
+pub(super) fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, size: f64, random: &mut Random) {
     let inside = Inside::new(dilation.solid.mesh());
     let distance = |x: DVec3| {
         let of = |[a, b]: &[DVec3; 2]| {

@@ -275,7 +275,7 @@ fn through([from, to]: &[Point; 2], [a, b, c]: &[Point; 3]) -> Option<Point> {
 /// Closest points of two segments (Ericson, "Real-Time Collision Detection", 2005, 5.1.9): the closest points of their
 /// lines, moved into the first, then into the second, and the first's closest to that. Of segments without length, and
 /// of parallel ones, ends are candidates anyway.
-fn closest_on_segments(a: &[Point; 2], b: &[Point; 2]) -> (Point, Point) {
+pub(crate) fn closest_on_segments(a: &[Point; 2], b: &[Point; 2]) -> (Point, Point) {
     let (u, v, r) = (subtract(&a[1], &a[0]), subtract(&b[1], &b[0]), subtract(&a[0], &b[0]));
     let (uu, vv, uv) = (dot(&u, &u), dot(&v, &v), dot(&u, &v));
     let (ur, vr) = (dot(&u, &r), dot(&v, &r));

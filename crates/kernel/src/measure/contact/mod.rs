@@ -17,7 +17,7 @@ use crate::attractor::{Address, Attractor};
 use crate::budget::{Budget, Stopped};
 use crate::error::Kind;
 use crate::tolerance::{NotPositive, Tolerance};
-pub(crate) use body::{Body, Nature, corners};
+pub(crate) use body::{Body, Nature, closest_on_segments, corners};
 pub use primitive::Primitive;
 pub(crate) use tree::{NodeId, Tree};
 

@@ -11,6 +11,8 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
 use std::f64::consts::{PI, TAU};
 
+/// Segments turn into each other if they turn by less than this.
+pub(super) const STRAIGHT: f64 = 1e-4;
 /// What a piece ends at that ends where its curve does.
 const NATURAL: u32 = NONE;
 
@@ -48,64 +50,71 @@ pub(super) struct Contour {
     pub(super) holes: u64,
 }
 
-/// Lengths below which nothing is told apart.
+/// What a piece of a curve ends at: where, at which curve, and how far off that may be by what is moved and rounded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Margins {
-    /// Of what is between dilations.
-    pub(super) gap: f64,
-    /// Of what is between ends on a curve: about the square root of twice the gap times the radius, as where circles touch.
-    pub(super) along: f64,
+struct End {
+    at: f64,
+    with: u32,
+    error: f64,
 }
 
-/// What a body covers of a curve, and the curves that bound that.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    ends: [(f64, u32); 2],
+impl End {
+    /// Whether it cannot be told from another.
+    fn is_like(&self, other: &Self) -> bool {
+        (self.at - other.at).abs() <= self.error + other.error
+    }
+
+    /// Whether it is before another for sure.
+    fn is_before(&self, other: &Self) -> bool {
+        self.at + self.error < other.at - other.error
+    }
 }
+
+/// What a body covers of a curve, or what is left of it.
+#[derive(Clone, Copy, Debug)]
+struct Span([End; 2]);
 
 /// What is left of a curve.
 #[derive(Default)]
 struct Left {
     open: Vec<Span>,
     after: Vec<Span>,
-    spans: Vec<[f64; 2]>,
-    ties: Vec<f64>,
+    spans: Vec<Span>,
+    ties: Vec<End>,
     length: f64,
-    margin: f64,
 }
 
 impl Left {
-    fn start(&mut self, to: f64, margin: f64) {
+    fn start(&mut self, to: f64, error: f64) {
         self.open.clear();
         self.spans.clear();
         self.ties.clear();
-        (self.length, self.margin) = (to, margin);
-        self.open.push(Span { ends: [(0.0, NATURAL), (to, NATURAL)] });
+        self.length = to;
+        self.open.push(Span([0.0, to].map(|at| End { at, with: NATURAL, error })));
     }
 
     /// Takes out what a body covers.
     fn cover(&mut self, span: &Span) {
-        let [from, to] = span.ends;
-        self.spans.push([from.0, to.0]);
+        let Span([from, to]) = *span;
+        self.spans.push(*span);
         self.after.clear();
         for piece in &self.open {
-            let [start, end] = piece.ends;
+            let Span([start, end]) = *piece;
             // Bodies with a vertex in common end at the same arc.
             for (own, like, other) in [(start, to, from), (end, from, to)] {
-                let is_close = |to: (f64, u32)| (to.0 - own.0).abs() < self.margin;
-                if is_close(like) && like.1 != own.1 || is_close(other) {
-                    self.ties.push(own.0);
+                if own.is_like(&like) && like.with != own.with || own.is_like(&other) {
+                    self.ties.push(End { error: own.error.max(like.error).max(other.error), ..own });
                 }
             }
-            if to.0 <= start.0 || from.0 >= end.0 {
+            if to.at <= start.at || from.at >= end.at {
                 self.after.push(*piece);
                 continue;
             }
-            if from.0 > start.0 {
-                self.after.push(Span { ends: [start, from] });
+            if from.at > start.at {
+                self.after.push(Span([start, from]));
             }
-            if to.0 < end.0 {
-                self.after.push(Span { ends: [to, end] });
+            if to.at < end.at {
+                self.after.push(Span([to, end]));
             }
         }
         std::mem::swap(&mut self.open, &mut self.after);
@@ -116,11 +125,12 @@ impl Left {
         self.open.is_empty() && self.is_certain()
     }
 
-    /// Whether all ties are covered with room.
+    /// Whether all ties are covered with room, or beyond the curve.
     fn is_certain(&self) -> bool {
-        let has_room = |tie: &f64| self.spans.iter().any(|span| span[0] < tie - self.margin && span[1] > tie + self.margin);
-        let is_beyond = |&tie: &f64| tie < -self.margin || tie > self.length + self.margin;
-        self.ties.iter().all(|tie| is_beyond(tie) || has_room(tie))
+        self.ties.iter().all(|tie| {
+            let is_beyond = tie.at + tie.error < 0.0 || tie.at - tie.error > self.length;
+            is_beyond || self.spans.iter().any(|Span([from, to])| from.is_before(tie) && tie.is_before(to))
+        })
     }
 }
 
@@ -128,43 +138,43 @@ impl Left {
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn contour(wires: &Wires, radius: f64, margins: Margins, budget: &Budget) -> Result<Option<Contour>, Stopped> {
+pub(super) fn contour(wires: &Wires, radius: f64, gap: f64, budget: &Budget) -> Result<Option<Contour>, Stopped> {
     let mut pieces: Vec<Piece> = Vec::new();
     let mut left = Left::default();
-    let mut add = |left: &Left, curve: Curve, scale: f64| {
-        for Span { ends: [from, to] } in &left.open {
-            let is_whole = from.1 == NATURAL && to.1 == NATURAL;
-            if !is_whole && (to.0 - from.0) * scale < margins.along {
+    let mut add = |left: &Left, curve: Curve| {
+        for Span([from, to]) in &left.open {
+            let is_whole = from.with == NATURAL && to.with == NATURAL;
+            if !is_whole && from.is_like(to) {
                 return false;
             }
-            pieces.push(Piece { curve, from: from.0, to: to.0, meets: [from.1, to.1] });
+            pieces.push(Piece { curve, from: from.at, to: to.at, meets: [from.with, to.with] });
         }
         left.is_certain()
     };
-    let (halves, reach) = (2 * wires.segments as u32, 2.0 * radius + margins.gap);
+    let (halves, reach) = (2 * wires.segments as u32, 2.0 * radius + gap);
     for half in 0..halves {
         if half.is_multiple_of(128) {
             budget.cancel.check()?;
         }
         let side = Side::new(wires, half, radius);
-        left.start(side.length, margins.along);
+        left.start(side.length, gap);
         let own = &wires.bodies[(half / 2) as usize];
         for other in wires.near(half / 2, reach) {
             let body = &wires.bodies[other as usize];
-            let leans = |along: Place| dot(along, side.right) > margins.along / radius;
+            let leans = |along: Place| dot(along, side.right) > STRAIGHT;
             let is_apart = (body.ends[0] == own.ends[0] || body.ends[0] == own.ends[1]) && !leans(body.along)
                 || (body.ends[1] == own.ends[0] || body.ends[1] == own.ends[1]) && !leans(body.along.map(|x| -x));
             if is_apart && body.length > 0.0 {
                 continue;
             }
-            if let Some(span) = side.covered(other, body, radius, margins, &mut left.ties) {
+            if let Some(span) = side.covered(other, body, radius, gap, &mut left.ties) {
                 left.cover(&span);
                 if left.is_closed() {
                     break;
                 }
             }
         }
-        if !add(&left, Curve::Side(half), 1.0) {
+        if !add(&left, Curve::Side(half)) {
             return Ok(None);
         }
     }
@@ -172,22 +182,23 @@ pub(super) fn contour(wires: &Wires, radius: f64, margins: Margins, budget: &Bud
         if vertex.is_multiple_of(128) {
             budget.cancel.check()?;
         }
+        let owner = wires.owner[vertex as usize];
         for (curve, start, width) in arcs(wires, vertex) {
-            let owner = wires.owner[vertex as usize];
-            left.start(width, margins.along / radius);
+            let arc = Around { place: wires.places[vertex as usize], start, width };
+            left.start(width, gap / radius);
             for other in wires.near(owner, reach) {
                 let body = &wires.bodies[other as usize];
                 if body.ends.contains(&vertex) {
                     continue;
                 }
-                for span in around(wires.places[vertex as usize], start, width, other, body, wires, radius, margins, &mut left.ties).into_iter().flatten() {
+                for span in arc.covered(other, body, radius, gap, &mut left.ties).into_iter().flatten() {
                     left.cover(&span);
                 }
                 if left.is_closed() {
                     break;
                 }
             }
-            if !add(&left, curve, radius) {
+            if !add(&left, curve) {
                 return Ok(None);
             }
         }
@@ -198,7 +209,9 @@ pub(super) fn contour(wires: &Wires, radius: f64, margins: Margins, budget: &Bud
 /// The arcs around a vertex, with the angle at which each begins and how wide it is.
 fn arcs(wires: &Wires, vertex: u32) -> impl Iterator<Item = (Curve, f64, f64)> {
     let half = wires.convex[vertex as usize];
-    let is_loose = wires.owner[vertex as usize] as usize >= wires.segments;
+    let owner = wires.owner[vertex as usize];
+    // None has those that are as good as others.
+    let is_loose = owner != NONE && owner as usize >= wires.segments;
     let first = if half != NONE {
         let (_, right) = wires.way(half);
         Some((Curve::Arc { vertex, is_second: false }, right[1].atan2(right[0]), wires.turns[half as usize]))
@@ -211,6 +224,7 @@ fn arcs(wires: &Wires, vertex: u32) -> impl Iterator<Item = (Curve, f64, f64)> {
 
 /// A half-edge's side.
 struct Side {
+    ends: [u32; 2],
     from: Place,
     along: Place,
     right: Place,
@@ -220,39 +234,41 @@ struct Side {
 impl Side {
     fn new(wires: &Wires, half: u32, radius: f64) -> Self {
         let (along, right) = wires.way(half);
-        let start = wires.places[wires.ends(half)[0] as usize];
-        Self { from: plus(start, radius, right), along, right, length: wires.bodies[(half / 2) as usize].length }
+        let ends = wires.ends(half);
+        let start = wires.places[ends[0] as usize];
+        Self { ends, from: plus(start, radius, right), along, right, length: wires.bodies[(half / 2) as usize].length }
     }
 
     /// What a body covers of the line.
-    fn covered(&self, number: u32, body: &Body, radius: f64, margins: Margins, ties: &mut Vec<f64>) -> Option<Span> {
+    fn covered(&self, number: u32, body: &Body, radius: f64, gap: f64, ties: &mut Vec<End>) -> Option<Span> {
         let local = |at: Place| -> Place {
             let way = minus(at, self.from);
             [dot(way, self.along), dot(way, self.right)]
         };
         let (c, u) = (local(body.from), [dot(body.along, self.along), dot(body.along, self.right)]);
         let d = plus(c, body.length, u);
-        let mut ends = [(f64::INFINITY, NONE), (f64::NEG_INFINITY, NONE)];
-        let mut meet = |at: f64, with: u32| {
-            if at < ends[0].0 {
-                ends[0] = (at, with);
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY].map(|at| End { at, with: NONE, error: 0.0 });
+        let mut meet = |own: End| {
+            if own.at < ends[0].at {
+                ends[0] = own;
             }
-            if at > ends[1].0 {
-                ends[1] = (at, with);
+            if own.at > ends[1].at {
+                ends[1] = own;
             }
         };
         let square = radius * radius;
         for (end, at, sign) in [(0, c, 1.0), (1, d, -1.0)] {
             let rest = square - at[1] * at[1];
-            if rest > 0.0 {
+            if rest > 2.0 * radius * gap {
                 let half = rest.sqrt();
                 for s in [at[0] - half, at[0] + half] {
                     if sign * ((s - at[0]) * u[0] - at[1] * u[1]) <= 0.0 {
-                        meet(s, vertex_curve(body.ends[end]));
+                        meet(End { at: s, with: vertex_curve(body.ends[end]), error: gap * (1.0 + radius / half) });
                     }
                 }
-            } else if rest > -2.0 * radius * margins.gap {
-                ties.push(at[0]);
+            } else if rest > -2.0 * radius * gap && !self.ends.contains(&body.ends[end]) {
+                // They may touch, as far around as this. What is around its own ends does where it ends.
+                ties.push(End { at: at[0], with: NONE, error: 2.0 * (radius * gap).sqrt() });
             }
         }
         if u[1] != 0.0 {
@@ -261,11 +277,11 @@ impl Side {
                 let s = c[0] - (sign * radius + u[0] * c[1]) / u[1];
                 let at = (s - c[0]) * u[0] - c[1] * u[1];
                 if at > 0.0 && at < body.length {
-                    meet(s, half);
+                    meet(End { at: s, with: half, error: gap * (1.0 + 1.0 / u[1].abs()) });
                 }
             }
         }
-        (ends[0].0 < ends[1].0).then_some(Span { ends })
+        (ends[0].at < ends[1].at).then_some(Span(ends))
     }
 }
 
@@ -274,83 +290,84 @@ fn vertex_curve(vertex: u32) -> u32 {
     vertex | 1 << 31
 }
 
-/// What a body covers of an arc around a place that begins at an angle, by angles beyond that.
-#[allow(clippy::too_many_arguments)]
-fn around(
+/// An arc around a place, from an angle on.
+struct Around {
     place: Place,
     start: f64,
     width: f64,
-    number: u32,
-    body: &Body,
-    wires: &Wires,
-    radius: f64,
-    margins: Margins,
-    ties: &mut Vec<f64>,
-) -> [Option<Span>; 2] {
-    let _ = wires;
-    let way = minus(body.closest(place), place);
-    let square = dot(way, way);
-    if square >= (2.0 * radius + margins.gap).powi(2) {
-        return [None; 2];
-    }
-    let middle = (way[1].atan2(way[0]) - start).rem_euclid(TAU);
-    if square > (2.0 * radius - margins.gap).powi(2) {
-        ties.push(middle);
-        return [None; 2];
-    }
-    let distance = square.sqrt();
-    let x = way.map(|part| part / distance);
-    let local = |way: Place| -> Place { [dot(way, x), cross(x, way)] };
-    let (c, u) = (local(minus(body.from, place)), local(body.along));
-    let mut ends = [(f64::NEG_INFINITY, NONE), (f64::INFINITY, NONE)];
-    let mut meet = |at: Place, with: u32| {
-        let angle = at[1].atan2(at[0]);
-        if angle < 0.0 && angle > ends[0].0 {
-            ends[0] = (angle, with);
+}
+
+impl Around {
+    /// What a body covers of the arc, by angles beyond its begin.
+    fn covered(&self, number: u32, body: &Body, radius: f64, gap: f64, ties: &mut Vec<End>) -> [Option<Span>; 2] {
+        let way = minus(body.closest(self.place), self.place);
+        let square = dot(way, way);
+        if square >= (2.0 * radius + gap).powi(2) {
+            return [None; 2];
         }
-        if angle > 0.0 && angle < ends[1].0 {
-            ends[1] = (angle, with);
+        let middle = (way[1].atan2(way[0]) - self.start).rem_euclid(TAU);
+        // They may touch, as far around as this.
+        let touch = End { at: middle, with: NONE, error: 2.0 * (gap / radius).sqrt() };
+        if square > (2.0 * radius - gap).powi(2) {
+            ties.push(touch);
+            return [None; 2];
         }
-    };
-    let d = plus(c, body.length, u);
-    for (end, at, sign) in [(0, c, 1.0), (1, d, -1.0)] {
-        let far = dot(at, at);
-        let rest = radius * radius - 0.25 * far;
-        if rest > 0.0 {
-            let side = (rest / far).sqrt();
-            for side in [-side, side] {
-                let meeting = [0.5 * at[0] - side * at[1], 0.5 * at[1] + side * at[0]];
-                if sign * dot(minus(meeting, at), u) <= 0.0 {
-                    meet(meeting, vertex_curve(body.ends[end]));
-                }
+        let distance = square.sqrt();
+        let x = way.map(|part| part / distance);
+        let local = |way: Place| -> Place { [dot(way, x), cross(x, way)] };
+        let (c, u) = (local(minus(body.from, self.place)), local(body.along));
+        let d = plus(c, body.length, u);
+        let mut ends = [f64::NEG_INFINITY, f64::INFINITY].map(|at| End { at, with: NONE, error: 0.0 });
+        // Half of the chord that both have in common tells how far off it may be.
+        let mut meet = |at: Place, with: u32, chord: f64| {
+            let own = End { at: at[1].atan2(at[0]), with, error: gap * (1.0 / radius + 1.0 / chord) };
+            if own.at < 0.0 && own.at > ends[0].at {
+                ends[0] = own;
             }
-        }
-    }
-    if body.length > 0.0 {
-        let normal = [-u[1], u[0]];
-        let height = -dot(normal, c);
-        for (sign, half) in [(1.0, 2 * number + 1), (-1.0, 2 * number)] {
-            let off = sign * radius - height;
-            let rest = radius * radius - off * off;
+            if own.at > 0.0 && own.at < ends[1].at {
+                ends[1] = own;
+            }
+        };
+        for (end, at, sign) in [(0, c, 1.0), (1, d, -1.0)] {
+            let far = dot(at, at);
+            let rest = radius * radius - 0.25 * far;
             if rest > 0.0 {
-                let along = rest.sqrt();
-                for along in [-along, along] {
-                    let meeting = plus(normal.map(|part| off * part), along, u);
-                    let at = dot(minus(meeting, c), u);
-                    if at > 0.0 && at < body.length {
-                        meet(meeting, half);
+                let side = (rest / far).sqrt();
+                for side in [-side, side] {
+                    let meeting = [0.5 * at[0] - side * at[1], 0.5 * at[1] + side * at[0]];
+                    if sign * dot(minus(meeting, at), u) <= 0.0 {
+                        // Close circles meet at a flat angle.
+                        meet(meeting, vertex_curve(body.ends[end]), rest.sqrt().min(0.5 * far.sqrt()));
                     }
                 }
             }
         }
+        if body.length > 0.0 {
+            let normal = [-u[1], u[0]];
+            let height = -dot(normal, c);
+            for (sign, half) in [(1.0, 2 * number + 1), (-1.0, 2 * number)] {
+                let off = sign * radius - height;
+                let rest = radius * radius - off * off;
+                if rest > 0.0 {
+                    let along = rest.sqrt();
+                    for along in [-along, along] {
+                        let meeting = plus(normal.map(|part| off * part), along, u);
+                        let at = dot(minus(meeting, c), u);
+                        if at > 0.0 && at < body.length {
+                            meet(meeting, half, along.abs());
+                        }
+                    }
+                }
+            }
+        }
+        if ends.iter().any(|end| end.with == NONE) {
+            ties.push(touch);
+            return [None; 2];
+        }
+        let span = |turn: f64| Span(ends.map(|end| End { at: middle + turn + end.at, ..end }));
+        let reaches = |Span([from, to]): &Span| to.at > -to.error && from.at < self.width + from.error;
+        [0.0, -TAU].map(|turn| Some(span(turn)).filter(reaches))
     }
-    if ends[0].1 == NONE || ends[1].1 == NONE {
-        ties.push(middle);
-        return [None; 2];
-    }
-    let span = |turn: f64| Span { ends: ends.map(|(angle, with)| (middle + turn + angle, with)) };
-    let reaches = |span: &Span| span.ends[1].0 > -margins.along / radius && span.ends[0].0 < width + margins.along / radius;
-    [0.0, -TAU].map(|turn| Some(span(turn)).filter(reaches))
 }
 
 /// The contour of pieces, joined where they meet; none where one has no other to go on with.
@@ -362,7 +379,8 @@ fn joined(wires: &Wires, radius: f64, pieces: Vec<Piece>) -> Option<Contour> {
     let mut starts: NameMap<[u32; 2], u32> = NameMap::default();
     for (number, piece) in (0..).zip(&pieces) {
         // A second arc begins where the first ends.
-        let own = if piece.meets[0] == NATURAL && matches!(piece.curve, Curve::Arc { is_second: true, .. }) { NONE - 1 } else { piece.meets[0] };
+        let own =
+            if piece.meets[0] == NATURAL && matches!(piece.curve, Curve::Arc { is_second: true, .. }) { NONE - 1 } else { piece.meets[0] };
         if starts.insert([id(piece.curve), own], number).is_some() {
             return None;
         }

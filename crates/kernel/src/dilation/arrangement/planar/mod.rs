@@ -11,6 +11,8 @@
 mod contour;
 mod rings;
 mod sheet;
+#[cfg(test)]
+mod tests;
 mod valleys;
 mod wires;
 
@@ -19,7 +21,7 @@ use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
 use crate::dilation::surface::BlockSurface;
-use contour::{Contour, Margins, contour};
+use contour::{Contour, contour};
 use rings::{Band, Corner, Ring, rings};
 use sheet::{Sheet, sheet};
 use std::f64::consts::PI;
@@ -31,6 +33,8 @@ type Place = [f64; 2];
 
 /// The least gap that is told apart, in units of the slack.
 const GAP: f64 = 16.0;
+/// By how much bodies may be off each other in contours, in units of that gap: what is closer is moved by up to three of them.
+const PERTURBED: f64 = 8.0;
 /// Levels at most.
 const MOST_LEVELS: usize = 64;
 /// Rings may be anywhere between the ends of the band but for these shares of it.
@@ -122,12 +126,12 @@ pub(super) fn surface(
     let spare = ROUNDINGS * setting.rounding + setting.slack;
     let limits = Limits { inner: setting.least + spare, outer: setting.outer - spare, base: round(base), round };
     let gap = GAP * setting.slack;
-    let margins = Margins { gap, along: 2.0 * (2.0 * gap * setting.reach).sqrt() };
-    let Some(wires) = Wires::new(&segments, 2.0 * setting.outer, gap, margins.along / setting.reach, budget)? else { return Ok(None) };
-    let Some(exact) = contour(&wires, setting.reach, margins, budget)? else { return Ok(None) };
-    let Some((all, distances)) = all_rings(&wires, &exact, &limits, margins, budget)? else { return Ok(None) };
+    let Some(wires) = Wires::new(&segments, 2.0 * setting.outer, gap, budget)? else { return Ok(None) };
+    let Some(exact) = contour(&wires, setting.reach, PERTURBED * gap, budget)? else { return Ok(None) };
+    let Some(Rings { all, distances }) = all_rings(&wires, &exact, &limits, PERTURBED * gap, budget)? else { return Ok(None) };
     let lines = Lines::new(&wires, &all, &distances, &limits);
-    let made = sheet(&wires, &all, &lines, &limits, budget)?.filter(|made| made.components == exact.components && made.holes == exact.holes);
+    let made =
+        sheet(&wires, &all, &lines, &limits, budget)?.filter(|made| made.components == exact.components && made.holes == exact.holes);
     Ok(made.map(|made| {
         mirrored(made, |at, height| {
             let mut point = [0.0; 3];
@@ -137,14 +141,20 @@ pub(super) fn surface(
     }))
 }
 
-/// The rings of all levels from the rim up, and how far the contours are that they are led along; none where the rim's is not like the exact one.
+/// The rings of all levels from the rim up, and how far the contours are that they are led along.
+struct Rings {
+    all: Vec<Ring>,
+    distances: Vec<f64>,
+}
+
+/// The rings of all levels; none where the rim's is not like the exact one.
 fn all_rings(
     wires: &Wires,
     exact: &Contour,
     limits: &Limits<impl Fn(f64) -> f64>,
-    margins: Margins,
+    gap: f64,
     budget: &Budget,
-) -> Result<Option<(Vec<Ring>, Vec<f64>)>, Stopped> {
+) -> Result<Option<Rings>, Stopped> {
     let band = limits.outer - limits.inner;
     let Some(levels) = levels(limits.inner + SPARE[0] * band, limits.outer - SPARE[1] * band, limits.top()) else { return Ok(None) };
     let (mut all, mut distances) = (Vec::new(), Vec::new());
@@ -153,7 +163,7 @@ fn all_rings(
         let is_like = |made: &Contour| number > 0 || (made.components == exact.components && made.holes == exact.holes);
         let mut found = None;
         for share in if number == 0 { RIM } else { ABOVE } {
-            found = contour(wires, inner + share * (outer - inner), margins, budget)?.filter(is_like);
+            found = contour(wires, inner + share * (outer - inner), gap, budget)?.filter(is_like);
             if found.is_some() {
                 break;
             }
@@ -169,7 +179,7 @@ fn all_rings(
             }
         }
     }
-    Ok(Some((all, distances)))
+    Ok(Some(Rings { all, distances }))
 }
 
 /// The surface of a sheet and its mirror image, without vertices that nothing has.

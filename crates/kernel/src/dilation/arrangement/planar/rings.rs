@@ -107,7 +107,11 @@ impl Gates {
             if let Some((at, way, is_crease)) = corner {
                 let narrow = NARROW * contour.radius;
                 let other = contour.body(wires, &contour.pieces[own[(number + 1) % own.len()] as usize]);
-                self.all.push(if is_crease { Gate { outer: plus(at, narrow, way), inner: plus(at, -narrow, way) } } else { gate(wires, contour, body, at, way, band) });
+                self.all.push(if is_crease {
+                    Gate { outer: plus(at, narrow, way), inner: plus(at, -narrow, way) }
+                } else {
+                    gate(wires, contour, body, at, way, band)
+                });
                 self.creases.push(is_crease.then_some([body.min(other), body.max(other)]));
             }
         }
@@ -135,7 +139,8 @@ fn gate(wires: &Wires, contour: &Contour, body: u32, at: Place, way: Place, band
         let there = wires.square(body, plus(at, by, way)).sqrt();
         there >= contour.radius + by * (1.0 - 1e-6) && there <= band.outer * (1.0 + 1e-9)
     };
-    let by = if most > 0.0 { [1.0, 0.8, 0.6, 0.4, 0.2].map(|share| share * most).into_iter().find(|&by| fits(by)).unwrap_or(0.0) } else { most };
+    let by =
+        if most > 0.0 { [1.0, 0.8, 0.6, 0.4, 0.2].map(|share| share * most).into_iter().find(|&by| fits(by)).unwrap_or(0.0) } else { most };
     Gate { outer: plus(at, by, way), inner }
 }
 
@@ -186,7 +191,7 @@ impl Walk<'_> {
                     shares[1] = of(left);
                 }
                 let is_ahead = dot(plus(outer, 1.0, inner), plus(left, 1.0, right)) > 0.0;
-                if !(shares[0] < shares[1] && shares[0] < 1.0 && shares[1] > 0.0 && is_ahead) {
+                if !(0.0 <= shares[0] && shares[0] < shares[1] && shares[1] <= 1.0 && is_ahead) {
                     break;
                 }
             }
@@ -237,7 +242,9 @@ impl Walk<'_> {
                 // The last corner is where the first is seen from.
                 let between = (gate + 1..end).rev().find_map(|number| {
                     let seen = self.look(at, gate, number).filter(|seen| seen.gate == number)?;
-                    let places = SHARES.map(|share| self.gate(number).at(seen.shares[0] + share.clamp(1e-3, 1.0 - 1e-3) * (seen.shares[1] - seen.shares[0])));
+                    let places = SHARES.map(|share| {
+                        self.gate(number).at(seen.shares[0] + share.clamp(1e-3, 1.0 - 1e-3) * (seen.shares[1] - seen.shares[0]))
+                    });
                     places.into_iter().find(|&place| closes(place, number)).map(|place| (number, place))
                 });
                 corners.extend(between.or(Some((reached, place))).map(|(number, place)| (number % count, place)));

@@ -5,29 +5,33 @@
 
 use super::rings::Ring;
 use super::valleys::Lines;
-use super::wires::{Body, Wires, dot, plus};
+use super::wires::{Body, Wires, cross as cross_in_plane, dot, minus, plus};
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, cross, distance_squared, dot as dot_in_space, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
+use crate::measure::contact::closest_on_segments;
 use crate::measure::triangle::closest_on_triangle;
 use crate::solid::box_tree::Box32;
 use rayon::prelude::*;
-use spade::handles::{DirectedEdgeHandle, FixedVertexHandle};
+use spade::handles::{DirectedEdgeHandle, FixedDirectedEdgeHandle, FixedVertexHandle};
 use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// Rounds in which places are added.
-const ROUNDS: usize = 12;
-/// Steps towards the closest places of a triangle and a body.
-const STEPS: usize = 8;
+const ROUNDS: usize = 24;
 /// How often a triangle is halved at most that no one body is near to, and how much wider than the reach what is that is not asked for.
 const DEPTH: u32 = 24;
 const WIDE: f64 = 4.0;
 /// How far out in the band a place is added where the surface is too near, and where it is too far.
-const OUT: [f64; 2] = [0.98, 0.4];
+const OUT: [f64; 2] = [0.85, 0.4];
 /// What is lower than this, in units of the band's inner end, is at the rim.
 const LOW: f64 = 0.05;
+/// An edge of the rim is bent no nearer to its ends than by this share, and by which parts of the way where others leave no room.
+const LEAST_SHARE: f64 = 0.1;
+const PARTS: [f64; 3] = [1.0, 0.6, 0.3];
+/// How close to an edge a place is that it stands in the way of, in units of its length.
+const CLOSE: f64 = 0.05;
 /// Triangles that are looked at in a row.
 const IN_A_ROW: usize = 64;
 
@@ -54,11 +58,13 @@ pub(super) struct Sheet {
     pub(super) holes: u64,
 }
 
-/// A place where a triangle is too near to a body, or too far from all.
+/// A place where a triangle may not be as it is.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     Near(Point),
     Far(Point),
+    /// It is as low as the rim, and not of it.
+    Low(Point),
 }
 
 type Mesh = ConstrainedDelaunayTriangulation<Vertex>;
@@ -81,7 +87,10 @@ pub(super) fn sheet(
         let new: Vec<[u32; 3]> = triangles.iter().copied().filter(|triangle| !known.contains_key(&key(triangle))).collect();
         let check = |some: &[[u32; 3]]| -> Result<Vec<Option<Fault>>, Stopped> {
             budget.cancel.check()?;
-            Ok(some.iter().map(|triangle| fault(wires, &triangle.map(|vertex| plane.point(vertex)), [limits.inner, limits.outer])).collect())
+            let of = |triangle: &[u32; 3]| {
+                plane.low(triangle).or_else(|| fault(wires, &triangle.map(|vertex| plane.point(vertex)), [limits.inner, limits.outer]))
+            };
+            Ok(some.iter().map(of).collect())
         };
         let faults: Vec<Option<Fault>> = new.par_chunks(IN_A_ROW).map(check).collect::<Result<Vec<_>, Stopped>>()?.concat();
         if faults.iter().all(Option::is_none) {
@@ -194,35 +203,102 @@ impl Plane {
         Some(inside.map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect())
     }
 
+    /// The middle of an edge between vertices of the rim that is none of its edges.
+    fn low(&self, triangle: &[u32; 3]) -> Option<Fault> {
+        let [from, to] = (0..3).find_map(|k| {
+            let ends = [triangle[k], triangle[(k + 1) % 3]];
+            let is_low = ends.iter().all(|&end| self.vertex(end).height == 0.0);
+            let [from, to] = ends.map(|end| FixedVertexHandle::from_index(end as usize));
+            let is_inner = is_low && self.mesh.get_edge_from_neighbors(from, to).is_some_and(|edge| !is_rim(&edge));
+            is_inner.then(|| ends.map(|end| self.vertex(end)))
+        })?;
+        Some(Fault::Low([0.5 * (from.at[0] + to.at[0]), 0.5 * (from.at[1] + to.at[1]), 0.0]))
+    }
+
     /// Adds a place where a triangle has a fault, or moves an edge of the rim out or in there; none where that is not possible.
     fn mend(&mut self, wires: &Wires, triangle: &[u32; 3], fault: Fault, limits: &Limits<impl Fn(f64) -> f64>) -> Option<()> {
         let (x, out) = match fault {
             Fault::Near(x) => (x, OUT[0]),
-            Fault::Far(x) => (x, OUT[1]),
+            Fault::Far(x) | Fault::Low(x) => (x, OUT[1]),
         };
-        let (at, wanted) = ([x[0], x[1]], limits.inner + out * (limits.outer - limits.inner));
-        if x[2] < LOW * limits.inner {
+        let (at, band) = ([x[0], x[1]], limits.outer - limits.inner);
+        let wanted = limits.inner + out * band;
+        let (distance, _) = wires.away(at)?;
+        if !matches!(fault, Fault::Low(_)) && (x[2] < LOW * limits.inner || distance > limits.outer) {
             let edges = (0..3).map(|k| [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize)));
-            let edge = edges.filter_map(|[from, to]| self.mesh.get_edge_from_neighbors(from, to)).find(is_rim);
-            if let Some(edge) = edge {
-                let (ends, edge) = ([edge.from().fix(), edge.to().fix()], edge.as_undirected().fix());
-                let (distance, away) = wires.away(at)?;
-                let at = plus(at, wanted - distance, away).map(&limits.round);
-                self.mesh.remove_constraint_edge(edge);
-                let new = self.add(Vertex { at, height: 0.0 })?;
-                return (self.join(ends[0], new) && self.join(new, ends[1])).then_some(());
+            if let Some(edge) = edges.filter_map(|[from, to]| self.mesh.get_edge_from_neighbors(from, to)).find(is_rim) {
+                let edge = edge.fix();
+                return self.bend(wires, edge, at, wanted, limits);
             }
         }
+        let loose = self.loosen(triangle, at);
         let crease = if matches!(fault, Fault::Far(_)) { wires.crease(at, limits.outer) } else { None };
-        for at in crease.into_iter().chain([at]).map(|at| at.map(&limits.round)) {
+        let [x, y, _] = middle(&triangle.map(|vertex| self.point(vertex)));
+        let halfway = [0.5 * (at[0] + x), 0.5 * (at[1] + y)];
+        for at in crease.into_iter().chain([at, halfway, [x, y]]).map(|at| at.map(&limits.round)) {
             let (distance, _) = wires.away(at)?;
+            // Where the plane is farther than wanted, halfway to what may be.
+            let wanted = wanted.max(0.5 * (distance + limits.outer));
             let square = wanted * wanted - distance * distance;
             if square > 0.0 && !self.numbers.contains_key(&at.map(f64::to_bits)) {
-                return self.add(Vertex { at, height: limits.height(square.sqrt()) }).map(|_| ());
+                let new = self.add(Vertex { at, height: limits.height(square.sqrt()) })?;
+                loose.into_iter().flatten().for_each(|end| {
+                    self.join(end, new);
+                });
+                return Some(());
             }
         }
         // A neighbour's fault may have been there.
         Some(())
+    }
+
+    /// Takes out edges of a triangle that a place is close to, unless they are of the rim: their ends.
+    fn loosen(&mut self, triangle: &[u32; 3], at: Place) -> Vec<[FixedVertexHandle; 2]> {
+        let mut loose = Vec::new();
+        for k in 0..3 {
+            let ends = [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize));
+            let Some(edge) = self.mesh.get_edge_from_neighbors(ends[0], ends[1]).filter(|edge| edge.is_constraint_edge() && !is_rim(edge))
+            else {
+                continue;
+            };
+            let [from, to] = [edge.from().data().at, edge.to().data().at];
+            let (way, edge) = (minus(to, from), edge.as_undirected().fix());
+            if cross_in_plane(way, minus(at, from)).abs() < CLOSE * dot(way, way) {
+                self.mesh.remove_constraint_edge(edge);
+                loose.push(ends);
+            }
+        }
+        loose
+    }
+
+    /// Leads an edge of the rim over a place beside it that is as far from the bodies as wanted; none where that is not possible.
+    fn bend(
+        &mut self,
+        wires: &Wires,
+        edge: FixedDirectedEdgeHandle,
+        at: Place,
+        wanted: f64,
+        limits: &Limits<impl Fn(f64) -> f64>,
+    ) -> Option<()> {
+        let edge = self.mesh.directed_edge(edge);
+        let (ends, edge) = ([edge.from(), edge.to()], edge.as_undirected().fix());
+        let [from, to] = ends.map(|end| end.data().at);
+        let ends = ends.map(|end| end.fix());
+        let way = minus(to, from);
+        let share = (dot(minus(at, from), way) / dot(way, way)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+        let at = plus(from, share, way);
+        let (distance, away) = wires.away(at)?;
+        self.mesh.remove_constraint_edge(edge);
+        let point = |at: Place| Point2::new(at[0], at[1]);
+        for part in PARTS {
+            let new = plus(at, part * (wanted - distance), away).map(&limits.round);
+            let is_free = |end: Place| !self.mesh.intersects_constraint(point(end), point(new));
+            if is_free(from) && is_free(to) {
+                let new = self.add(Vertex { at: new, height: 0.0 })?;
+                return (self.join(ends[0], new) && self.join(new, ends[1])).then_some(());
+            }
+        }
+        None
     }
 
     /// The sheet, if nothing but the rim is as low as the plane, and all bodies are below it.
@@ -267,7 +343,10 @@ impl Plane {
                 }
                 OnVertex(vertex) => {
                     let edges = self.mesh.vertex(vertex).out_edges();
-                    edges.filter_map(|edge| edge.face().as_inner()).map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect()
+                    edges
+                        .filter_map(|edge| edge.face().as_inner())
+                        .map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32))
+                        .collect()
                 }
                 _ => Vec::new(),
             };
@@ -312,24 +391,22 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
     Cover { wires, most: outer }.far(&near, triangle, DEPTH).map(Fault::Far)
 }
 
-/// A place of a triangle that is nearer to a body than `least`, unless a plane parts them by as much. Alternating projections converge to the closest places.
+/// A place of a triangle that is nearer to a body than `least`, unless a plane parts them by as much: the one across the way between their closest places, which are at a corner, at an end, or on a side.
 fn too_near(triangle: &[Point; 3], body: &Body, least: f64) -> Option<Point> {
-    let mut q = middle(triangle);
-    for _ in 0..STEPS {
-        let p = body.closest([q[0], q[1]]);
-        let way = [q[0] - p[0], q[1] - p[1], q[2]];
-        let length = dot_in_space(&way, &way).sqrt();
-        if length <= least {
-            return Some(q);
-        }
-        let unit = way.map(|part| part / length);
-        let lowest = triangle.iter().map(|corner| dot_in_space(corner, &unit)).fold(f64::INFINITY, f64::min);
-        if lowest - body.highest(unit) > least {
-            return None;
-        }
-        q = closest_on_triangle(&[p[0], p[1], 0.0], &triangle[0], &triangle[1], &triangle[2]);
-    }
-    Some(q)
+    let ends = [body.from, body.to()].map(|[x, y]| [x, y, 0.0]);
+    let closest = |[x, y, _]: Point| body.closest([x, y]);
+    let corners = triangle.iter().map(|&q| (q, closest(q)));
+    let of_ends = ends.iter().map(|p| (closest_on_triangle(p, &triangle[0], &triangle[1], &triangle[2]), [p[0], p[1]]));
+    let sides = (0..3).map(|k| {
+        let (q, p) = closest_on_segments(&[triangle[k], triangle[(k + 1) % 3]], &ends);
+        (q, [p[0], p[1]])
+    });
+    let way = |q: &Point, p: &Place| [q[0] - p[0], q[1] - p[1], q[2]];
+    let square = |(q, p): &(Point, Place)| dot_in_space(&way(q, p), &way(q, p));
+    let (q, p) = corners.chain(of_ends).chain(sides).min_by(|a, b| square(a).total_cmp(&square(b)))?;
+    let unit = unit(&way(&q, &p));
+    let lowest = triangle.iter().map(|corner| dot_in_space(corner, &unit)).fold(f64::INFINITY, f64::min);
+    (lowest - body.highest(unit) < least).then_some(q)
 }
 
 fn middle(triangle: &[Point; 3]) -> Point {

@@ -36,7 +36,8 @@ impl Lines {
     /// The lines from all rings to those one level below, whose contours are at given distances.
     pub(super) fn new(wires: &Wires, rings: &[Ring], distances: &[f64], limits: &Limits<impl Fn(f64) -> f64>) -> Self {
         let mut lines = Self::default();
-        let (mut corners, mut taken): (NameMap<[u32; 3], Vec<Place>>, NameMap<[u64; 2], ()>) = Default::default();
+        let mut corners: NameMap<[u32; 3], Vec<Place>> = NameMap::default();
+        let mut taken: NameMap<[u64; 2], ()> = NameMap::default();
         for (ring, corner) in rings.iter().flat_map(|ring| ring.corners.iter().map(move |corner| (ring, corner))) {
             taken.insert(corner.at.map(f64::to_bits), ());
             if let Some([a, b]) = corner.crease {
@@ -53,7 +54,7 @@ impl Lines {
                     Stop::Joint(ridge) => {
                         let known = lines.joints.iter().rev().take(LAST).map(|joint| joint.at).find(|other| is_like(other, &ridge.at));
                         known.or_else(|| {
-                            let wanted = limits.inner + OUT * (limits.outer - limits.inner);
+                            let wanted = (limits.inner + OUT * (limits.outer - limits.inner)).max(0.5 * (ridge.distance + limits.outer));
                             let (at, square) = (ridge.at.map(&limits.round), wanted * wanted - ridge.distance * ridge.distance);
                             (square > 0.0 && taken.insert(at.map(f64::to_bits), ()).is_none()).then(|| {
                                 lines.joints.push(Vertex { at, height: limits.height(square.sqrt()) });
@@ -94,7 +95,7 @@ enum Stop {
 
 impl Wires {
     /// How far a place is from a body, and the unit vector away from it.
-    fn from_body(&self, body: u32, x: Place) -> (f64, Place) {
+    fn off(&self, body: u32, x: Place) -> (f64, Place) {
         let way = minus(x, self.bodies[body as usize].closest(x));
         let far = length(way);
         (far, way.map(|part| part / far))
@@ -103,14 +104,15 @@ impl Wires {
     /// The place near x as far from two bodies as a distance.
     fn equal(&self, bodies: [u32; 2], mut x: Place, distance: f64) -> Option<Place> {
         for _ in 0..STEPS {
-            let [(a, u), (b, v)] = bodies.map(|body| self.from_body(body, x));
+            let [(a, u), (b, v)] = bodies.map(|body| self.off(body, x));
             let (e, f) = (distance - a, distance - b);
             if e.abs().max(f.abs()) < 1e-2 * EQUAL * distance {
                 return Some(x);
             }
             let determinant = cross(u, v);
             let by = [(e * v[1] - f * u[1]) / determinant, (u[0] * f - v[0] * e) / determinant];
-            if !(length(by) < distance) {
+            // They may be parallel there.
+            if !length(by).is_finite() || length(by) > distance {
                 return None;
             }
             x = plus(x, 1.0, by);
@@ -122,7 +124,9 @@ impl Wires {
     fn third(&self, bodies: [u32; 2], x: Place) -> (f64, u32) {
         let distance = self.bodies[bodies[0] as usize].square(x).sqrt();
         let others = self.near(bodies[0], 2.0 * distance).filter(|&other| other != bodies[1]);
-        others.map(|other| (self.bodies[other as usize].square(x), other)).fold((f64::INFINITY, u32::MAX), |best, own| if own.0 < best.0 { own } else { best })
+        others
+            .map(|other| (self.bodies[other as usize].square(x), other))
+            .fold((f64::INFINITY, u32::MAX), |best, own| if own.0 < best.0 { own } else { best })
     }
 
     /// The place on the way on from the body closest to a place where another body is as close, if that is so within a distance from it.
@@ -158,11 +162,12 @@ impl Wires {
             // Of the lines that begin there, the one on which the distance grows.
             let [a, b] = ridge.bodies;
             let rises = |pair: [u32; 2], other: u32| {
-                let [(_, u), (_, v), (_, w)] = [pair[0], pair[1], other].map(|body| self.from_body(body, next.at));
+                let [(_, u), (_, v), (_, w)] = [pair[0], pair[1], other].map(|body| self.off(body, next.at));
                 let way = plus(u, 1.0, v);
                 dot(way, u) > 0.0 && dot(way, w) > dot(way, u)
             };
-            let onward: Vec<([u32; 2], u32)> = [([a, third], b), ([third, b], a)].into_iter().filter(|&(pair, other)| rises(pair, other)).collect();
+            let onward: Vec<([u32; 2], u32)> =
+                [([a, third], b), ([third, b], a)].into_iter().filter(|&(pair, other)| rises(pair, other)).collect();
             let &[(bodies, other)] = &onward[..] else { return stops };
             ridge = Ridge { bodies, ..next };
             left = Some(other);

@@ -1,16 +1,20 @@
 //! Points and segments in a plane, as a graph: what is next around its vertices, and which of it is near to each other.
 
 use super::Place;
+use super::contour::STRAIGHT;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
+use crate::groups::Groups;
 use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// Bodies near to each other at most, as a mean over all, and in any case.
-const MOST_NEAR: usize = 400;
-const FEW_NEAR: usize = 2_000_000;
+const MOST_NEAR: usize = 200;
+const FEW_NEAR: usize = 100_000;
+/// Places that are close to each other along an axis, of those that one is held against.
+const MOST_CLOSE: usize = 64;
 /// No number.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -60,6 +64,64 @@ pub(super) fn minus(a: Place, b: Place) -> Place {
     [a[0] - b[0], a[1] - b[1]]
 }
 
+/// Segments by the numbers of their ends, with places closer than a margin as one, and parted where they pass other ends that closely. None where such places are a chain, or very many.
+fn parted(places: &[Place], pairs: Vec<[u32; 2]>, margin: f64, budget: &Budget) -> Result<Option<Vec<[u32; 2]>>, Stopped> {
+    // Along the first axis.
+    let mut order: Vec<u32> = (0..places.len() as u32).collect();
+    order.sort_unstable_by(|&a, &b| places[a as usize][0].total_cmp(&places[b as usize][0]).then(a.cmp(&b)));
+    let mut groups = Groups::new(places.len());
+    for (rank, &first) in order.iter().enumerate() {
+        let own = places[first as usize];
+        let near = order[rank + 1..].iter().take(MOST_CLOSE).take_while(|&&other| places[other as usize][0] <= own[0] + margin);
+        for &other in near {
+            if length(minus(places[other as usize], own)) <= margin {
+                groups.join(first as usize, other as usize);
+            }
+        }
+    }
+    let is_far = |vertex: usize, groups: &mut Groups| length(minus(places[groups.of(vertex) as usize], places[vertex])) > margin;
+    if (0..places.len()).any(|vertex| is_far(vertex, &mut groups)) {
+        return Ok(None);
+    }
+    let pairs: Vec<[u32; 2]> = pairs.iter().map(|pair| pair.map(|end| groups.of(end as usize))).collect();
+    let bodies: Vec<Body> = pairs.iter().map(|&pair| Body::new(pair, places)).collect();
+    let mut tree = BoxTree::default();
+    tree.build(bodies.len(), |index| Some(bodies[index as usize].box_within(2.0 * margin)), false);
+    let mut stops: Vec<(u32, f64, u32)> = Vec::new();
+    for vertex in (0..places.len() as u32).filter(|&vertex| groups.of(vertex as usize) == vertex) {
+        if vertex.is_multiple_of(256) {
+            budget.cancel.check()?;
+        }
+        let own = places[vertex as usize];
+        tree.query(&Box32::of(&[[own[0], own[1], 0.0]]), 0, |leaf| {
+            for &item in tree.items(leaf) {
+                let body = &bodies[item as usize];
+                if !body.ends.contains(&vertex) && body.square(own) <= 4.0 * margin * margin {
+                    stops.push((item, dot(minus(own, body.from), body.along), vertex));
+                }
+            }
+            stops.len() <= MOST_NEAR * bodies.len()
+        });
+    }
+    if stops.len() > MOST_NEAR * bodies.len() {
+        return Ok(None);
+    }
+    stops.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let mut parts = Vec::with_capacity(pairs.len() + stops.len());
+    let mut rest = &stops[..];
+    for (item, &[from, to]) in (0..).zip(&pairs) {
+        let (own, later) = rest.split_at(rest.partition_point(|stop| stop.0 <= item));
+        rest = later;
+        let mut last = from;
+        for &(_, _, vertex) in own {
+            parts.push([last, vertex]);
+            last = vertex;
+        }
+        parts.push([last, to]);
+    }
+    Ok(Some(parts))
+}
+
 /// a + s b.
 #[inline]
 pub(super) fn plus(a: Place, s: f64, b: Place) -> Place {
@@ -94,7 +156,8 @@ impl Body {
         dot(way, way)
     }
 
-    fn to(&self) -> Place {
+    /// Where its second end is.
+    pub(super) fn to(&self) -> Place {
         plus(self.from, self.length, self.along)
     }
 
@@ -125,23 +188,27 @@ impl Body {
 }
 
 impl Wires {
-    /// The graph of segments with their ends, and points as segments without a length; what is within `reach` of each other is near. None where an end is within `margin` of what does not have it, or where nothing is near, or very much.
+    /// The graph of segments with their ends, and points as segments without a length; what is within `reach` of each other is near. What is within `margin` is moved by as much, so that it has ends in common. None where it still does not, or where nothing is near, or very much.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn new(segments: &[[Place; 2]], reach: f64, margin: f64, least_turn: f64, budget: &Budget) -> Result<Option<Self>, Stopped> {
-        let (mut places, mut numbers): (Vec<Place>, NameMap<[u64; 2], u32>) = (Vec::new(), NameMap::default());
+    pub(super) fn new(segments: &[[Place; 2]], reach: f64, margin: f64, budget: &Budget) -> Result<Option<Self>, Stopped> {
+        let mut places: Vec<Place> = Vec::with_capacity(2 * segments.len());
+        let mut numbers: NameMap<[u64; 2], u32> = NameMap::default();
         let mut number = |at: Place| {
             *numbers.entry(at.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
                 places.push(at);
                 places.len() as u32 - 1
             })
         };
-        let mut pairs: Vec<[u32; 2]> = segments.iter().map(|ends| ends.map(&mut number)).collect();
+        let pairs: Vec<[u32; 2]> = segments.iter().map(|ends| ends.map(&mut number)).collect();
+        let Some(mut pairs) = parted(&places, pairs, margin, budget)? else { return Ok(None) };
         pairs.iter_mut().for_each(|pair| pair.sort_unstable());
         pairs.sort_unstable();
         pairs.dedup();
         let mut owner = vec![NONE; places.len()];
+        let mut is_used = vec![false; places.len()];
+        pairs.iter().flatten().for_each(|&end| is_used[end as usize] = true);
         let mut bodies: Vec<Body> = Vec::with_capacity(pairs.len());
         for pair in pairs.iter().filter(|pair| pair[0] != pair[1]) {
             pair.iter().for_each(|&end| owner[end as usize] = bodies.len() as u32);
@@ -149,7 +216,7 @@ impl Wires {
         }
         let segments = bodies.len();
         for end in 0..places.len() as u32 {
-            if owner[end as usize] == NONE {
+            if owner[end as usize] == NONE && is_used[end as usize] {
                 owner[end as usize] = bodies.len() as u32;
                 bodies.push(Body::new([end; 2], &places));
             }
@@ -167,7 +234,7 @@ impl Wires {
             starts: Vec::new(),
             tree: BoxTree::default(),
         };
-        let is_plain = wires.turn(least_turn) && wires.find_near(reach, margin, budget)?;
+        let is_plain = wires.turn() && wires.find_near(reach, margin, budget)?;
         Ok(is_plain.then_some(wires))
     }
 
@@ -219,7 +286,7 @@ impl Wires {
     }
 
     /// Finds what is next around vertices; false where segments lie on each other.
-    fn turn(&mut self, least_turn: f64) -> bool {
+    fn turn(&mut self) -> bool {
         let mut around: Vec<(u32, f64, u32)> = (0..2 * self.segments as u32)
             .map(|half| {
                 let (along, _) = self.way(half);
@@ -231,12 +298,12 @@ impl Wires {
             for (place, &(vertex, angle, half)) in own.iter().enumerate() {
                 let (_, after, next) = own[(place + 1) % own.len()];
                 let wide = if own.len() == 1 { TAU } else { (after - angle).rem_euclid(TAU) };
-                if wide < least_turn || (own.len() > 1 && wide > TAU - least_turn) {
+                if wide < STRAIGHT || (own.len() > 1 && wide > TAU - STRAIGHT) {
                     return false;
                 }
                 let back = half ^ 1;
                 (self.next[back as usize], self.turns[back as usize]) = (next, wide - PI);
-                if wide - PI > least_turn {
+                if wide - PI > STRAIGHT {
                     self.convex[vertex as usize] = back;
                 }
             }
@@ -261,7 +328,7 @@ impl Wires {
                     }
                     let other = &bodies[item as usize];
                     let [square, of_ends] = own.squares(other);
-                    is_plain &= of_ends > margin * margin || own.is_joined(other);
+                    is_plain &= of_ends > 0.25 * margin * margin || own.is_joined(other);
                     if square < reach * reach {
                         found.push(((square.sqrt() as f32).next_down(), item));
                     }

@@ -1,0 +1,253 @@
+use super::super::tests::{arranged, arranged_unless_left, keeps_its_bounds, plan, topology, wires as lowered};
+use super::contour::contour;
+use super::wires::Wires;
+use super::{Place, levels};
+use crate::attractor::Attractor;
+use crate::budget::{Budget, CancelToken, StopReason};
+use crate::dilation::{Dilation, DilationError, dilate};
+use crate::solid::mend;
+use crate::split_mix::Random;
+use crate::tolerance::{Radius, Tolerance};
+use glam::{DMat3, DVec3};
+
+/// A shape's segments, over the plane.
+type Drawing = Vec<[Place; 2]>;
+
+/// Drawings of several kinds, some 20 mm wide.
+fn drawing(kind: usize, random: &mut Random) -> Drawing {
+    let mut at = |size: f64| -> Place { [size * random.share(), size * random.share()] };
+    let polyline = |places: Vec<Place>| -> Drawing { places.windows(2).map(|pair| [pair[0], pair[1]]).collect() };
+    match kind {
+        // Loose segments, some of which cross, and points.
+        0 => (0..30)
+            .map(|k| {
+                let (from, way) = (at(20.0), at(6.0));
+                [from, if k % 5 == 0 { from } else { [from[0] + way[0] - 3.0, from[1] + way[1] - 3.0] }]
+            })
+            .collect(),
+        // A lattice without some of its edges, and with places that are off theirs.
+        1 => {
+            let places: Vec<Place> =
+                (0..49).map(|k| (k, at(0.8))).map(|(k, by)| [3.0 * f64::from(k % 7) + by[0], 3.0 * f64::from(k / 7) + by[1]]).collect();
+            let edges = (0..49).flat_map(|k| [(k, k + 1, k % 7 < 6), (k, k + 7, k < 42)]).filter(|edge| edge.2);
+            edges.filter(|_| at(1.0)[0] < 0.8).map(|(a, b, _)| [places[a], places[b]]).collect()
+        }
+        // A smooth curve that crosses itself.
+        2 => {
+            let turns = 2.0 + (4.0 * at(1.0)[0]).floor();
+            let place = |k: i32| {
+                let angle = std::f64::consts::TAU * f64::from(k) / 300.0;
+                let far = 6.0 + 4.0 * (turns * angle).sin();
+                [10.0 + far * (2.0 * angle).cos(), 10.0 + far * (2.0 * angle).sin()]
+            };
+            polyline((0..=300).map(place).collect())
+        }
+        // A tree.
+        3 => {
+            let mut places = vec![[10.0, 10.0]];
+            (0..80)
+                .map(|_| {
+                    let [which, turn] = at(1.0);
+                    let from: Place = places[(which * places.len() as f64) as usize];
+                    let (sine, cosine) = (std::f64::consts::TAU * turn).sin_cos();
+                    places.push([from[0] + 1.7 * cosine, from[1] + 1.7 * sine]);
+                    [from, places[places.len() - 1]]
+                })
+                .collect()
+        }
+        // A path on a lattice: right angles, what goes straight on, what meets itself.
+        4 => {
+            let mut place = [10.0, 10.0];
+            let walk = (0..60).map(|_| {
+                let [axis, sign] = at(2.0);
+                place[axis as usize] += if sign < 1.0 { 1.6 } else { -1.6 };
+                place
+            });
+            polyline(walk.collect())
+        }
+        // Segments that end on another.
+        _ => {
+            let ends = (0..9).map(|_| at(1.0)).map(|[along, long]| [[20.0 * along, 0.0], [20.0 * along + 2.0 * long, 2.0 + 6.0 * long]]);
+            ends.chain([[[0.0, 0.0], [20.0, 0.0]]]).collect()
+        }
+    }
+}
+
+/// A drawing across one of the axes, as high as that.
+fn raised(drawing: &Drawing, axis: usize, height: f64) -> Vec<[DVec3; 2]> {
+    let place = |[x, y]: Place| {
+        let mut place = DVec3::splat(height);
+        (place[(axis + 1) % 3], place[(axis + 2) % 3]) = (x, y);
+        place
+    };
+    drawing.iter().map(|ends| ends.map(place)).collect()
+}
+
+/// Whether a shape's surface is a sheet and its mirror image.
+fn is_sheet(shape: &Attractor, radius: f64, tolerance: f64) -> bool {
+    let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
+    let setting = plan.setting(plan.pitch(), &budget);
+    let arrangement = super::super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap();
+    arrangement.is_some_and(|arrangement| arrangement.flat.is_some())
+}
+
+/// Whether no triangle has a place that is nearer or farther than the bounds say, or meets another.
+fn holds_everywhere(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, random: &mut Random) -> bool {
+    let distance = |x: DVec3| {
+        let of = |[a, b]: &[DVec3; 2]| {
+            let way = *b - *a;
+            let share = if way.length_squared() > 0.0 { ((x - *a).dot(way) / way.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
+            x.distance(*a + share * way)
+        };
+        segments.iter().map(of).fold(f64::INFINITY, f64::min)
+    };
+    let mesh = dilation.solid.mesh();
+    let mut holds = |x: DVec3| (radius - dilation.inner_mm..=radius + dilation.outer_mm).contains(&distance(x));
+    let is_within = mesh.triangles.iter().all(|triangle| {
+        let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
+        let shares = [random.share(), random.share()];
+        let [s, t] = if shares[0] + shares[1] > 1.0 { shares.map(|share| 1.0 - share) } else { shares };
+        [a, a.midpoint(b), b.midpoint(c), c.midpoint(a), (a + b + c) / 3.0, a + s * (b - a) + t * (c - a)].into_iter().all(&mut holds)
+    });
+    let points = mesh.vertices.iter().map(|vertex| vertex.to_array()).collect();
+    let made = mend::mend(points, mesh.triangles.clone(), 1e-6, &Budget::default()).unwrap();
+    is_within && made.crossings == 0
+}
+
+#[test]
+fn sheets_keep_their_bounds_and_have_the_topology_of_what_is_turned_out_of_its_plane() {
+    let mut random = Random(11);
+    let turn = DMat3::from_rotation_z(0.3) * DMat3::from_rotation_x(0.7);
+    let (mut sheets, mut compared) = (0, 0);
+    for round in 0..72 {
+        let drawing = drawing(round % 6, &mut random);
+        let segments = raised(&drawing, round % 3, [0.0, 0.1, -40.3][round / 3 % 3]);
+        let (radius, tolerance) = ([0.5, 0.93, 1.51][round / 6 % 3], [0.1, 0.025][round % 2]);
+        let shape = lowered(&segments);
+        let tolerance = tolerance * radius;
+        if !is_sheet(&shape, radius, tolerance) {
+            continue;
+        }
+        sheets += 1;
+        let made = arranged(&shape, radius, tolerance);
+        assert!(made.topology_exact && made.inner_mm <= tolerance && made.outer_mm <= tolerance, "{round}");
+        assert!(holds_everywhere(&made, &segments, radius, &mut random), "{round}");
+        keeps_its_bounds(&made, &segments, radius, 20.0, &mut random);
+        let turned: Vec<[DVec3; 2]> = segments.iter().map(|ends| ends.map(|end| turn * end)).collect();
+        if let Some(other) = arranged_unless_left(&lowered(&turned), radius, tolerance).filter(|other| other.topology_exact) {
+            assert_eq!(topology(&made), topology(&other), "{round}");
+            compared += 1;
+        }
+    }
+    assert!(sheets >= 65 && compared >= 40, "{sheets} sheets, {compared} compared");
+}
+
+/// The contour's components and holes at a distance.
+fn counted(drawing: &Drawing, radius: f64) -> Option<[u64; 2]> {
+    let budget = Budget::default();
+    let wires = Wires::new(drawing, 2.2 * radius, 1e-10, &budget).unwrap()?;
+    contour(&wires, radius, 1e-9, &budget).unwrap().map(|made| [made.components, made.holes])
+}
+
+/// A square lattice of so many places a side, 1 mm apart.
+fn lattice(count: i32) -> Drawing {
+    let place = |x: i32, y: i32| [f64::from(x), f64::from(y)];
+    let along = (0..count).flat_map(|y| (0..count - 1).map(move |x| [place(x, y), place(x + 1, y)]));
+    let across = (0..count).flat_map(|x| (0..count - 1).map(move |y| [place(x, y), place(x, y + 1)]));
+    along.chain(across).collect()
+}
+
+#[test]
+fn contours_have_as_many_components_and_holes_as_formulas_say() {
+    // Each square leaves a hole until half of its side, where all of them are in doubt.
+    for count in [2, 3, 9] {
+        let drawing = lattice(count);
+        let squares = (count as u64 - 1).pow(2);
+        for radius in [0.01, 0.3, 0.499_99] {
+            assert_eq!(counted(&drawing, radius), Some([1, squares]), "{count} {radius}");
+        }
+        assert_eq!(counted(&drawing, 0.5), None);
+        for radius in [0.500_01, 0.7, 1.3] {
+            assert_eq!(counted(&drawing, radius), Some([1, 0]), "{count} {radius}");
+        }
+    }
+    // Places of a lattice hang together from half their distance on, and leave holes up to half a diagonal.
+    let places: Drawing = (0..25).map(|k| [[f64::from(k % 5), f64::from(k / 5)]; 2]).collect();
+    for (radius, expected) in [(0.49, Some([25, 0])), (0.5, None), (0.51, Some([1, 16])), (0.707, Some([1, 16])), (0.708, Some([1, 0]))] {
+        assert_eq!(counted(&places, radius), expected, "{radius}");
+    }
+    // A regular polygon's hole ends at its inscribed circle.
+    for sides in [3, 5, 12, 100] {
+        let place = |k: i32| {
+            let (sine, cosine) = (std::f64::consts::TAU * f64::from(k) / f64::from(sides)).sin_cos();
+            [cosine, sine]
+        };
+        let drawing: Drawing = (0..sides).map(|k| [place(k), place(k + 1)]).collect();
+        let inscribed = (std::f64::consts::PI / f64::from(sides)).cos();
+        assert_eq!(counted(&drawing, inscribed - 1e-4), Some([1, 1]), "{sides}");
+        assert_eq!(counted(&drawing, inscribed + 1e-4), Some([1, 0]), "{sides}");
+    }
+}
+
+#[test]
+fn what_is_stated_twice_or_ends_on_another_is_as_if_it_were_not() {
+    let place = |x: f64, y: f64| [x, y];
+    let plain: Drawing = vec![[place(0.0, 0.0), place(5.0, 0.0)], [place(5.0, 0.0), place(10.0, 0.0)], [place(5.0, 0.0), place(6.0, 4.0)]];
+    // One segment with another's end on it, itself again, a part of it, the other way around, and an end that is off by rounding.
+    let mut stated: Drawing =
+        vec![[place(0.0, 0.0), place(10.0, 0.0)], [place(5.0, 0.0), place(6.0, 4.0)], [place(0.0, 0.0), place(10.0, 0.0)]];
+    stated.extend([[place(7.0, 0.0), place(2.0, 0.0)], [place(6.0, 4.0), place(5.0, 1e-13)], [place(3.0, 0.0); 2]]);
+    for (radius, tolerance) in [(0.8, 0.08), (2.0, 0.05)] {
+        let [one, other] = [&plain, &stated].map(|drawing| lowered(&raised(drawing, 2, 1.0)));
+        assert!(is_sheet(&one, radius, tolerance) && is_sheet(&other, radius, tolerance));
+        let [one, other] = [one, other].map(|shape| arranged(&shape, radius, tolerance));
+        assert_eq!(topology(&one), topology(&other));
+        assert!(other.topology_exact);
+    }
+}
+
+#[test]
+fn what_does_not_lie_in_a_plane_or_apart_is_left() {
+    let mut random = Random(5);
+    let mut segments = raised(&drawing(3, &mut random), 2, 0.0);
+    assert!(is_sheet(&lowered(&segments), 0.9, 0.09));
+    segments[7][1].z += 1e-3;
+    assert!(!is_sheet(&lowered(&segments), 0.9, 0.09));
+    let apart: Drawing = (0..5).map(|k| [[10.0 * f64::from(k), 0.0], [10.0 * f64::from(k), 0.1 * f64::from(k * k)]]).collect();
+    assert!(!is_sheet(&lowered(&raised(&apart, 2, 0.0)), 0.9, 0.09));
+}
+
+#[test]
+fn profiles_are_between_their_circles() {
+    for outer in [1.000_2, 1.002, 1.02, 1.1, 1.4, 1.9] {
+        let levels = levels(1.0, outer, 1.0 + 1e-6).unwrap();
+        let ends = levels.iter().map(|level| [level.band.inner, level.band.outer].map(|x| [x, level.height]));
+        for [[a, _], [b, _]] in ends.clone().zip(ends.skip(1)).map(|(below, above)| [below, above]) {
+            // From the inner end to the inner one above: where the chord is nearest to the centre.
+            let way = [b[0] - a[0], b[1] - a[1]];
+            let share = (-(a[0] * way[0] + a[1] * way[1]) / (way[0] * way[0] + way[1] * way[1])).clamp(0.0, 1.0);
+            assert!((a[0] + share * way[0]).hypot(a[1] + share * way[1]) > 1.0 - 1e-9, "{outer}");
+        }
+        assert!(levels.iter().all(|level| level.band.outer.hypot(level.height) < outer * (1.0 + 1e-12)));
+    }
+}
+
+#[test]
+fn sheets_do_not_depend_on_threads_and_can_be_stopped() {
+    let mut random = Random(23);
+    let shape = lowered(&raised(&drawing(1, &mut random), 1, 3.0));
+    let (radius, tolerance) = (Radius::new(0.9).unwrap(), Tolerance::new(0.02).unwrap());
+    assert!(is_sheet(&shape, 0.9, 0.02));
+    let made = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| dilate(&shape, radius, tolerance, &Budget::default()).unwrap()).solid.mesh().clone()
+    };
+    let one = made(1);
+    for threads in [2, 3] {
+        let other = made(threads);
+        assert_eq!((&one.vertices, &one.triangles), (&other.vertices, &other.triangles));
+    }
+    let cancel = CancelToken::new();
+    cancel.fire(StopReason::Cancelled);
+    assert!(matches!(dilate(&shape, radius, tolerance, &Budget { cancel, ..Budget::default() }), Err(DilationError::Stopped(_))));
+}
