@@ -362,7 +362,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Predicts from a sample of the lattice's blocks.
+    /// Predicts from a sample of the lattice's blocks, or of polytopes; what lies in a plane takes less to make.
     pub(super) fn predict(&self, budget: &Budget) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
             limits: crate::budget::Limits { cells: u64::MAX, triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },

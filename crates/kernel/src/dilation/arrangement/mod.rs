@@ -119,7 +119,7 @@ pub(super) struct Arranged {
     pub(super) surface: BlockSurface,
     /// Sets of sites of which it is not proven that their polytopes have a common point exactly where their dilations have.
     pub(super) uncertain: u64,
-    /// Whether it has few triangles, in coordinates that can be written, and crosses nothing.
+    /// Whether it needs no simplification, has coordinates that can be written, and crosses nothing.
     pub(super) is_done: bool,
 }
 

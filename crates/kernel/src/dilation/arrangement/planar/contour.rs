@@ -153,7 +153,7 @@ pub(super) fn contour(wires: &Wires, radius: f64, gap: f64, budget: &Budget) -> 
     };
     let (halves, reach) = (2 * wires.segments as u32, 2.0 * radius + gap);
     for half in 0..halves {
-        if half.is_multiple_of(128) {
+        if half.is_multiple_of(32) {
             budget.cancel.check()?;
         }
         let side = Side::new(wires, half, radius);
@@ -179,7 +179,7 @@ pub(super) fn contour(wires: &Wires, radius: f64, gap: f64, budget: &Budget) -> 
         }
     }
     for vertex in 0..wires.places.len() as u32 {
-        if vertex.is_multiple_of(128) {
+        if vertex.is_multiple_of(32) {
             budget.cancel.check()?;
         }
         let owner = wires.owner[vertex as usize];

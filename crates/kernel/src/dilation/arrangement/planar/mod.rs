@@ -1,4 +1,4 @@
-//! Points and segments in one plane, some of them near to each other: the surface around them is a sheet over the plane, and its mirror image.
+//! Points and segments in one plane, many of them near to each other: the surface around them is a sheet over the plane, and its mirror image.
 //!
 //! The distance d from a place at height z over the plane to the bodies has d^2 = z^2 + d_0^2, with d_0 that from its foot. So what is below a height z of {d <= r} is over the plane's {d_0 <= sqrt(r^2 - z^2)}, whose boundary is known (`contour`): sheets are led along it at several heights by polygons with few
 //! corners (`rings`), and along the creases between (`valleys`).
@@ -16,6 +16,7 @@ mod tests;
 mod valleys;
 mod wires;
 
+use super::BYTES_PER_TRIANGLE;
 use super::figure::{Figure, Outline};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
@@ -33,8 +34,9 @@ type Place = [f64; 2];
 
 /// The least gap that is told apart, in units of the slack.
 const GAP: f64 = 16.0;
-/// By how much bodies may be off each other in contours, in units of that gap: what is closer is moved by up to three of them.
-const PERTURBED: f64 = 8.0;
+/// By how much what is closer is moved at most, in units of that gap; and two bodies together, with room for what that turns.
+const MOVED: f64 = 3.0;
+const PERTURBED: f64 = 2.0 * MOVED + 2.0;
 /// Levels at most.
 const MOST_LEVELS: usize = 64;
 /// Rings may be anywhere between the ends of the band but for these shares of it.
@@ -44,8 +46,10 @@ const ACROSS: f64 = 0.6;
 /// Where contours are between the ends of their bands: of the rim, and above. Farther out they have fewer creases.
 const RIM: [f64; 3] = [0.8, 0.6, 0.9];
 const ABOVE: [f64; 3] = [0.7, 0.6, 0.8];
-/// How much narrower the band is than what may be, in units of rounding: the plane and the heights above and below it are rounded.
+/// How much narrower the band is than what may be, in units of rounding: the plane, and the heights above and below it, are rounded. No height above the rim is less than this, either.
 const ROUNDINGS: f64 = 3.0;
+/// Triangles of a sheet and its mirror image for each corner of a ring, about: where more would be than may, none are made.
+const PER_CORNER: f64 = 4.0;
 
 /// Between which distances from the bodies the surface may be, and how coordinates are rounded.
 struct Limits<F> {
@@ -53,13 +57,15 @@ struct Limits<F> {
     outer: f64,
     /// Where the plane is.
     base: f64,
+    /// The least height above the rim.
+    lowest: f64,
     round: F,
 }
 
 impl<F: Fn(f64) -> f64> Limits<F> {
-    /// A height that leads to a rounded coordinate, no higher than what all of the band is below.
+    /// A height that leads to a rounded coordinate, above the plane, and no higher than what nothing is too near to.
     fn height(&self, height: f64) -> f64 {
-        (self.round)(self.base + height.min(self.top())) - self.base
+        (self.round)(self.base + height.min(self.top()).max(self.lowest)) - self.base
     }
 
     /// A height at which nothing is too near.
@@ -84,11 +90,10 @@ fn levels(inner: f64, outer: f64, top: f64) -> Option<Vec<Level>> {
         if outer - least < ACROSS * (outer - inner) {
             return None;
         }
-        let middle = 0.5 * (least + outer);
         let mut all: Vec<Level> = Vec::with_capacity(count + 1);
         for level in 0..=count {
             let is_last = level == count;
-            let height = if is_last { top } else { middle * (level as f64 * step).sin() };
+            let height = if is_last { top } else { least * (level as f64 * step).sin() };
             let far = (outer * outer - height * height).max(0.0).sqrt();
             let near = if is_last {
                 // The chord from the level below touches the inner circle.
@@ -107,7 +112,7 @@ fn levels(inner: f64, outer: f64, top: f64) -> Option<Vec<Level>> {
     })
 }
 
-/// The surface around figures that are points and segments with one coordinate in common, with coordinates that are rounded; none where they are not, none is near to another, or the proof does not come out.
+/// The surface around figures that are points and segments with one coordinate in common, with coordinates that are rounded; none where they are not, few are near to each other, or the proof does not come out.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -123,13 +128,29 @@ pub(super) fn surface(
     let flat = |at: &Point| axes.map(|axis| at[axis]);
     let ends = |figure: &Figure| figure.corners().first().zip(figure.corners().last()).map(|(from, to)| [flat(from), flat(to)]);
     let segments: Vec<[Place; 2]> = figures.iter().filter_map(ends).collect();
-    let spare = ROUNDINGS * setting.rounding + setting.slack;
-    let limits = Limits { inner: setting.least + spare, outer: setting.outer - spare, base: round(base), round };
     let gap = GAP * setting.slack;
+    let spare = ROUNDINGS * setting.rounding + MOVED * gap + setting.slack;
+    // Zeros have two signs: places that are the same have the same bits.
+    let round = |x: f64| round(x) + 0.0;
+    let limits = Limits {
+        inner: setting.least + spare,
+        outer: setting.outer - spare,
+        base: round(base),
+        lowest: ROUNDINGS * setting.rounding,
+        round,
+    };
     let Some(wires) = Wires::new(&segments, 2.0 * setting.outer, gap, budget)? else { return Ok(None) };
+    if !wires.are_crowded() {
+        return Ok(None);
+    }
     let Some(exact) = contour(&wires, setting.reach, PERTURBED * gap, budget)? else { return Ok(None) };
     let Some(Rings { all, distances }) = all_rings(&wires, &exact, &limits, PERTURBED * gap, budget)? else { return Ok(None) };
-    let lines = Lines::new(&wires, &all, &distances, &limits);
+    let corners: usize = all.iter().map(|ring| ring.corners.len()).sum();
+    let (triangles, allowed) = (PER_CORNER * corners as f64, &budget.limits);
+    if triangles > 2.0 * allowed.triangles as f64 || triangles * BYTES_PER_TRIANGLE > allowed.memory_bytes as f64 {
+        return Ok(None);
+    }
+    let lines = Lines::new(&wires, &all, &distances, &limits, budget)?;
     let made =
         sheet(&wires, &all, &lines, &limits, budget)?.filter(|made| made.components == exact.components && made.holes == exact.holes);
     Ok(made.map(|made| {
@@ -171,7 +192,7 @@ fn all_rings(
         let Some(found) = found.as_ref().or((number == 0).then_some(exact)) else { return Ok(None) };
         distances.push(found.radius);
         let height = if number == 0 { 0.0 } else { limits.height(level.height) };
-        for mut corners in rings(wires, found, level.band) {
+        for mut corners in rings(wires, found, level.band, budget)? {
             corners.iter_mut().for_each(|corner: &mut Corner| corner.at = corner.at.map(&limits.round));
             corners.dedup_by_key(|corner| corner.at);
             if corners.len() >= 3 {

@@ -5,6 +5,7 @@
 use super::Place;
 use super::contour::{Contour, Curve};
 use super::wires::{Wires, cross, dot, length, minus, plus};
+use crate::budget::{Budget, Stopped};
 
 /// Gates along an arc, in units of the angle of the longest chord within the band; beside a segment, in units of the radius, and how many at most.
 const ARC_STEP: f64 = 0.25;
@@ -63,19 +64,22 @@ struct Gates {
 }
 
 /// The rings along a contour's loops.
-pub(super) fn rings(wires: &Wires, contour: &Contour, band: Band) -> Vec<Vec<Corner>> {
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn rings(wires: &Wires, contour: &Contour, band: Band, budget: &Budget) -> Result<Vec<Vec<Corner>>, Stopped> {
     let mut gates = Gates::default();
     let ring = |own: &Vec<u32>| {
-        gates.fill(wires, contour, band, own);
+        gates.fill(wires, contour, band, own, budget)?;
         let corners = Walk { gates: &gates.all, next: &gates.next }.ring();
-        corners.into_iter().map(|(gate, at)| Corner { at, crease: gates.creases[gate] }).collect()
+        Ok(corners.into_iter().map(|(gate, at)| Corner { at, crease: gates.creases[gate] }).collect())
     };
     contour.loops.iter().map(ring).collect()
 }
 
 impl Gates {
     /// Makes the gates of a loop.
-    fn fill(&mut self, wires: &Wires, contour: &Contour, band: Band, own: &[u32]) {
+    fn fill(&mut self, wires: &Wires, contour: &Contour, band: Band, own: &[u32], budget: &Budget) -> Result<(), Stopped> {
         let chord = 2.0 * (band.inner / band.outer).clamp(0.0, 1.0).acos();
         self.all.clear();
         self.creases.clear();
@@ -90,6 +94,9 @@ impl Gates {
         };
         let mut is_after_corner = corner(own.len() - 1).is_some();
         for number in 0..own.len() {
+            if number.is_multiple_of(64) {
+                budget.cancel.check()?;
+            }
             let piece = piece(number);
             let body = contour.body(wires, piece);
             let wide = piece.to - piece.from;
@@ -127,6 +134,7 @@ impl Gates {
                 self.next[gate] = next;
             }
         }
+        Ok(())
     }
 }
 

@@ -20,8 +20,9 @@ use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Tria
 
 /// Rounds in which places are added.
 const ROUNDS: usize = 24;
-/// How often a triangle is halved at most that no one body is near to, and how much wider than the reach what is that is not asked for.
+/// How often a triangle is halved at most that no one body is near to, how many parts are looked at, and how much wider than the reach what is that is not asked for.
 const DEPTH: u32 = 24;
+const MOST_PARTS: u32 = 1 << 20;
 const WIDE: f64 = 4.0;
 /// How far out in the band a place is added where the surface is too near, and where it is too far.
 const OUT: [f64; 2] = [0.85, 0.4];
@@ -96,7 +97,10 @@ pub(super) fn sheet(
         if faults.iter().all(Option::is_none) {
             return Ok(plane.finish(wires, triangles));
         }
-        for (triangle, fault) in new.iter().zip(faults) {
+        for (number, (triangle, fault)) in new.iter().zip(faults).enumerate() {
+            if number.is_multiple_of(IN_A_ROW) {
+                budget.cancel.check()?;
+            }
             let is_mended = match fault {
                 None => known.insert(key(triangle), ()).is_none(),
                 Some(fault) => plane.mend(wires, triangle, fault, limits).is_some(),
@@ -134,18 +138,22 @@ impl Plane {
         for ring in rings {
             own.clear();
             for corner in &ring.corners {
-                own.push(plane.add(Vertex { at: corner.at, height: ring.height })?);
+                own.push(if ring.level == 0 {
+                    plane.add(Vertex { at: corner.at, height: 0.0 })
+                } else {
+                    plane.raise(Vertex { at: corner.at, height: ring.height })
+                }?);
             }
             for (k, &from) in own.iter().enumerate() {
                 // What is above the rim is led along rings, and need not follow them.
                 let is_joined = plane.join(from, own[(k + 1) % own.len()]);
-                if !is_joined && ring.height == 0.0 {
+                if !is_joined && ring.level == 0 {
                     return None;
                 }
             }
         }
         for &joint in &lines.joints {
-            plane.add(joint)?;
+            plane.raise(joint)?;
         }
         for line in &lines.all {
             if let [Some(&from), Some(&to)] = line.map(|at| plane.numbers.get(&at.map(f64::to_bits))) {
@@ -161,6 +169,11 @@ impl Plane {
         let handle = self.mesh.insert(vertex).ok()?;
         self.numbers.insert(vertex.at.map(f64::to_bits), handle);
         (handle.index() == count).then_some(handle)
+    }
+
+    /// Adds a vertex that is above the rim, likewise.
+    fn raise(&mut self, vertex: Vertex) -> Option<FixedVertexHandle> {
+        if vertex.height > 0.0 { self.add(vertex) } else { None }
     }
 
     /// Makes an edge between vertices, unless it would cross another.
@@ -241,7 +254,7 @@ impl Plane {
             let wanted = wanted.max(0.5 * (distance + limits.outer));
             let square = wanted * wanted - distance * distance;
             if square > 0.0 && !self.numbers.contains_key(&at.map(f64::to_bits)) {
-                let new = self.add(Vertex { at, height: limits.height(square.sqrt()) })?;
+                let new = self.raise(Vertex { at, height: limits.height(square.sqrt()) })?;
                 loose.into_iter().flatten().for_each(|end| {
                     self.join(end, new);
                 });
@@ -305,23 +318,27 @@ impl Plane {
     fn finish(&self, wires: &Wires, triangles: Vec<[u32; 3]>) -> Option<Sheet> {
         let vertices: Vec<Vertex> = self.mesh.vertices().map(|vertex| *vertex.data()).collect();
         let is_low = |vertex: u32| vertices[vertex as usize].height == 0.0;
-        let (mut low_edges, mut is_used) = (0, vec![false; vertices.len()]);
+        // Of every vertex, whether it is there, and the edges between it and others that are low.
+        let (mut is_used, mut low_edges) = (vec![false; vertices.len()], vec![0_u32; vertices.len()]);
         for triangle in &triangles {
             triangle.iter().for_each(|&vertex| is_used[vertex as usize] = true);
-            let low = (0..3).filter(|&k| is_low(triangle[k]) && is_low(triangle[(k + 1) % 3])).count();
-            low_edges += low;
-            if low == 3 {
-                return None;
+            for ends in (0..3).map(|k| [triangle[k], triangle[(k + 1) % 3]]).filter(|ends| ends.iter().all(|&end| is_low(end))) {
+                ends.into_iter().for_each(|end| low_edges[end as usize] += 1);
             }
         }
-        // A rim's edge has one triangle, and a vertex of it two such edges; others between them have two.
-        let rim = vertices.iter().zip(&is_used).filter(|(vertex, used)| **used && vertex.height == 0.0).count();
+        // A rim's edge has one triangle, and a vertex of it two such edges; others between them would have two.
+        let is_rim = |vertex: usize| is_used[vertex] && is_low(vertex as u32);
+        if (0..vertices.len()).any(|vertex| is_rim(vertex) && low_edges[vertex] != 2)
+            || triangles.iter().any(|triangle| triangle.iter().all(|&vertex| is_low(vertex)))
+        {
+            return None;
+        }
+        let rim = (0..vertices.len()).filter(|&vertex| is_rim(vertex)).count();
         let mut groups = Groups::of_triangles(vertices.len(), &triangles);
         let components = (0..vertices.len()).filter(|&vertex| is_used[vertex] && groups.of(vertex) as usize == vertex).count() as u64;
         let edges = (3 * triangles.len() + rim) / 2;
         let euler = is_used.iter().filter(|used| **used).count() as i64 - edges as i64 + triangles.len() as i64;
-        let is_closed = low_edges == rim;
-        (is_closed && self.is_above(wires, &triangles)).then_some(())?;
+        self.is_above(wires, &triangles).then_some(())?;
         Some(Sheet { vertices, triangles, components, holes: (components as i64 - euler).try_into().ok()? })
     }
 
@@ -366,7 +383,7 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
     let is_high = triangle.iter().all(|corner| corner[2] >= inner);
     let edge = |k: usize| subtract(&triangle[k], &triangle[0]);
     let normal = unit(&cross(&edge(1), &edge(2)));
-    let height = dot_in_space(&normal, &triangle[0]);
+    let height = triangle.iter().map(|corner| dot_in_space(&normal, corner)).fold(f64::INFINITY, f64::min);
     let (mut is_covered, mut found) = (false, None);
     wires.tree.query(&within, 0, |leaf| {
         for (&item, theirs) in wires.tree.items(leaf).iter().zip(wires.tree.boxes(leaf)) {
@@ -388,7 +405,7 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
     if found.is_some() || is_covered {
         return found;
     }
-    Cover { wires, most: outer }.far(&near, triangle, DEPTH).map(Fault::Far)
+    Cover { wires, most: outer, left: MOST_PARTS }.far(&near, triangle, DEPTH).map(Fault::Far)
 }
 
 /// A place of a triangle that is nearer to a body than `least`, unless a plane parts them by as much: the one across the way between their closest places, which are at a corner, at an end, or on a side.
@@ -425,15 +442,18 @@ impl Body {
 struct Cover<'a> {
     wires: &'a Wires,
     most: f64,
+    /// Parts that may be looked at.
+    left: u32,
 }
 
 impl Cover<'_> {
     /// A place of a triangle that may be farther from all of some bodies. The distance grows by no more than the way; and that from a convex body is convex, so that one that is near to all corners is near to all.
-    fn far(&self, near: &[u32], triangle: &[Point; 3], depth: u32) -> Option<Point> {
-        let square = |body: u32, [x, y, z]: &Point| self.wires.bodies[body as usize].square([*x, *y]) + z * z;
+    fn far(&mut self, near: &[u32], triangle: &[Point; 3], depth: u32) -> Option<Point> {
+        let (wires, most) = (self.wires, self.most);
+        let square = |body: u32, [x, y, z]: &Point| wires.bodies[body as usize].square([*x, *y]) + z * z;
         let centre = middle(triangle);
         let wide = triangle.iter().map(|corner| distance_squared(corner, &centre)).fold(0.0, f64::max).sqrt();
-        let reach = (self.most + wide).powi(2);
+        let reach = (most + wide).powi(2);
         let (mut least, mut left) = (f64::INFINITY, Vec::new());
         for &body in near {
             let square = square(body, &centre);
@@ -443,11 +463,13 @@ impl Cover<'_> {
             }
         }
         let least = least.sqrt();
-        if least > self.most || depth == 0 {
+        self.left = self.left.saturating_sub(1);
+        if least > most || depth == 0 || self.left == 0 {
             return Some(centre);
         }
-        let covers = |&body: &u32| triangle.iter().all(|corner| square(body, corner) <= self.most * self.most);
-        if least + wide <= self.most || (wide < WIDE * self.most && left.iter().any(covers)) {
+        let covers = |&body: &u32| triangle.iter().all(|corner| square(body, corner) <= most * most);
+        // Of what is much wider than the reach, nothing covers all.
+        if least + wide <= most || (wide < WIDE * most && left.iter().any(covers)) {
             return None;
         }
         let long = |k: usize| distance_squared(&triangle[k], &triangle[(k + 1) % 3]);
@@ -455,5 +477,102 @@ impl Cover<'_> {
         let (a, b, c) = (triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
         let half: Point = std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]));
         self.far(&left, &[a, half, c], depth - 1).or_else(|| self.far(&left, &[half, b, c], depth - 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::split_mix::Random;
+
+    fn crossed() -> Wires {
+        let segments = [[[0.0, 0.0], [10.0, 0.0]], [[3.0, -4.0], [4.0, 5.0]], [[8.0, 1.0], [9.0, 1.5]]];
+        Wires::new(&segments, 4.0, 1e-12, &Budget::default()).unwrap().unwrap()
+    }
+
+    /// Random triangles against the distances of many of their places: those that are accepted have none out of bounds, those that are not have one, but for what is about at a bound.
+    #[test]
+    fn triangles_are_held_against_their_bounds() {
+        let (wires, mut random) = (crossed(), Random(3));
+        let mut counts = [0; 3];
+        for _ in 0..4_000 {
+            let middle = [12.0 * random.share() - 1.0, 12.0 * random.share() - 6.0, 1.6 * random.share()];
+            let wide = 2.0 * random.share().powi(2);
+            let triangle: [Point; 3] = std::array::from_fn(|_| {
+                let [x, y, z] = middle.map(|x| x + wide * (random.share() - 0.5));
+                [x, y, z.max(0.0)]
+            });
+            let distance =
+                |[x, y, z]: Point| wires.bodies.iter().map(|body| (body.square([x, y]) + z * z).sqrt()).fold(f64::INFINITY, f64::min);
+            let mut found = [f64::INFINITY, 0.0_f64];
+            for i in 0..=20 {
+                for j in 0..=20 - i {
+                    let shares = [f64::from(i), f64::from(j), f64::from(20 - i - j)].map(|share| share / 20.0);
+                    let at = std::array::from_fn(|axis| (0..3).map(|k| shares[k] * triangle[k][axis]).sum());
+                    found = [found[0].min(distance(at)), found[1].max(distance(at))];
+                }
+            }
+            let (inner, outer, close) = (0.8, 1.3, 0.05 * wide);
+            match fault(&wires, &triangle, [inner, outer]) {
+                None => {
+                    assert!(found[0] >= inner && found[1] <= outer, "{triangle:?}: {found:?}");
+                    counts[0] += 1;
+                }
+                Some(Fault::Near(x)) => {
+                    assert!(found[0] <= inner + close && distance(x) < inner + 1e-9, "{triangle:?}: {found:?}");
+                    counts[1] += 1;
+                }
+                Some(Fault::Far(_) | Fault::Low(_)) => {
+                    assert!(found[1] >= outer - close, "{triangle:?}: {found:?}");
+                    counts[2] += 1;
+                }
+            }
+        }
+        assert!(counts.iter().all(|&count| count > 100), "{counts:?}");
+    }
+
+    fn ring(level: usize, corners: &[Place]) -> Ring {
+        let corners = corners.iter().map(|&at| super::super::rings::Corner { at, crease: None }).collect();
+        Ring { level, height: [0.0, 1.0][level.min(1)], corners }
+    }
+
+    fn square(x: f64, half: f64) -> [Place; 4] {
+        [[x - half, -half], [x + half, -half], [x + half, half], [x - half, half]]
+    }
+
+    /// What rings enclose, if it may be a sheet over one segment.
+    fn finished(rings: &[Ring]) -> Option<[u64; 2]> {
+        let wires = Wires::new(&[[[-0.1, 0.0], [0.1, 0.0]]], 1.0, 1e-12, &Budget::default()).unwrap()?;
+        let plane = Plane::new(rings, &Lines::default())?;
+        let triangles = plane.base()?;
+        plane.finish(&wires, triangles).map(|sheet| [sheet.components, sheet.holes])
+    }
+
+    #[test]
+    fn only_closed_rims_around_all_bodies_are_sheets() {
+        let above = ring(1, &square(0.0, 1.0));
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), above]), Some([1, 0]));
+        let above = || ring(1, &square(0.0, 1.0));
+        // A hole with what is above it around; and another piece beside.
+        let hole = ring(0, &[[1.6, -0.1], [1.6, 0.1], [1.8, 0.0]]);
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), above()]), Some([1, 0]));
+        let pieces = [ring(0, &square(0.0, 2.0)), ring(0, &square(9.0, 2.0)), above(), ring(1, &square(9.0, 1.0))];
+        assert_eq!(finished(&pieces), Some([2, 0]));
+        // A triangle, or an edge inside, that is as low as the rim.
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0))]), None);
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), hole, ring(1, &square(0.0, 1.0))]), None);
+        // Rims that cross, or have a corner in common, and a corner of one on an edge of the other.
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), ring(0, &square(3.0, 2.0)), above()]), None);
+        let corner = ring(0, &[[2.0, 2.0], [3.0, 2.0], [3.0, 3.0]]);
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), corner, above()]), None);
+        let touching = ring(0, &[[2.0, 0.0], [4.0, -1.0], [4.0, 1.0]]);
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), touching, above(), ring(1, &[[3.5, -0.1], [3.7, 0.0], [3.5, 0.1]])]), None);
+        // The body is outside, or in a hole.
+        assert_eq!(finished(&[ring(0, &square(9.0, 2.0)), ring(1, &square(9.0, 1.0))]), None);
+        let hole: Vec<Place> = square(0.0, 0.5).into_iter().rev().collect();
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), ring(0, &hole), above()]), None);
+        // What is above, and is not.
+        let sunk = Ring { height: 0.0, ..ring(1, &square(0.0, 1.0)) };
+        assert_eq!(finished(&[ring(0, &square(0.0, 2.0)), sunk]), None);
     }
 }

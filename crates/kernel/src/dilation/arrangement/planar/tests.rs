@@ -3,7 +3,7 @@ use super::contour::contour;
 use super::wires::Wires;
 use super::{Place, levels};
 use crate::attractor::Attractor;
-use crate::budget::{Budget, CancelToken, StopReason};
+use crate::budget::{Budget, CancelToken, Limits, StopReason};
 use crate::dilation::{Dilation, DilationError, dilate};
 use crate::solid::mend;
 use crate::split_mix::Random;
@@ -139,7 +139,7 @@ fn sheets_keep_their_bounds_and_have_the_topology_of_what_is_turned_out_of_its_p
             compared += 1;
         }
     }
-    assert!(sheets >= 65 && compared >= 40, "{sheets} sheets, {compared} compared");
+    assert!(sheets >= 55 && compared >= 50, "{sheets} sheets, {compared} compared");
 }
 
 /// The contour's components and holes at a distance.
@@ -192,12 +192,16 @@ fn contours_have_as_many_components_and_holes_as_formulas_say() {
 #[test]
 fn what_is_stated_twice_or_ends_on_another_is_as_if_it_were_not() {
     let place = |x: f64, y: f64| [x, y];
-    let plain: Drawing = vec![[place(0.0, 0.0), place(5.0, 0.0)], [place(5.0, 0.0), place(10.0, 0.0)], [place(5.0, 0.0), place(6.0, 4.0)]];
+    let row = (0..9).map(|k| [place(f64::from(k), 3.0), place(f64::from(k) + 1.0, 3.2)]);
+    let mut plain: Drawing =
+        vec![[place(0.0, 0.0), place(5.0, 0.0)], [place(5.0, 0.0), place(10.0, 0.0)], [place(5.0, 0.0), place(6.0, 4.0)]];
+    plain.extend(row.clone());
     // One segment with another's end on it, itself again, a part of it, the other way around, and an end that is off by rounding.
     let mut stated: Drawing =
         vec![[place(0.0, 0.0), place(10.0, 0.0)], [place(5.0, 0.0), place(6.0, 4.0)], [place(0.0, 0.0), place(10.0, 0.0)]];
+    stated.extend(row);
     stated.extend([[place(7.0, 0.0), place(2.0, 0.0)], [place(6.0, 4.0), place(5.0, 1e-13)], [place(3.0, 0.0); 2]]);
-    for (radius, tolerance) in [(0.8, 0.08), (2.0, 0.05)] {
+    for (radius, tolerance) in [(2.0, 0.2), (2.6, 0.05)] {
         let [one, other] = [&plain, &stated].map(|drawing| lowered(&raised(drawing, 2, 1.0)));
         assert!(is_sheet(&one, radius, tolerance) && is_sheet(&other, radius, tolerance));
         let [one, other] = [one, other].map(|shape| arranged(&shape, radius, tolerance));
@@ -219,8 +223,8 @@ fn what_does_not_lie_in_a_plane_or_apart_is_left() {
 
 #[test]
 fn profiles_are_between_their_circles() {
-    for outer in [1.000_2, 1.002, 1.02, 1.1, 1.4, 1.9] {
-        let levels = levels(1.0, outer, 1.0 + 1e-6).unwrap();
+    for outer in [1.000_2, 1.002, 1.02, 1.1, 1.2, 1.4] {
+        let levels = levels(1.0, outer, 1.0 + 1e-6).unwrap_or_else(|| panic!("none for {outer}"));
         let ends = levels.iter().map(|level| [level.band.inner, level.band.outer].map(|x| [x, level.height]));
         for [[a, _], [b, _]] in ends.clone().zip(ends.skip(1)).map(|(below, above)| [below, above]) {
             // From the inner end to the inner one above: where the chord is nearest to the centre.
@@ -250,4 +254,50 @@ fn sheets_do_not_depend_on_threads_and_can_be_stopped() {
     let cancel = CancelToken::new();
     cancel.fire(StopReason::Cancelled);
     assert!(matches!(dilate(&shape, radius, tolerance, &Budget { cancel, ..Budget::default() }), Err(DilationError::Stopped(_))));
+}
+
+#[test]
+fn drawings_anywhere_are_sheets_and_copies_are_put() {
+    let mut random = Random(31);
+    let drawing = drawing(1, &mut random);
+    let moved = |x: f64, y: f64| -> Drawing { drawing.iter().map(|ends| ends.map(|at| [at[0] + x, at[1] + y])).collect() };
+    let made = |drawing: &Drawing, height: f64| {
+        let segments = raised(drawing, 2, height);
+        let shape = lowered(&segments);
+        assert!(is_sheet(&shape, 0.9, 0.09));
+        let made = arranged(&shape, 0.9, 0.09);
+        assert!(made.topology_exact && holds_everywhere(&made, &segments, 0.9, &mut Random(1)));
+        topology(&made)
+    };
+    let one = made(&drawing, 0.0);
+    // About an axis, where zeros have signs; and far from all of them.
+    assert_eq!(made(&moved(-10.0, -10.0), 0.0), one);
+    assert_eq!(made(&moved(3_000.0, -7_000.3), 1.0 / 3.0), one);
+    // Of what is there four times, also in another plane, one is made.
+    let mut segments: Vec<[DVec3; 2]> = Vec::new();
+    for (x, y, height) in [(0.0, 0.0, 0.0), (40.0, 0.0, 0.0), (40.0, 30.0, 5.0), (0.0, 30.0, -8.0)] {
+        segments.extend(raised(&moved(x, y), 2, height));
+    }
+    let shape = lowered(&segments);
+    assert!(is_sheet(&shape, 0.9, 0.09));
+    let four = arranged(&shape, 0.9, 0.09);
+    assert_eq!(topology(&four), (4 * one.0, one.1, 4 * one.2));
+    assert!(four.topology_exact && holds_everywhere(&four, &segments, 0.9, &mut random));
+}
+
+#[test]
+fn limits_hold_for_sheets_and_long_bodies_with_very_many_near_are_left() {
+    let shape = lowered(&raised(&lattice(12), 2, 0.0));
+    let (radius, tolerance) = (Radius::new(0.4).unwrap(), Tolerance::new(0.02).unwrap());
+    assert!(is_sheet(&shape, 0.4, 0.02));
+    let budget = |triangles: u64| Budget { limits: Limits { triangles, ..Limits::default() }, ..Budget::default() };
+    let made = dilate(&shape, radius, tolerance, &Budget::default()).unwrap().solid.mesh().triangles.len() as u64;
+    assert!(dilate(&shape, radius, tolerance, &budget(made)).is_ok());
+    for triangles in [made - 1, made / 50] {
+        assert!(matches!(dilate(&shape, radius, tolerance, &budget(triangles)), Err(DilationError::Triangles { .. })), "{triangles}");
+    }
+    // All cross one of them.
+    let mut drawing: Drawing = (0..6_000).map(|k| f64::from(k) * 0.01).map(|x| [[x, -0.1], [x + 0.001, 0.1]]).collect();
+    drawing.push([[-1.0, 0.0], [61.0, 0.0]]);
+    assert!(Wires::new(&drawing, 0.1, 1e-12, &Budget::default()).unwrap().is_none());
 }

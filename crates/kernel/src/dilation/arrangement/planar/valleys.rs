@@ -4,6 +4,7 @@ use super::rings::Ring;
 use super::sheet::Vertex;
 use super::wires::{Wires, cross, dot, length, minus, plus};
 use super::{Limits, Place};
+use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
 
 /// Steps of Newton's method.
@@ -34,7 +35,16 @@ pub(super) struct Lines {
 
 impl Lines {
     /// The lines from all rings to those one level below, whose contours are at given distances.
-    pub(super) fn new(wires: &Wires, rings: &[Ring], distances: &[f64], limits: &Limits<impl Fn(f64) -> f64>) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn new(
+        wires: &Wires,
+        rings: &[Ring],
+        distances: &[f64],
+        limits: &Limits<impl Fn(f64) -> f64>,
+        budget: &Budget,
+    ) -> Result<Self, Stopped> {
         let mut lines = Self::default();
         let mut corners: NameMap<[u32; 3], Vec<Place>> = NameMap::default();
         let mut taken: NameMap<[u64; 2], ()> = NameMap::default();
@@ -47,6 +57,7 @@ impl Lines {
         let is_like = |a: &Place, b: &Place| length(minus(*a, *b)) < NEAR * limits.inner;
         for (ring, corner) in rings.iter().flat_map(|ring| ring.corners.iter().map(move |corner| (ring, corner))) {
             let (Some(bodies), Some(below)) = (corner.crease, ring.level.checked_sub(1)) else { continue };
+            budget.cancel.check()?;
             let mut last = corner.at;
             for stop in wires.follow(Ridge { at: corner.at, distance: distances[ring.level], bodies }, distances[below]) {
                 let next = match stop {
@@ -72,7 +83,7 @@ impl Lines {
                 last = next;
             }
         }
-        lines
+        Ok(lines)
     }
 }
 

@@ -10,9 +10,13 @@ use crate::solid::box_tree::{Box32, BoxTree};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
+/// Bodies near to each other at least, as a mean over all: where there are fewer, polytopes around them have fewer triangles.
+const LEAST_NEAR: f64 = 3.0;
 /// Bodies near to each other at most, as a mean over all, and in any case.
 const MOST_NEAR: usize = 200;
 const FEW_NEAR: usize = 100_000;
+/// Near to one of them at most: what is asked of a body grows with the square.
+const MOST_OF_ONE: usize = 4_096;
 /// Places that are close to each other along an axis, of those that one is held against.
 const MOST_CLOSE: usize = 64;
 /// No number.
@@ -64,7 +68,7 @@ pub(super) fn minus(a: Place, b: Place) -> Place {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// Segments by the numbers of their ends, with places closer than a margin as one, and parted where they pass other ends that closely. None where such places are a chain, or very many.
+/// Segments by the numbers of their ends, with places closer than a margin as one, and parted where they pass other ends within two: what is moved is so by three margins at most. None where such places are a chain, or very many.
 fn parted(places: &[Place], pairs: Vec<[u32; 2]>, margin: f64, budget: &Budget) -> Result<Option<Vec<[u32; 2]>>, Stopped> {
     // Along the first axis.
     let mut order: Vec<u32> = (0..places.len() as u32).collect();
@@ -188,7 +192,7 @@ impl Body {
 }
 
 impl Wires {
-    /// The graph of segments with their ends, and points as segments without a length; what is within `reach` of each other is near. What is within `margin` is moved by as much, so that it has ends in common. None where it still does not, or where nothing is near, or very much.
+    /// The graph of segments with their ends, and points as segments without a length; what is within `reach` of each other is near. What is about as close as `margin` is moved, by three of these at most, so that it has ends in common. None where it still does not, or where very much is near.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -251,6 +255,11 @@ impl Wires {
     pub(super) fn ends(&self, half: u32) -> [u32; 2] {
         let [from, to] = self.bodies[(half / 2) as usize].ends;
         if half.is_multiple_of(2) { [from, to] } else { [to, from] }
+    }
+
+    /// Whether many bodies are near to each other.
+    pub(super) fn are_crowded(&self) -> bool {
+        self.near.len() as f64 > LEAST_NEAR * self.bodies.len() as f64
     }
 
     /// The bodies near to a body, the nearest first, as far as a distance.
@@ -333,8 +342,9 @@ impl Wires {
                         found.push(((square.sqrt() as f32).next_down(), item));
                     }
                 }
-                is_plain
+                is_plain && found.len() <= MOST_OF_ONE
             });
+            is_plain &= found.len() <= MOST_OF_ONE;
             found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             Ok(is_plain.then_some(found))
         };
@@ -351,8 +361,7 @@ impl Wires {
                 return Ok(false);
             }
         }
-        let is_any = !near.is_empty();
         (self.near, self.starts, self.tree) = (near, starts, tree);
-        Ok(is_any)
+        Ok(true)
     }
 }
