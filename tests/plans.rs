@@ -133,14 +133,14 @@ fn beyond() -> Vec<(Value, &'static str)> {
     let lattice = json!({ "tolerance_mm": 0.01, "radius_mm": 2.0, "simplify": false });
     let evaluated = |tolerance: f64| json!({ "tolerance_mm": tolerance });
     vec![
-        limited("solidify", "curves/circle", &plain(0.002, 1.0), &triangles(300_000), "tolerance_mm"),
+        limited("solidify", "curves/circle", &plain(0.002, 1.0), &triangles(10_000), "tolerance_mm"),
         limited("solidify", "ifs/koch_curve", &plain(0.9, 0.6), &triangles(3000), "triangles"),
         limited("solidify", "curves/circle", &plain(0.02, 0.5), &triangles(1000), "triangles"),
         limited("solidify", "meshes/cube_open", &lattice, &triangles(40_000), "tolerance_mm"),
         limited("evaluate", "nurbs/torus", &evaluated(0.0005), &json!({ "cells": 20_000 }), "tolerance_mm"),
         limited("evaluate", "ifs/sierpinski_tetrahedron", &evaluated(0.05), &json!({ "cells": 5000 }), "tolerance_mm"),
         limited("solidify", "ifs/sierpinski_tetrahedron", &plain(0.33, 2.0), &json!({ "cells": 10 }), "cells"),
-        limited("solidify", "curves/circle", &plain(0.002, 1.0), &json!({ "cells": 10_000 }), "tolerance_mm"),
+        limited("solidify", "curves/circle", &plain(0.002, 1.0), &json!({ "cells": 300 }), "tolerance_mm"),
         limited("evaluate", "nurbs/torus", &evaluated(0.0002), &json!({ "memory_bytes": 4_000_000 }), "tolerance_mm"),
     ]
 }
@@ -183,7 +183,7 @@ fn the_command_line_refuses_what_a_plan_says_is_beyond_the_limits() {
     refused_and_mended(&scratch, beyond(), true);
     // Limits that are given as options count as those in the document.
     let circle = cases::named("curves/circle").model();
-    let options = ["--tolerance", "0.002", "--radius", "1", "--limit-triangles", "300000", "-o"];
+    let options = ["--tolerance", "0.002", "--radius", "1", "--limit-triangles", "10000", "-o"];
     let all = ["solidify".as_ref(), circle.as_os_str()].into_iter().chain(options.iter().map(std::ffi::OsStr::new));
     let file = scratch.join("refused.stl");
     let ended = run(all.chain([file.as_os_str()]));

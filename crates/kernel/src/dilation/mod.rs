@@ -14,7 +14,7 @@
 //! Its cubes are larger than that asks where one site serves all that is filled. Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
 //!
 //! Points, segments and triangles of which few are near to each other, wires, panels and the faces of solids, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`) and simplified part by
-//! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there).
+//! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
 //! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
 //!

@@ -3,6 +3,8 @@
 //! With s < r < outer the ends of the band, figure S_i (see `figure`) has a polytope P_i between its dilations: D_s(S_i) in P_i in D_outer(S_i). So the union M of all has D_s(S) in M in D_outer(S). That is so, too,
 //! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does, see `engine`.
+//!
+//! Points and segments in one plane need no polytopes where many are near to each other, see `planar`.
 
 mod bodies;
 mod cells;
@@ -48,6 +50,7 @@ use form::Kind;
 pub(super) use index::Index;
 use noise::Cleared;
 use pieces::{Body, Lists};
+use planar::Flat;
 use polytopes::{MOST_POLYTOPES, Polytopes};
 use std::sync::Arc;
 use steady::Steady;
@@ -152,10 +155,15 @@ impl Arrangement {
         let setting = setting.narrower(put, setting.slack);
         if let Some(flat) = planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
             let mut arrangement = Self::empty(kinds, setting, surfaces, Arc::new(copies));
-            let (leaves, site_error) = (arrangement.sites.leaves, arrangement.sites.error);
-            arrangement.made = flat.triangles.len() as f64;
-            arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
-            arrangement.flat = Some(BlockSurface { leaves, site_error, ..flat });
+            match flat {
+                Flat::Beyond(triangles) => (arrangement.made, arrangement.triangles) = (triangles, triangles),
+                Flat::Made(flat) => {
+                    arrangement.made = flat.triangles.len() as f64;
+                    arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
+                    let (leaves, site_error) = (arrangement.sites.leaves, arrangement.sites.error);
+                    arrangement.flat = Some(BlockSurface { leaves, site_error, ..flat });
+                }
+            }
             return Ok(Some(arrangement));
         }
         let slack = CLEARED * setting.slack;

@@ -122,17 +122,19 @@ fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: imp
     told(&mut Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
 }
 
+/// The distance of a place from segments.
+pub(super) fn distance_of_segments(x: DVec3, segments: &[[DVec3; 2]]) -> f64 {
+    let of = |[a, b]: &[DVec3; 2]| {
+        let along = *b - *a;
+        let share = if along.length_squared() > 0.0 { ((x - *a).dot(along) / along.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
+        x.distance(*a + share * along)
+    };
+    segments.iter().map(of).fold(f64::INFINITY, f64::min)
+}
+
 /// Whether all places deeper than the bounds are inside and all beyond are not.
 pub(super) fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, size: f64, random: &mut Random) {
     let inside = Inside::new(dilation.solid.mesh());
-    let distance = |x: DVec3| {
-        let of = |[a, b]: &[DVec3; 2]| {
-            let along = *b - *a;
-            let share = if along.length_squared() > 0.0 { ((x - *a).dot(along) / along.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
-            x.distance(*a + share * along)
-        };
-        segments.iter().map(of).fold(f64::INFINITY, f64::min)
-    };
     for _ in 0..400 {
         // Half of them near a segment's surface.
         let x = if random.next().is_multiple_of(2) {
@@ -142,7 +144,7 @@ pub(super) fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], rad
         } else {
             place(random, size)
         };
-        assert_bounds("segments", &inside, dilation, radius, x, distance(x));
+        assert_bounds("segments", &inside, dilation, radius, x, distance_of_segments(x, segments));
     }
 }
 

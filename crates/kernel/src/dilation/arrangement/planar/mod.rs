@@ -3,10 +3,10 @@
 //! The distance d from a place at height z over the plane to the bodies has d^2 = z^2 + d_0^2, with d_0 that from its foot. So what is below a height z of {d <= r} is over the plane's {d_0 <= sqrt(r^2 - z^2)}, whose boundary is known (`contour`): sheets are led along it at several heights by polygons with few
 //! corners (`rings`), and along the creases between (`valleys`).
 //!
-//! Of a sheet between s and t, s < r < t, with its mirror image, it is proven (`sheet`) that it crosses nothing, that all its triangles have s <= d <= t, and that all bodies are within. Then the solid holds D(s), as that hangs together around each body and does not meet the surface, and it is in D(t): over a place of its base there is
-//! one of the surface, whose foot is no farther from the bodies than itself. It shrinks into its base, and D(r) into the plane's {d_0 <= r}, which the contour at r is the boundary of. So where both have as many components and holes, the solid has as many components and handles as D(r); neither has voids.
+//! Of a sheet with its mirror image it is proven (`sheet`) that it crosses nothing, that all its triangles have s <= d <= t, s < r < t, and that all bodies are within. Then the solid holds D(s), which hangs together around each body and does not meet the surface, and it is in D(t), as what is between a place of the
+//! surface and its foot is no farther from the bodies. It shrinks into its base, and D(r) into the plane's {d_0 <= r}, which the contour at r bounds: where both have as many components and holes, the solid has as many components and handles as D(r). Neither has voids.
 //!
-//! Where any of it does not come out, nothing is said, and the arrangement of polytopes is left to do it.
+//! Where any of it does not come out, polytopes, or a lattice, do the work.
 
 mod contour;
 mod rings;
@@ -48,7 +48,7 @@ const RIM: [f64; 3] = [0.8, 0.6, 0.9];
 const ABOVE: [f64; 3] = [0.7, 0.6, 0.8];
 /// How much narrower the band is than what may be, in units of rounding: the plane, and the heights above and below it, are rounded. No height above the rim is less than this, either.
 const ROUNDINGS: f64 = 3.0;
-/// Triangles of a sheet and its mirror image for each corner of a ring, about: where more would be than may, none are made.
+/// Triangles of a sheet and its mirror image for each corner of a ring, about.
 const PER_CORNER: f64 = 4.0;
 
 /// Between which distances from the bodies the surface may be, and how coordinates are rounded.
@@ -112,6 +112,13 @@ fn levels(inner: f64, outer: f64, top: f64) -> Option<Vec<Level>> {
     })
 }
 
+/// What comes of figures in a plane.
+pub(super) enum Flat {
+    Made(BlockSurface),
+    /// There would be far more triangles than may be: about how many.
+    Beyond(f64),
+}
+
 /// The surface around figures that are points and segments with one coordinate in common, with coordinates that are rounded; none where they are not, few are near to each other, or the proof does not come out.
 ///
 /// # Errors
@@ -121,7 +128,7 @@ pub(super) fn surface(
     setting: &Setting,
     round: impl Fn(f64) -> f64 + Sync,
     budget: &Budget,
-) -> Result<Option<BlockSurface>, Stopped> {
+) -> Result<Option<Flat>, Stopped> {
     let Some((axis, base)) = plane(figures) else { return Ok(None) };
     // So that the axis is up where these are right and ahead.
     let axes = [(axis + 1) % 3, (axis + 2) % 3];
@@ -146,19 +153,22 @@ pub(super) fn surface(
     let Some(exact) = contour(&wires, setting.reach, PERTURBED * gap, budget)? else { return Ok(None) };
     let Some(Rings { all, distances }) = all_rings(&wires, &exact, &limits, PERTURBED * gap, budget)? else { return Ok(None) };
     let corners: usize = all.iter().map(|ring| ring.corners.len()).sum();
-    let (triangles, allowed) = (PER_CORNER * corners as f64, &budget.limits);
-    if triangles > 2.0 * allowed.triangles as f64 || triangles * BYTES_PER_TRIANGLE > allowed.memory_bytes as f64 {
+    let triangles = PER_CORNER * corners as f64;
+    if triangles > 2.0 * budget.limits.triangles as f64 {
+        return Ok(Some(Flat::Beyond(triangles)));
+    }
+    if triangles * BYTES_PER_TRIANGLE > budget.limits.memory_bytes as f64 {
         return Ok(None);
     }
     let lines = Lines::new(&wires, &all, &distances, &limits, budget)?;
     let made =
         sheet(&wires, &all, &lines, &limits, budget)?.filter(|made| made.components == exact.components && made.holes == exact.holes);
     Ok(made.map(|made| {
-        mirrored(made, |at, height| {
+        Flat::Made(mirrored(made, |at, height| {
             let mut point = [0.0; 3];
             (point[axes[0]], point[axes[1]], point[axis]) = (at[0], at[1], (limits.round)(limits.base + height));
             point
-        })
+        }))
     }))
 }
 

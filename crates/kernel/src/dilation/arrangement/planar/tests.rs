@@ -1,4 +1,4 @@
-use super::super::tests::{arranged, arranged_unless_left, keeps_its_bounds, plan, topology, wires as lowered};
+use super::super::tests::{arranged, arranged_unless_left, distance_of_segments, keeps_its_bounds, plan, topology, wires as lowered};
 use super::contour::contour;
 use super::wires::Wires;
 use super::{Place, levels};
@@ -93,16 +93,8 @@ fn is_sheet(shape: &Attractor, radius: f64, tolerance: f64) -> bool {
 
 /// Whether no triangle has a place that is nearer or farther than the bounds say, or meets another.
 fn holds_everywhere(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, random: &mut Random) -> bool {
-    let distance = |x: DVec3| {
-        let of = |[a, b]: &[DVec3; 2]| {
-            let way = *b - *a;
-            let share = if way.length_squared() > 0.0 { ((x - *a).dot(way) / way.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
-            x.distance(*a + share * way)
-        };
-        segments.iter().map(of).fold(f64::INFINITY, f64::min)
-    };
     let mesh = dilation.solid.mesh();
-    let mut holds = |x: DVec3| (radius - dilation.inner_mm..=radius + dilation.outer_mm).contains(&distance(x));
+    let mut holds = |x: DVec3| (radius - dilation.inner_mm..=radius + dilation.outer_mm).contains(&distance_of_segments(x, segments));
     let is_within = mesh.triangles.iter().all(|triangle| {
         let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
         let shares = [random.share(), random.share()];
