@@ -161,7 +161,7 @@ impl Arrangement {
                     arrangement.made = flat.triangles.len() as f64;
                     arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
                     let (leaves, site_error) = (arrangement.sites.leaves, arrangement.sites.error);
-                    arrangement.flat = Some(BlockSurface { leaves, site_error, ..flat });
+                    arrangement.flat = Some(BlockSurface { leaves, site_error, ..*flat });
                 }
             }
             return Ok(Some(arrangement));

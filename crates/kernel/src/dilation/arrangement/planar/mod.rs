@@ -114,7 +114,7 @@ fn levels(inner: f64, outer: f64, top: f64) -> Option<Vec<Level>> {
 
 /// What comes of figures in a plane.
 pub(super) enum Flat {
-    Made(BlockSurface),
+    Made(Box<BlockSurface>),
     /// There would be far more triangles than may be: about how many.
     Beyond(f64),
 }
@@ -164,11 +164,12 @@ pub(super) fn surface(
     let made =
         sheet(&wires, &all, &lines, &limits, budget)?.filter(|made| made.components == exact.components && made.holes == exact.holes);
     Ok(made.map(|made| {
-        Flat::Made(mirrored(made, |at, height| {
+        let surface = mirrored(made, |at, height| {
             let mut point = [0.0; 3];
             (point[axes[0]], point[axes[1]], point[axis]) = (at[0], at[1], (limits.round)(limits.base + height));
             point
-        }))
+        });
+        Flat::Made(Box::new(surface))
     }))
 }
 
