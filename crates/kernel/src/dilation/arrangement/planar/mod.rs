@@ -68,6 +68,13 @@ impl<F: Fn(f64) -> f64> Limits<F> {
         (self.round)(self.base + height.min(self.top()).max(self.lowest)) - self.base
     }
 
+    /// The height over a place of the plane, as far from the bodies as that, of what is so far out in the band; where the place is farther itself, halfway to what may be. None over what is beyond the band.
+    fn over(&self, distance: f64, out: f64) -> Option<f64> {
+        let wanted = (self.inner + out * (self.outer - self.inner)).max(0.5 * (distance + self.outer));
+        let square = wanted * wanted - distance * distance;
+        (square > 0.0).then(|| self.height(square.sqrt()))
+    }
+
     /// A height at which nothing is too near.
     fn top(&self) -> f64 {
         self.inner + SPARE[0] * (self.outer - self.inner)

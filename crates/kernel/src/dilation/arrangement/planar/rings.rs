@@ -97,6 +97,7 @@ impl Gates {
             if number.is_multiple_of(64) {
                 budget.cancel.check()?;
             }
+            let after = piece(number + 1);
             let piece = piece(number);
             let body = contour.body(wires, piece);
             let wide = piece.to - piece.from;
@@ -113,7 +114,7 @@ impl Gates {
             is_after_corner = corner.is_some();
             if let Some((at, way, is_crease)) = corner {
                 let narrow = NARROW * contour.radius;
-                let other = contour.body(wires, &contour.pieces[own[(number + 1) % own.len()] as usize]);
+                let other = contour.body(wires, after);
                 self.all.push(if is_crease {
                     Gate { outer: plus(at, narrow, way), inner: plus(at, -narrow, way) }
                 } else {
@@ -210,16 +211,17 @@ impl Walk<'_> {
         seen
     }
 
+    /// Places of what is seen of a gate, a little within its ends.
+    fn places(&self, Seen { gate, shares: [from, to] }: &Seen) -> [Place; 3] {
+        SHARES.map(|share| self.gate(*gate).at(from + share.clamp(1e-3, 1.0 - 1e-3) * (to - from)))
+    }
+
     /// Where an edge from a place ends best.
     fn step(&self, from: Place, gate: usize, last: usize) -> Option<(usize, Place)> {
         let seen = self.look(from, gate, last)?;
-        let place = |share: f64| {
-            let inside = share.clamp(1e-3, 1.0 - 1e-3);
-            self.gate(seen.gate).at(seen.shares[0] + inside * (seen.shares[1] - seen.shares[0]))
-        };
         let reach = |at: &Place| self.look(*at, seen.gate, seen.gate + self.gates.len()).map_or(0, |next| next.gate);
         // The first of those that reach as far.
-        let best = SHARES.map(place).into_iter().rev().max_by_key(reach)?;
+        let best = self.places(&seen).into_iter().rev().max_by_key(reach)?;
         best.iter().all(|x| x.is_finite()).then_some((seen.gate, best))
     }
 
@@ -250,10 +252,7 @@ impl Walk<'_> {
                 // The last corner is where the first is seen from.
                 let between = (gate + 1..end).rev().find_map(|number| {
                     let seen = self.look(at, gate, number).filter(|seen| seen.gate == number)?;
-                    let places = SHARES.map(|share| {
-                        self.gate(number).at(seen.shares[0] + share.clamp(1e-3, 1.0 - 1e-3) * (seen.shares[1] - seen.shares[0]))
-                    });
-                    places.into_iter().find(|&place| closes(place, number)).map(|place| (number, place))
+                    self.places(&seen).into_iter().find(|&place| closes(place, number)).map(|place| (number, place))
                 });
                 corners.extend(between.or(Some((reached, place))).map(|(number, place)| (number % count, place)));
                 break;

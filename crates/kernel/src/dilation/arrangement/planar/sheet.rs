@@ -15,7 +15,7 @@ use crate::measure::contact::closest_on_segments;
 use crate::measure::triangle::closest_on_triangle;
 use crate::solid::box_tree::Box32;
 use rayon::prelude::*;
-use spade::handles::{DirectedEdgeHandle, FixedDirectedEdgeHandle, FixedVertexHandle};
+use spade::handles::{DirectedEdgeHandle, FaceHandle, FixedDirectedEdgeHandle, FixedVertexHandle, InnerTag};
 use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// Rounds in which places are added.
@@ -120,6 +120,16 @@ fn key(triangle: &[u32; 3]) -> u128 {
     sorted.iter().fold(0, |key, &vertex| key << 32 | u128::from(vertex))
 }
 
+/// The corners of a face.
+fn corners(face: FaceHandle<'_, InnerTag, Vertex, (), CdtEdge<()>, ()>) -> [u32; 3] {
+    face.vertices().map(|vertex| vertex.fix().index() as u32)
+}
+
+/// The ends of a triangle's sides.
+fn sides(triangle: &[u32; 3]) -> [[FixedVertexHandle; 2]; 3] {
+    [0, 1, 2].map(|k| [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize)))
+}
+
 /// Whether an edge is one of the rim.
 fn is_rim(edge: &DirectedEdgeHandle<'_, Vertex, (), CdtEdge<()>, ()>) -> bool {
     edge.is_constraint_edge() && edge.from().data().height == 0.0 && edge.to().data().height == 0.0
@@ -213,7 +223,7 @@ impl Plane {
             }
         }
         let inside = mesh.inner_faces().filter(|face| sides[face.fix().index()] == Some(true));
-        Some(inside.map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect())
+        Some(inside.map(corners).collect())
     }
 
     /// The middle of an edge between vertices of the rim that is none of its edges.
@@ -234,15 +244,15 @@ impl Plane {
             Fault::Near(x) => (x, OUT[0]),
             Fault::Far(x) | Fault::Low(x) => (x, OUT[1]),
         };
-        let (at, band) = ([x[0], x[1]], limits.outer - limits.inner);
-        let wanted = limits.inner + out * band;
+        let at = [x[0], x[1]];
         let (distance, _) = wires.away(at)?;
-        if !matches!(fault, Fault::Low(_)) && (x[2] < LOW * limits.inner || distance > limits.outer) {
-            let edges = (0..3).map(|k| [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize)));
-            if let Some(edge) = edges.filter_map(|[from, to]| self.mesh.get_edge_from_neighbors(from, to)).find(is_rim) {
-                let edge = edge.fix();
-                return self.bend(wires, edge, at, wanted, limits);
-            }
+        if !matches!(fault, Fault::Low(_))
+            && (x[2] < LOW * limits.inner || distance > limits.outer)
+            && let Some(edge) =
+                sides(triangle).into_iter().filter_map(|[from, to]| self.mesh.get_edge_from_neighbors(from, to)).find(is_rim)
+        {
+            let edge = edge.fix();
+            return self.bend(wires, edge, at, limits.inner + out * (limits.outer - limits.inner), limits);
         }
         let loose = self.loosen(triangle, at);
         let crease = if matches!(fault, Fault::Far(_)) { wires.crease(at, limits.outer) } else { None };
@@ -250,11 +260,10 @@ impl Plane {
         let halfway = [0.5 * (at[0] + x), 0.5 * (at[1] + y)];
         for at in crease.into_iter().chain([at, halfway, [x, y]]).map(|at| at.map(&limits.round)) {
             let (distance, _) = wires.away(at)?;
-            // Where the plane is farther than wanted, halfway to what may be.
-            let wanted = wanted.max(0.5 * (distance + limits.outer));
-            let square = wanted * wanted - distance * distance;
-            if square > 0.0 && !self.numbers.contains_key(&at.map(f64::to_bits)) {
-                let new = self.raise(Vertex { at, height: limits.height(square.sqrt()) })?;
+            if let Some(height) = limits.over(distance, out)
+                && !self.numbers.contains_key(&at.map(f64::to_bits))
+            {
+                let new = self.raise(Vertex { at, height })?;
                 loose.into_iter().flatten().for_each(|end| {
                     self.join(end, new);
                 });
@@ -268,8 +277,7 @@ impl Plane {
     /// Takes out edges of a triangle that a place is close to, unless they are of the rim: their ends.
     fn loosen(&mut self, triangle: &[u32; 3], at: Place) -> Vec<[FixedVertexHandle; 2]> {
         let mut loose = Vec::new();
-        for k in 0..3 {
-            let ends = [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize));
+        for ends in sides(triangle) {
             let Some(edge) = self.mesh.get_edge_from_neighbors(ends[0], ends[1]).filter(|edge| edge.is_constraint_edge() && !is_rim(edge))
             else {
                 continue;
@@ -356,14 +364,11 @@ impl Plane {
                 OnEdge(edge) => {
                     let edge = self.mesh.directed_edge(edge);
                     let faces = [edge.face(), edge.rev().face()].into_iter().filter_map(|face| face.as_inner());
-                    faces.map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32)).collect()
+                    faces.map(corners).collect()
                 }
                 OnVertex(vertex) => {
                     let edges = self.mesh.vertex(vertex).out_edges();
-                    edges
-                        .filter_map(|edge| edge.face().as_inner())
-                        .map(|face| face.vertices().map(|vertex| vertex.fix().index() as u32))
-                        .collect()
+                    edges.filter_map(|edge| edge.face().as_inner()).map(corners).collect()
                 }
                 _ => Vec::new(),
             };

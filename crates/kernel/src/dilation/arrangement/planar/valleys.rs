@@ -65,10 +65,9 @@ impl Lines {
                     Stop::Joint(ridge) => {
                         let known = lines.joints.iter().rev().take(LAST).map(|joint| joint.at).find(|other| is_like(other, &ridge.at));
                         known.or_else(|| {
-                            let wanted = (limits.inner + OUT * (limits.outer - limits.inner)).max(0.5 * (ridge.distance + limits.outer));
-                            let (at, square) = (ridge.at.map(&limits.round), wanted * wanted - ridge.distance * ridge.distance);
-                            (square > 0.0 && taken.insert(at.map(f64::to_bits), ()).is_none()).then(|| {
-                                lines.joints.push(Vertex { at, height: limits.height(square.sqrt()) });
+                            let (at, height) = (ridge.at.map(&limits.round), limits.over(ridge.distance, OUT)?);
+                            taken.insert(at.map(f64::to_bits), ()).is_none().then(|| {
+                                lines.joints.push(Vertex { at, height });
                                 at
                             })
                         })

@@ -68,6 +68,17 @@ pub(super) fn minus(a: Place, b: Place) -> Place {
     [a[0] - b[0], a[1] - b[1]]
 }
 
+/// a + s b.
+#[inline]
+pub(super) fn plus(a: Place, s: f64, b: Place) -> Place {
+    [a[0] + s * b[0], a[1] + s * b[1]]
+}
+
+#[inline]
+pub(super) fn length(a: Place) -> f64 {
+    dot(a, a).sqrt()
+}
+
 /// Segments by the numbers of their ends, with places closer than a margin as one, and parted where they pass other ends within two: what is moved is so by three margins at most. None where such places are a chain, or very many.
 fn parted(places: &[Place], pairs: Vec<[u32; 2]>, margin: f64, budget: &Budget) -> Result<Option<Vec<[u32; 2]>>, Stopped> {
     // Along the first axis.
@@ -124,17 +135,6 @@ fn parted(places: &[Place], pairs: Vec<[u32; 2]>, margin: f64, budget: &Budget) 
         parts.push([last, to]);
     }
     Ok(Some(parts))
-}
-
-/// a + s b.
-#[inline]
-pub(super) fn plus(a: Place, s: f64, b: Place) -> Place {
-    [a[0] + s * b[0], a[1] + s * b[1]]
-}
-
-#[inline]
-pub(super) fn length(a: Place) -> f64 {
-    dot(a, a).sqrt()
 }
 
 impl Body {
