@@ -4,7 +4,7 @@
 //! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does, see `engine`.
 //!
-//! Points and segments in one plane need no polytopes where many are near to each other, see `planar`.
+//! Points and segments in one plane need no polytopes where many are near to each other, see `planar`, nor do triangles with one height over each place of one, see `height_field`.
 
 mod bodies;
 mod cells;
@@ -16,6 +16,7 @@ mod engine;
 mod facets;
 mod figure;
 mod form;
+mod height_field;
 mod hidden;
 mod hinges;
 mod hull;
@@ -50,7 +51,6 @@ use form::Kind;
 pub(super) use index::Index;
 use noise::Cleared;
 use pieces::{Body, Lists};
-use planar::Flat;
 use polytopes::{MOST_POLYTOPES, Polytopes};
 use std::sync::Arc;
 use steady::Steady;
@@ -96,7 +96,7 @@ pub(super) struct Arrangement {
     loose: Loose,
     /// Where parts were that are like others.
     copies: Arc<Copies>,
-    /// The surface, where all lies in a plane.
+    /// The surface, where all lies in a plane, or has one height over it.
     flat: Option<BlockSurface>,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
@@ -106,6 +106,13 @@ pub(super) struct Arrangement {
     /// About how many triangles will be made, and how many there will be with those that are put elsewhere.
     made: f64,
     pub(super) triangles: f64,
+}
+
+/// What comes of figures over a plane.
+enum Flat {
+    Made(Box<BlockSurface>),
+    /// There would be far more triangles than may be: about how many.
+    Beyond(f64),
 }
 
 /// How polytopes were begun.
@@ -153,7 +160,11 @@ impl Arrangement {
         }
         let put = if copies.is_empty() { 0.0 } else { copies.moved + setting.rounding };
         let setting = setting.narrower(put, setting.slack);
-        if let Some(flat) = planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
+        let flat = match planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
+            None => height_field::surface(&kinds.list, &setting, &|x| copies.rounded(x), budget)?,
+            made => made,
+        };
+        if let Some(flat) = flat {
             let mut arrangement = Self::empty(kinds, setting, surfaces, Arc::new(copies));
             match flat {
                 Flat::Beyond(triangles) => (arrangement.made, arrangement.triangles) = (triangles, triangles),

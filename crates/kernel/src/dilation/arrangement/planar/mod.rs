@@ -16,8 +16,8 @@ mod tests;
 mod valleys;
 mod wires;
 
-use super::BYTES_PER_TRIANGLE;
 use super::figure::{Figure, Outline};
+use super::{BYTES_PER_TRIANGLE, Flat};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
@@ -117,13 +117,6 @@ fn levels(inner: f64, outer: f64, top: f64) -> Option<Vec<Level>> {
         }
         Some(all)
     })
-}
-
-/// What comes of figures in a plane.
-pub(super) enum Flat {
-    Made(Box<BlockSurface>),
-    /// There would be far more triangles than may be: about how many.
-    Beyond(f64),
 }
 
 /// The surface around figures that are points and segments with one coordinate in common, with coordinates that are rounded; none where they are not, few are near to each other, or the proof does not come out.

@@ -1,0 +1,100 @@
+//! A surface with one height over each place of a convex part of a plane across an axis, such as a terrain: what is around it is between a sheet above and a sheet below.
+//!
+//! Let S be the graph of f over a convex part P of the plane. Over each place x, D(r) is the union of the intervals around f(u) of half-length sqrt(r^2 - |x - u|^2), for all u of P as near as r: these are a convex set, and f is continuous, so that D(r) has one interval over each place of P's dilation and nothing
+//! elsewhere. It is a ball for every r. So all that has to be shown of two sheets and the strip around them that joins them (`pair`), with s < r < t:
+//!
+//! * All of their triangles have s <= d <= t (`check`).
+//! * Seen from above, each sheet with its side of the strip covers the inside of the rim once: so neither crosses itself.
+//! * All vertices of the sheets are nearer to P than s, so that all places over which they are have some of D(s) over them, as P is convex. A sheet does not meet it, and these places hang together: so it is above all of D(s), as one place of it is that is higher than S; and the lower one is below. So they do not meet
+//!   each other, nor do the sides of the strip, which have the same edges seen from above, and the same rim.
+//!
+//! Then the surface is a sphere, and what it bounds holds D(s). It is in D(t), as over each place both of its ends are, and D(t) has one interval there.
+//!
+//! Where that does not come out, or few parts are near to each other, polytopes, or a lattice, do the work.
+
+mod check;
+mod field;
+mod ground;
+mod pair;
+mod parts;
+mod samples;
+mod sheet;
+mod squares;
+#[cfg(test)]
+mod tests;
+
+use super::Flat;
+use super::figure::Figure;
+use crate::attractor::cell::Point;
+use crate::budget::{Budget, Stopped};
+use crate::dilation::plan::Setting;
+use check::{Faces, Question};
+use ground::Ground;
+use pair::{Outcome, Pair};
+
+/// A place in the plane.
+type Place = [f64; 2];
+
+/// Parts near to a triangle at least, as a mean: where there are fewer, polytopes around them have fewer triangles.
+const LEAST_NEAR: f64 = 20.0;
+
+/// Between which distances from the graph the surface may be, and how coordinates are rounded.
+struct Limits<'a> {
+    inner: f64,
+    outer: f64,
+    rounding: f64,
+    round: &'a (dyn Fn(f64) -> f64 + Sync),
+}
+
+impl Limits<'_> {
+    /// The distance that is so far out in the band.
+    fn at(&self, share: f64) -> f64 {
+        self.inner + share * (self.outer - self.inner)
+    }
+
+    fn question(&self, triangle: [Point; 3], owners: [u32; 3]) -> Question {
+        Question { triangle, owners, inner: self.inner, outer: self.outer }
+    }
+}
+
+/// The surface around figures that are the triangles of a graph over a convex part of a plane, with coordinates that are rounded; none where they are not, few are near to each other, or the proof does not come out.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn surface(
+    figures: &[Figure],
+    setting: &Setting,
+    round: &(dyn Fn(f64) -> f64 + Sync),
+    budget: &Budget,
+) -> Result<Option<Flat>, Stopped> {
+    // So that the axis is up where the others are right and ahead.
+    let frames = [2, 1, 0].map(|axis| [(axis + 1) % 3, (axis + 2) % 3, axis]);
+    let graph = |frame: [usize; 3]| Ground::new(figures, |at| frame.map(|axis| at[axis])).map(|ground| (frame, ground));
+    let Some((frame, ground)) = frames.into_iter().find_map(graph) else { return Ok(None) };
+    budget.cancel.check()?;
+    // Zeros have two signs: places that are the same have the same bits.
+    let limits = Limits {
+        inner: setting.least + setting.slack,
+        outer: setting.outer - setting.slack,
+        rounding: setting.rounding,
+        round: &|x| round(x) + 0.0,
+    };
+    let faces = Faces::new(&ground);
+    if ground.crowding(setting.slack, &faces, limits.outer) < LEAST_NEAR {
+        return Ok(None);
+    }
+    budget.cancel.check()?;
+    let below = ground.turned();
+    let grounds = [ground, below];
+    Ok(match Pair::new(&grounds, faces, &limits).run(budget)? {
+        Outcome::Made(mut surface) => {
+            for vertex in &mut surface.vertices {
+                let own = *vertex;
+                (0..3).for_each(|axis| vertex[frame[axis]] = own[axis] + 0.0);
+            }
+            Some(Flat::Made(Box::new(surface)))
+        }
+        Outcome::Beyond(triangles) => Some(Flat::Beyond(triangles)),
+        Outcome::Left => None,
+    })
+}

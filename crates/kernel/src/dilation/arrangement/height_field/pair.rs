@@ -1,0 +1,273 @@
+//! The sheets above and below a graph, and the strip around, which joins them in the rim.
+//!
+//! Both sheets end at a border beside the graph, not farther from its part of the plane than the inner distance; the rim is beyond that. Between them is a strip of two triangles after each post, on either side, with the same edges seen from above.
+
+use super::check::{Faces, Fault};
+use super::ground::{Ground, NONE, border_of};
+use super::sheet::{Found, Sheet};
+use super::{Limits, Place};
+use crate::attractor::cell::Point;
+use crate::budget::{Budget, Stopped};
+use crate::dilation::surface::BlockSurface;
+use crate::solid::contact::turn;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Rounds in which places are added.
+const ROUNDS: usize = 48;
+/// How far out in the band the rim is, along straight sides, and at most around corners.
+const RIM: [f64; 2] = [0.4, 0.7];
+/// How far the border is from the inner distance, as a share of it, and in units of rounding.
+const BORDER: f64 = 1e-4;
+const ROUNDINGS: f64 = 4.0;
+/// The rim is bent no nearer to posts than by this share of the way between them.
+const LEAST_SHARE: f64 = 0.1;
+/// Triangles for each vertex of a sheet, about.
+const PER_VERTEX: f64 = 2.0;
+/// Bytes held at most for each triangle of the graph, and for each vertex of a sheet.
+const BYTES_PER_FACE: f64 = 1_600.0;
+const BYTES_PER_VERTEX: f64 = 400.0;
+
+/// A place of the rim, and the vertices of both sheets at the border next to it.
+#[derive(Clone, Copy, Debug)]
+struct Post {
+    rim: Point,
+    ends: [u32; 2],
+    /// Whether the strip after it was found to be as it should be.
+    is_known: bool,
+}
+
+/// What comes of two sheets.
+pub(super) enum Outcome {
+    /// The surface in the frame of the graph.
+    Made(BlockSurface),
+    /// There would be far more triangles than may be: at least about how many.
+    Beyond(f64),
+    /// Places do not make it so, or there is no room for it.
+    Left,
+}
+
+/// Both sheets, the lower one upside down, and the posts.
+pub(super) struct Pair<'a> {
+    sheets: [Sheet<'a>; 2],
+    posts: Vec<Post>,
+    /// Of every post, the next.
+    next: Vec<u32>,
+    limits: &'a Limits<'a>,
+}
+
+/// A polygon around a convex one, between two distances from it: its sides touch what is as far as the first.
+fn rim(corners: &[Place], limits: &Limits<'_>) -> Vec<Place> {
+    let [near, far] = RIM.map(|share| limits.at(share));
+    let widest = 2.0 * (near / far).acos();
+    let count = corners.len();
+    let outward = |from: Place, to: Place| (from[0] - to[0]).atan2(to[1] - from[1]);
+    let mut rim = Vec::new();
+    for k in 0..count {
+        let [a, b, c] = [k + count - 1, k, k + 1].map(|k| corners[k % count]);
+        let first = outward(a, b);
+        let turn = (outward(b, c) - first).rem_euclid(TAU);
+        let steps = (turn / widest).ceil().max(1.0);
+        let reach = near / (0.5 * turn / steps).cos();
+        for step in 0..steps as u32 {
+            let (sine, cosine) = (first + turn * (f64::from(step) + 0.5) / steps).sin_cos();
+            rim.push([b[0] + reach * cosine, b[1] + reach * sine]);
+        }
+    }
+    rim
+}
+
+impl<'a> Pair<'a> {
+    pub(super) fn new(grounds: &'a [Ground; 2], faces: Faces, limits: &'a Limits<'a>) -> Self {
+        let [above, below] = grounds;
+        let (above, below) = rayon::join(|| Sheet::new(above, faces, limits), || Sheet::new(below, Faces::new(below), limits));
+        Self { sheets: [above, below], posts: Vec::new(), next: Vec::new(), limits }
+    }
+
+    /// The surface, once all of it is between the distances from the graph.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn run(mut self, budget: &Budget) -> Result<Outcome, Stopped> {
+        let limits = self.limits;
+        // Each twice as many as may be.
+        let most = (budget.limits.triangles as f64 / PER_VERTEX).min(f64::from(u32::MAX >> 2)) as usize;
+        let room = budget.limits.memory_bytes as f64 - BYTES_PER_FACE * self.sheets[0].ground.triangles.len() as f64;
+        if room < 0.0 || self.begin().is_none() {
+            return Ok(Outcome::Left);
+        }
+        let [above, below] = &mut self.sheets;
+        let (first, second) = rayon::join(|| above.sample(most, limits, budget), || below.sample(most, limits, budget));
+        first.and(second)?;
+        let mut all = true;
+        for _ in 0..ROUNDS {
+            let vertices = self.sheets.each_ref().map(Sheet::len).into_iter().sum::<usize>() as f64;
+            if PER_VERTEX * vertices > 2.0 * budget.limits.triangles as f64 {
+                return Ok(Outcome::Beyond(PER_VERTEX * vertices));
+            }
+            if BYTES_PER_VERTEX * vertices > room {
+                return Ok(Outcome::Left);
+            }
+            let ([above, below], next) = (&mut self.sheets, &self.next);
+            let (first, second) = rayon::join(|| above.check(next, all, limits, budget), || below.check(next, all, limits, budget));
+            let [first, second] = [first?, second?];
+            let is_done = first.is_done && second.is_done;
+            let bends = [first, second].into_iter().flat_map(|Found { bends, .. }| bends).chain(self.check_strip()).collect::<Vec<_>>();
+            if is_done && bends.is_empty() {
+                return Ok(self.finish().map_or(Outcome::Left, Outcome::Made));
+            }
+            all = !bends.is_empty();
+            let mut is_bent = vec![false; self.posts.len()];
+            for (post, at) in bends {
+                if !std::mem::replace(&mut is_bent[post as usize], true) && self.bend(post, at).is_none() {
+                    return Ok(Outcome::Left);
+                }
+            }
+        }
+        Ok(Outcome::Left)
+    }
+
+    /// Makes the first posts.
+    fn begin(&mut self) -> Option<()> {
+        let rim = rim(&self.sheets[0].ground.corners, self.limits);
+        for &at in &rim {
+            self.post(at)?;
+        }
+        let count = rim.len() as u32;
+        (0..count).try_for_each(|post| self.join(post, (post + 1) % count))
+    }
+
+    /// Adds a post at a place.
+    fn post(&mut self, at: Place) -> Option<u32> {
+        let limits = self.limits;
+        let at = at.map(limits.round);
+        let [above, below] = self.sheets.each_ref().map(|sheet| sheet.field.top(at, limits.outer));
+        // In the middle of what is over the place.
+        let rim = [at[0], at[1], (limits.round)(0.5 * (above?.height - below?.height))];
+        let post = self.posts.len() as u32;
+        let border = self.sheets[0].ground.inward(at, limits.inner * (1.0 - BORDER) - ROUNDINGS * limits.rounding);
+        let mut ends = [NONE; 2];
+        for (sheet, end) in self.sheets.iter_mut().zip(&mut ends) {
+            *end = sheet.raise_post(border, post, limits)?;
+        }
+        self.posts.push(Post { rim, ends, is_known: false });
+        self.next.push(NONE);
+        Some(post)
+    }
+
+    fn join(&mut self, from: u32, to: u32) -> Option<()> {
+        self.next[from as usize] = to;
+        self.posts[from as usize].is_known = false;
+        let [a, b] = [from, to].map(|post| self.posts[post as usize].ends);
+        self.sheets.iter_mut().zip(a.into_iter().zip(b)).all(|(sheet, (a, b))| sheet.join(a, b)).then_some(())
+    }
+
+    /// Adds a post between one and the next, beside a place.
+    fn bend(&mut self, post: u32, at: Place) -> Option<()> {
+        let next = self.next[post as usize];
+        let [from, to] = [post, next].map(|post| self.posts[post as usize]);
+        let way = [0, 1].map(|axis| to.rim[axis] - from.rim[axis]);
+        let share = [0, 1].map(|axis| (at[axis] - from.rim[axis]) * way[axis]).iter().sum::<f64>() / (way[0] * way[0] + way[1] * way[1]);
+        let share = share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+        for (sheet, (from, to)) in self.sheets.iter_mut().zip(from.ends.into_iter().zip(to.ends)) {
+            sheet.part(from, to).then_some(())?;
+        }
+        let new = self.post([0, 1].map(|axis| from.rim[axis] + share * way[axis]))?;
+        self.join(post, new)?;
+        self.join(new, next)
+    }
+
+    /// The triangles of a side's strip after a post, counter-clockwise from above, upside down on the second side.
+    fn strip(&self, side: usize, post: u32) -> [[Point; 3]; 2] {
+        let [from, to] = [post, self.next[post as usize]].map(|post| &self.posts[post as usize]);
+        let sign = [1.0, -1.0][side];
+        let [a, b] = [from, to].map(|Post { rim: [x, y, z], .. }| [*x, *y, sign * z]);
+        let [c, d] = [to, from].map(|post| self.sheets[side].point(post.ends[side]));
+        [[a, b, c], [a, c, d]]
+    }
+
+    /// Holds the parts of the strip that are not known against the graph: the posts after which the rim is to be bent, and where.
+    fn check_strip(&mut self) -> Vec<(u32, Place)> {
+        let open: Vec<u32> = (0..self.posts.len() as u32).filter(|&post| !self.posts[post as usize].is_known).collect();
+        let fault = |&post: &u32| {
+            let mut near = Vec::new();
+            let mut all = [0, 1].into_iter().flat_map(|side| self.strip(side, post).map(|triangle| (side, triangle)));
+            all.find_map(|(side, triangle)| {
+                let Sheet { faces, field, .. } = &self.sheets[side];
+                faces.fault(field, &self.limits.question(triangle, [NONE; 3]), &mut near)
+            })
+        };
+        let faults: Vec<Option<Fault>> = open.par_iter().map(fault).collect();
+        let mut bends = Vec::new();
+        for (post, fault) in open.into_iter().zip(faults) {
+            match fault {
+                None => self.posts[post as usize].is_known = true,
+                Some(Fault::Near(x, _) | Fault::Far(x)) => bends.push((post, [x[0], x[1]])),
+            }
+        }
+        bends
+    }
+
+    /// The surface, if it is as it is proven to be: see the head of the module.
+    fn finish(&self) -> Option<BlockSurface> {
+        let mut order = vec![0];
+        while let Some(&post) = self.next.get(order[order.len() - 1] as usize).filter(|&&post| post != 0) {
+            order.push(post);
+            (order.len() <= self.posts.len()).then_some(())?;
+        }
+        let rim: Vec<Point> = order.iter().map(|&post| self.posts[post as usize].rim).collect();
+        let mut surface = BlockSurface { vertices: rim.clone(), ..BlockSurface::default() };
+        let count = rim.len() as u32;
+        for (side, sheet) in self.sheets.iter().enumerate() {
+            let mut numbers = vec![NONE; sheet.len()];
+            let (mut is_above, mut is_inside) = (false, true);
+            let highest = sheet.ground.places.iter().map(|place| place[2]).fold(f64::NEG_INFINITY, f64::max);
+            let mut number = |corner: u32| {
+                let number = &mut numbers[corner as usize];
+                if *number == NONE {
+                    let [x, y, height] = sheet.point(corner);
+                    is_above |= height > highest;
+                    is_inside &= sheet.ground.away([x, y]).0 < self.limits.inner;
+                    *number = surface.vertices.len() as u32;
+                    surface.vertices.push([x, y, [height, -height][side]]);
+                }
+                *number
+            };
+            let mut own: Vec<[u32; 3]> = sheet.base().iter().map(|triangle| triangle.map(&mut number)).collect();
+            for (k, &post) in (0..).zip(&order) {
+                let next = (k + 1) % count;
+                let [c, d] = [order[next as usize], post].map(|post| number(self.posts[post as usize].ends[side]));
+                own.extend([[k, next, c], [k, c, d]]);
+            }
+            (is_above && is_inside && is_plane(&surface.vertices, &own, &rim)).then_some(())?;
+            if side == 1 {
+                own.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            }
+            surface.triangles.extend(own);
+        }
+        Some(surface)
+    }
+}
+
+/// Whether triangles cover the inside of a rim, whose places are the first ones, once, and nothing else; seen from above. The rim turns once around a place, and all triangles turn the same way.
+fn is_plane(places: &[Point], triangles: &[[u32; 3]], rim: &[Point]) -> bool {
+    let middle = [0, 1].map(|axis| rim.iter().map(|place| place[axis]).sum::<f64>() / rim.len() as f64);
+    let middle = [middle[0], middle[1], 0.0];
+    let mut turned = 0.0;
+    for (k, a) in rim.iter().enumerate() {
+        let b = &rim[(k + 1) % rim.len()];
+        if turn(2, &middle, a, b) <= 0.0 {
+            return false;
+        }
+        let [[ax, ay], [bx, by]] = [a, b].map(|place| [place[0] - middle[0], place[1] - middle[1]]);
+        turned += (ax * by - ay * bx).atan2(ax * bx + ay * by);
+    }
+    let turns = |&[a, b, c]: &[u32; 3]| turn(2, &places[a as usize], &places[b as usize], &places[c as usize]) > 0.0;
+    turned < 1.5 * TAU && triangles.iter().all(turns) && border_of(triangles).is_some_and(|border| is_same(&border, rim.len() as u32))
+}
+
+/// Whether a cycle is that of the first numbers.
+fn is_same(border: &[u32], count: u32) -> bool {
+    let first = border.first().copied().unwrap_or(NONE);
+    border.len() == count as usize && (0..count).zip(border).all(|(k, &place)| first < count && place == (first + k) % count)
+}
