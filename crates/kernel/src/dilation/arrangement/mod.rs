@@ -6,6 +6,7 @@
 //!
 //! Points and segments in one plane need no polytopes where many are near to each other, see `planar`, nor do triangles with one height over each place of one, see `height_field`.
 
+mod between;
 mod bodies;
 mod cells;
 mod copies;
@@ -26,6 +27,7 @@ mod nerve;
 mod noise;
 mod pieces;
 mod planar;
+mod plane;
 mod polyhedron;
 mod polytopes;
 mod solids;

@@ -1,22 +1,22 @@
 //! Whether a triangle is between two distances from a graph.
 
+use super::super::between::{Body, halves, lowest, middle, radius, too_far};
 use super::field::Field;
 use super::ground::Ground;
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
-use crate::measure::contact::closest_on_segments;
+use crate::dilation::arrangement::figure;
+use crate::dilation::convex::Convex;
+use crate::groups::Groups;
 use crate::measure::triangle::closest_on_triangle;
 use crate::solid::box_tree::{Box32, BoxTree};
+use crate::solid::half_edges::{NONE, previous};
 
-/// How often a triangle is halved at most where only faces below its parts are asked, and how often these are where all are; and how many parts are looked at.
+/// How often a triangle is halved at most where only faces below its parts are asked.
 const QUICK: u32 = 4;
-const DEPTH: u32 = 24;
-const MOST_PARTS: u32 = 1 << 16;
-/// Of what is wider than the outer distance by this factor, nothing covers all.
-const WIDE: f64 = 4.0;
 /// How often the way between two triangles is sought from one to the other before corners and sides are.
 const STEPS: usize = 2;
-/// What rounding adds to a radius at most, as a share of it.
-const ROUNDED: f64 = 1e-12;
+/// Triangles that tell how many parts are near to each other.
+const SAMPLE: usize = 256;
 
 /// A place where a triangle may not be as it is.
 #[derive(Clone, Copy, Debug)]
@@ -34,41 +34,53 @@ pub(super) struct Question {
     pub(super) outer: f64,
 }
 
-/// The triangles of a graph, for searches.
+/// The triangles of a graph, or of the same upside down, for searches.
 pub(super) struct Faces {
-    all: Vec<Face>,
-    pub(super) tree: BoxTree,
+    pub(super) all: Vec<Face>,
+    tree: BoxTree,
 }
 
-/// A triangle of the graph, and the ball around its middle that holds it.
-struct Face {
-    corners: [Point; 3],
+/// A triangle of the graph with its normal up, and the ball around its middle that holds it.
+pub(super) struct Face {
+    pub(super) corners: [Point; 3],
+    pub(super) normal: Point,
     centre: Point,
     radius: f64,
 }
 
-impl Face {
-    fn highest(&self, direction: &Point) -> f64 {
-        self.corners.iter().map(|corner| dot(direction, corner)).fold(f64::NEG_INFINITY, f64::max)
+impl Convex for Face {
+    fn deficit(&self) -> f64 {
+        0.0
     }
 
+    #[inline]
     fn closest(&self, x: &Point) -> Point {
         let [a, b, c] = &self.corners;
         closest_on_triangle(x, a, b, c)
     }
 
-    fn square(&self, x: &Point) -> f64 {
-        distance_squared(x, &self.closest(x))
+    #[inline]
+    fn highest(&self, direction: &Point) -> f64 {
+        figure::highest(&self.corners, direction)
+    }
+}
+
+impl Body for Face {
+    fn corners(&self) -> impl AsRef<[Point]> {
+        self.corners
     }
 
-    /// Whether all of a triangle is near to it, as its corners are: the distance from a convex body is convex.
-    fn covers(&self, triangle: &[Point; 3], most: f64) -> bool {
-        triangle.iter().all(|corner| self.square(corner) <= most * most)
+    #[inline]
+    fn may_reach(&self, x: &Point, distance: f64) -> bool {
+        distance_squared(&self.centre, x) <= (distance + self.radius).powi(2)
     }
+}
 
-    /// Whether a plane across a direction parts it from a triangle by a distance.
-    fn is_parted(&self, triangle: &[Point; 3], direction: &Point, least: f64) -> bool {
-        lowest(triangle, direction) - self.highest(direction) >= least
+impl Face {
+    fn new(corners: [Point; 3]) -> Self {
+        let [a, b, c] = &corners;
+        let (normal, centre) = (unit(&cross(&subtract(b, a), &subtract(c, a))), middle(&corners));
+        Self { normal, radius: radius(&corners, &centre), corners, centre }
     }
 
     /// Whether a plane across the way from it to a triangle shows that both are as far apart. The way is found by going back and forth, from the middle.
@@ -84,56 +96,50 @@ impl Face {
         }
         false
     }
-
-    /// Where a triangle is nearer to it than a distance, and what is close to that place, unless a plane parts them by as much: the one across the way between their closest places, which are at a corner of either or on two sides.
-    fn too_near(&self, triangle: &[Point; 3], least: f64) -> Option<[Point; 2]> {
-        let [a, b, c] = triangle;
-        let corners = triangle.iter().map(|corner| [*corner, self.closest(corner)]);
-        let own = self.corners.iter().map(|corner| [closest_on_triangle(corner, a, b, c), *corner]);
-        let side = |corners: &[Point; 3], k: usize| [corners[k], corners[(k + 1) % 3]];
-        let sides = (0..9).map(|k| {
-            let (q, p) = closest_on_segments(&side(triangle, k / 3), &side(&self.corners, k % 3));
-            [q, p]
-        });
-        let all = corners.chain(own).chain(sides);
-        let [q, p] = all.min_by(|[a, b], [c, d]| distance_squared(a, b).total_cmp(&distance_squared(c, d)))?;
-        (!self.is_parted(triangle, &unit(&subtract(&q, &p)), least)).then_some([q, p])
-    }
-}
-
-pub(super) fn middle(triangle: &[Point; 3]) -> Point {
-    std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0)
-}
-
-fn lowest(triangle: &[Point; 3], direction: &Point) -> f64 {
-    triangle.iter().map(|corner| dot(direction, corner)).fold(f64::INFINITY, f64::min)
-}
-
-/// How far the corners of a triangle are from a place at most.
-fn radius(triangle: &[Point; 3], centre: &Point) -> f64 {
-    triangle.iter().map(|corner| distance_squared(corner, centre)).fold(0.0, f64::max).sqrt() * (1.0 + ROUNDED)
-}
-
-/// Both halves of a triangle, parted in the middle of its longest side.
-fn halves(triangle: &[Point; 3]) -> [[Point; 3]; 2] {
-    let long = |k: usize| distance_squared(&triangle[k], &triangle[(k + 1) % 3]);
-    let k = (1..3).fold(0, |best, k| if long(k) > long(best) { k } else { best });
-    let (a, b, c) = (triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-    let half: Point = std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]));
-    [[a, half, c], [half, b, c]]
 }
 
 impl Faces {
-    pub(super) fn new(ground: &Ground) -> Self {
-        let face = |triangle: usize| {
-            let corners = ground.points(triangle);
-            let centre = middle(&corners);
-            Face { corners, centre, radius: radius(&corners, &centre) }
-        };
-        let all: Vec<Face> = (0..ground.triangles.len()).map(face).collect();
+    /// The triangles of a graph; upside down if `sign` is -1.
+    pub(super) fn new(ground: &Ground, sign: f64) -> Self {
+        let all: Vec<Face> = ground.triangles().map(|corners| Face::new(corners.map(|[x, y, z]| [x, y, sign * z]))).collect();
         let mut tree = BoxTree::default();
         tree.build(all.len(), |item| Some(Box32::of(&all[item as usize].corners)), false);
         Self { all, tree }
+    }
+
+    /// How far above the plane of a half-edge's face the corner beyond its other half is.
+    #[inline]
+    pub(super) fn above(&self, half: u32, twin: u32) -> f64 {
+        let [Face { corners, normal, .. }, other] = [half, twin].map(|half| &self.all[(half / 3) as usize]);
+        dot(normal, &subtract(&other.corners[(previous(twin) % 3) as usize], &corners[(half % 3) as usize]))
+    }
+
+    /// The largest height of all.
+    pub(super) fn highest(&self) -> f64 {
+        self.all.iter().flat_map(|face| face.corners).map(|corner| corner[2]).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// How many parts, of triangles in one plane each, are near to a triangle in the mean, from a sample; given how far off a plane corners may be, and how far what is near is.
+    pub(super) fn crowding(&self, ground: &Ground, flatness: f64, distance: f64) -> f64 {
+        let (count, mesh) = (self.all.len(), &ground.mesh);
+        let mut groups = Groups::new(count);
+        for half in (0..3 * mesh.triangles()).filter(|&half| mesh.twin(half) != NONE && mesh.twin(half) > half) {
+            if self.above(half, mesh.twin(half)).abs() <= flatness {
+                groups.join((half / 3) as usize, (mesh.twin(half) / 3) as usize);
+            }
+        }
+        let (step, mut near, mut total) = (count.div_ceil(SAMPLE), Vec::new(), 0);
+        for face in (0..count).step_by(step) {
+            near.clear();
+            self.around(&self.all[face].corners, distance, |other| {
+                near.push(groups.of(other as usize));
+                true
+            });
+            near.sort_unstable();
+            near.dedup();
+            total += near.len();
+        }
+        total as f64 / count.div_ceil(step) as f64
     }
 
     /// Calls `visit` with the faces whose boxes are within a distance of a triangle's, until it answers false.
@@ -177,7 +183,7 @@ impl Faces {
         let centre = middle(part);
         let below = field.top([centre[0], centre[1]], 0.5 * (inner + outer)).map_or(u32::MAX, |top| top.owner);
         let face = |owner: u32| self.all.get(owner as usize);
-        if face(below).is_some_and(|face| face.square(&centre).sqrt() + radius(part, &centre) <= outer)
+        if face(below).is_some_and(|face| face.distance_squared(&centre).sqrt() + radius(part, &centre) <= outer)
             || [below, owners[0], owners[1], owners[2]].into_iter().filter_map(face).any(|face| face.covers(part, outer))
         {
             return None;
@@ -193,49 +199,6 @@ impl Faces {
             near.push(item);
             true
         });
-        Cover { faces: &self.all, most: outer, left: MOST_PARTS, near }.far(0, part, DEPTH)
-    }
-}
-
-/// Whether faces are near to all of a triangle.
-struct Cover<'a> {
-    faces: &'a [Face],
-    most: f64,
-    /// Parts that may be looked at.
-    left: u32,
-    /// The faces near to it, and then those near to its parts.
-    near: &'a mut Vec<u32>,
-}
-
-impl Cover<'_> {
-    /// A place of a triangle that may be farther from all of the last faces, given the first of these. The distance grows by no more than the way; and where one face is near to all corners, it is near to all.
-    fn far(&mut self, first: usize, triangle: &[Point; 3], depth: u32) -> Option<Point> {
-        let (most, end) = (self.most, self.near.len());
-        let centre = middle(triangle);
-        let wide = radius(triangle, &centre);
-        let reach = most + wide;
-        let mut least = f64::INFINITY;
-        for place in first..end {
-            let item = self.near[place];
-            let face = &self.faces[item as usize];
-            if distance_squared(&face.centre, &centre) <= (reach + face.radius).powi(2) {
-                let square = face.square(&centre);
-                if square <= reach * reach {
-                    least = least.min(square.sqrt());
-                    self.near.push(item);
-                }
-            }
-        }
-        self.left = self.left.saturating_sub(1);
-        let covers = |&item: &u32| self.faces[item as usize].covers(triangle, most);
-        let found = if least > most || depth == 0 || self.left == 0 {
-            Some(centre)
-        } else if least + wide <= most || (wide < WIDE * most && self.near[end..].iter().any(covers)) {
-            None
-        } else {
-            halves(triangle).iter().find_map(|half| self.far(end, half, depth - 1))
-        };
-        self.near.truncate(end);
-        found
+        too_far(&self.all, near, part, outer)
     }
 }

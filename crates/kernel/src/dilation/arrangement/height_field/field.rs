@@ -1,6 +1,7 @@
 //! How high the dilation of a graph is over a place.
 
 use super::Place;
+use super::check::Faces;
 use super::ground::Ground;
 use super::parts::{Part, Top, parts};
 use super::squares::Squares;
@@ -25,13 +26,14 @@ pub(super) struct Field {
 }
 
 impl Field {
-    pub(super) fn new(ground: &Ground, distances: [f64; 2]) -> Self {
-        let parts = parts(ground, distances);
+    /// What is above a graph with such faces, between two distances.
+    pub(super) fn new(ground: &Ground, faces: &Faces, distances: [f64; 2]) -> Self {
+        let parts = parts(&ground.mesh, faces, distances);
         let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for Part { bounds: [low, high], .. } in &parts {
             bounds = [[0, 1].map(|axis| bounds[0][axis].min(low[axis])), [0, 1].map(|axis| bounds[1][axis].max(high[axis]))];
         }
-        let squares = Squares::new(bounds, PITCH * distances[1], MOST * ground.triangles.len() as f64);
+        let squares = Squares::new(bounds, PITCH * distances[1], MOST * ground.len() as f64);
         let mut order: Vec<u32> = (0..parts.len() as u32).collect();
         order.sort_unstable_by(|&a, &b| parts[b as usize].highest.total_cmp(&parts[a as usize].highest).then(a.cmp(&b)));
         let (starts, items) = squares.lists(order.iter().map(|&part| (part, parts[part as usize].bounds)));

@@ -30,7 +30,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
 use check::{Faces, Question};
 use ground::Ground;
-use pair::{Outcome, Pair};
+use pair::Pair;
 
 /// A place in the plane.
 type Place = [f64; 2];
@@ -67,11 +67,27 @@ pub(super) fn surface(
     round: &(dyn Fn(f64) -> f64 + Sync),
     budget: &Budget,
 ) -> Result<Option<Flat>, Stopped> {
+    let corners = |figure: &Figure| if figure.deficit == 0.0 { figure.corners().try_into().ok() } else { None };
+    let Some(triangles) = figures.iter().map(corners).collect::<Option<Vec<[Point; 3]>>>() else { return Ok(None) };
     // So that the axis is up where the others are right and ahead.
-    let frames = [2, 1, 0].map(|axis| [(axis + 1) % 3, (axis + 2) % 3, axis]);
-    let graph = |frame: [usize; 3]| Ground::new(figures, |at| frame.map(|axis| at[axis])).map(|ground| (frame, ground));
-    let Some((frame, ground)) = frames.into_iter().find_map(graph) else { return Ok(None) };
-    budget.cancel.check()?;
+    for frame in [2, 1, 0].map(|axis| [(axis + 1) % 3, (axis + 2) % 3, axis]) {
+        budget.cancel.check()?;
+        let seen = triangles.iter().map(|triangle| triangle.map(|corner| frame.map(|axis| corner[axis])));
+        if let Some(ground) = Ground::new(seen) {
+            return around(&ground, frame, setting, round, budget);
+        }
+    }
+    Ok(None)
+}
+
+/// The surface around a graph that is seen in a frame, likewise.
+fn around(
+    ground: &Ground,
+    frame: [usize; 3],
+    setting: &Setting,
+    round: &(dyn Fn(f64) -> f64 + Sync),
+    budget: &Budget,
+) -> Result<Option<Flat>, Stopped> {
     // Zeros have two signs: places that are the same have the same bits.
     let limits = Limits {
         inner: setting.least + setting.slack,
@@ -79,22 +95,17 @@ pub(super) fn surface(
         rounding: setting.rounding,
         round: &|x| round(x) + 0.0,
     };
-    let faces = Faces::new(&ground);
-    if ground.crowding(setting.slack, &faces, limits.outer) < LEAST_NEAR {
+    let faces = Faces::new(ground, 1.0);
+    if faces.crowding(ground, setting.slack, limits.outer) < LEAST_NEAR {
         return Ok(None);
     }
     budget.cancel.check()?;
-    let below = ground.turned();
-    let grounds = [ground, below];
-    Ok(match Pair::new(&grounds, faces, &limits).run(budget)? {
-        Outcome::Made(mut surface) => {
-            for vertex in &mut surface.vertices {
-                let own = *vertex;
-                (0..3).for_each(|axis| vertex[frame[axis]] = own[axis] + 0.0);
-            }
-            Some(Flat::Made(Box::new(surface)))
+    let mut made = Pair::new(ground, faces, &limits).run(budget)?;
+    if let Some(Flat::Made(surface)) = &mut made {
+        for vertex in &mut surface.vertices {
+            let own = *vertex;
+            (0..3).for_each(|axis| vertex[frame[axis]] = own[axis] + 0.0);
         }
-        Outcome::Beyond(triangles) => Some(Flat::Beyond(triangles)),
-        Outcome::Left => None,
-    })
+    }
+    Ok(made)
 }

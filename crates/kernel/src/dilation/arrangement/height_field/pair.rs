@@ -2,14 +2,16 @@
 //!
 //! Both sheets end at a border beside the graph, not farther from its part of the plane than the inner distance; the rim is beyond that. Between them is a strip of two triangles after each post, on either side, with the same edges seen from above.
 
+use super::super::Flat;
 use super::check::{Faces, Fault};
-use super::ground::{Ground, NONE, border_of};
+use super::ground::{Ground, border};
 use super::sheet::{Found, Sheet};
 use super::{Limits, Place};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::BlockSurface;
 use crate::solid::contact::turn;
+use crate::solid::half_edges::{HalfEdges, NONE};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -35,16 +37,6 @@ struct Post {
     ends: [u32; 2],
     /// Whether the strip after it was found to be as it should be.
     is_known: bool,
-}
-
-/// What comes of two sheets.
-pub(super) enum Outcome {
-    /// The surface in the frame of the graph.
-    Made(BlockSurface),
-    /// There would be far more triangles than may be: at least about how many.
-    Beyond(f64),
-    /// Places do not make it so, or there is no room for it.
-    Left,
 }
 
 /// Both sheets, the lower one upside down, and the posts.
@@ -78,53 +70,55 @@ fn rim(corners: &[Place], limits: &Limits<'_>) -> Vec<Place> {
 }
 
 impl<'a> Pair<'a> {
-    pub(super) fn new(grounds: &'a [Ground; 2], faces: Faces, limits: &'a Limits<'a>) -> Self {
-        let [above, below] = grounds;
-        let (above, below) = rayon::join(|| Sheet::new(above, faces, limits), || Sheet::new(below, Faces::new(below), limits));
+    /// Both sheets without places, given the faces seen from above.
+    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &'a Limits<'a>) -> Self {
+        let (above, below) = rayon::join(|| Sheet::new(ground, faces, limits), || Sheet::new(ground, Faces::new(ground, -1.0), limits));
         Self { sheets: [above, below], posts: Vec::new(), next: Vec::new(), limits }
     }
 
-    /// The surface, once all of it is between the distances from the graph.
+    /// The surface in the frame of the graph, once all of it is between the distances; none where places do not make it so, or there is no room for it.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn run(mut self, budget: &Budget) -> Result<Outcome, Stopped> {
+    pub(super) fn run(mut self, budget: &Budget) -> Result<Option<Flat>, Stopped> {
         let limits = self.limits;
-        // Each twice as many as may be.
-        let most = (budget.limits.triangles as f64 / PER_VERTEX).min(f64::from(u32::MAX >> 2)) as usize;
-        let room = budget.limits.memory_bytes as f64 - BYTES_PER_FACE * self.sheets[0].ground.triangles.len() as f64;
+        let most = 2.0 * budget.limits.triangles as f64;
+        let room = budget.limits.memory_bytes as f64 - BYTES_PER_FACE * self.sheets[0].ground.len() as f64;
         if room < 0.0 || self.begin().is_none() {
-            return Ok(Outcome::Left);
+            return Ok(None);
         }
+        // Samples alone make neither sheet have more than may be of both.
+        let vertices = (most / PER_VERTEX).min(room / BYTES_PER_VERTEX).min(f64::from(u32::MAX >> 2)) as usize;
         let [above, below] = &mut self.sheets;
-        let (first, second) = rayon::join(|| above.sample(most, limits, budget), || below.sample(most, limits, budget));
+        let (first, second) = rayon::join(|| above.sample(vertices, limits, budget), || below.sample(vertices, limits, budget));
         first.and(second)?;
         let mut all = true;
         for _ in 0..ROUNDS {
             let vertices = self.sheets.each_ref().map(Sheet::len).into_iter().sum::<usize>() as f64;
-            if PER_VERTEX * vertices > 2.0 * budget.limits.triangles as f64 {
-                return Ok(Outcome::Beyond(PER_VERTEX * vertices));
+            if PER_VERTEX * vertices > most {
+                return Ok(Some(Flat::Beyond(PER_VERTEX * vertices)));
             }
             if BYTES_PER_VERTEX * vertices > room {
-                return Ok(Outcome::Left);
+                return Ok(None);
             }
             let ([above, below], next) = (&mut self.sheets, &self.next);
             let (first, second) = rayon::join(|| above.check(next, all, limits, budget), || below.check(next, all, limits, budget));
             let [first, second] = [first?, second?];
             let is_done = first.is_done && second.is_done;
-            let bends = [first, second].into_iter().flat_map(|Found { bends, .. }| bends).chain(self.check_strip()).collect::<Vec<_>>();
+            let of_sheets = [first, second].into_iter().flat_map(|Found { bends, .. }| bends);
+            let bends: Vec<(u32, Place)> = of_sheets.chain(self.check_strip(budget)?).collect();
             if is_done && bends.is_empty() {
-                return Ok(self.finish().map_or(Outcome::Left, Outcome::Made));
+                return Ok(self.finish().map(|surface| Flat::Made(Box::new(surface))));
             }
             all = !bends.is_empty();
             let mut is_bent = vec![false; self.posts.len()];
             for (post, at) in bends {
                 if !std::mem::replace(&mut is_bent[post as usize], true) && self.bend(post, at).is_none() {
-                    return Ok(Outcome::Left);
+                    return Ok(None);
                 }
             }
         }
-        Ok(Outcome::Left)
+        Ok(None)
     }
 
     /// Makes the first posts.
@@ -187,17 +181,21 @@ impl<'a> Pair<'a> {
     }
 
     /// Holds the parts of the strip that are not known against the graph: the posts after which the rim is to be bent, and where.
-    fn check_strip(&mut self) -> Vec<(u32, Place)> {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn check_strip(&mut self, budget: &Budget) -> Result<Vec<(u32, Place)>, Stopped> {
         let open: Vec<u32> = (0..self.posts.len() as u32).filter(|&post| !self.posts[post as usize].is_known).collect();
         let fault = |&post: &u32| {
+            budget.cancel.check()?;
             let mut near = Vec::new();
             let mut all = [0, 1].into_iter().flat_map(|side| self.strip(side, post).map(|triangle| (side, triangle)));
-            all.find_map(|(side, triangle)| {
+            Ok(all.find_map(|(side, triangle)| {
                 let Sheet { faces, field, .. } = &self.sheets[side];
                 faces.fault(field, &self.limits.question(triangle, [NONE; 3]), &mut near)
-            })
+            }))
         };
-        let faults: Vec<Option<Fault>> = open.par_iter().map(fault).collect();
+        let faults: Vec<Option<Fault>> = open.par_iter().map(fault).collect::<Result<_, Stopped>>()?;
         let mut bends = Vec::new();
         for (post, fault) in open.into_iter().zip(faults) {
             match fault {
@@ -205,7 +203,7 @@ impl<'a> Pair<'a> {
                 Some(Fault::Near(x, _) | Fault::Far(x)) => bends.push((post, [x[0], x[1]])),
             }
         }
-        bends
+        Ok(bends)
     }
 
     /// The surface, if it is as it is proven to be: see the head of the module.
@@ -221,7 +219,7 @@ impl<'a> Pair<'a> {
         for (side, sheet) in self.sheets.iter().enumerate() {
             let mut numbers = vec![NONE; sheet.len()];
             let (mut is_above, mut is_inside) = (false, true);
-            let highest = sheet.ground.places.iter().map(|place| place[2]).fold(f64::NEG_INFINITY, f64::max);
+            let highest = sheet.faces.highest();
             let mut number = |corner: u32| {
                 let number = &mut numbers[corner as usize];
                 if *number == NONE {
@@ -233,7 +231,7 @@ impl<'a> Pair<'a> {
                 }
                 *number
             };
-            let mut own: Vec<[u32; 3]> = sheet.base().iter().map(|triangle| triangle.map(&mut number)).collect();
+            let mut own: Vec<[u32; 3]> = sheet.base()?.iter().map(|triangle| triangle.map(&mut number)).collect();
             for (k, &post) in (0..).zip(&order) {
                 let next = (k + 1) % count;
                 let [c, d] = [order[next as usize], post].map(|post| number(self.posts[post as usize].ends[side]));
@@ -263,7 +261,8 @@ fn is_plane(places: &[Point], triangles: &[[u32; 3]], rim: &[Point]) -> bool {
         turned += (ax * by - ay * bx).atan2(ax * bx + ay * by);
     }
     let turns = |&[a, b, c]: &[u32; 3]| turn(2, &places[a as usize], &places[b as usize], &places[c as usize]) > 0.0;
-    turned < 1.5 * TAU && triangles.iter().all(turns) && border_of(triangles).is_some_and(|border| is_same(&border, rim.len() as u32))
+    let is_around = |border: Vec<u32>| is_same(&border, rim.len() as u32);
+    turned < 1.5 * TAU && triangles.iter().all(turns) && border(&HalfEdges::new(places.to_vec(), triangles)).is_some_and(is_around)
 }
 
 /// Whether a cycle is that of the first numbers.

@@ -2,17 +2,19 @@
 //!
 //! Places are added where samples are far off the sheet (Garland, Heckbert, "Fast polygonal approximation of terrains and height fields", 1995), on creases as on all else, and then where triangles are nearer to the graph or farther from it than they may be, each held against all of it.
 
-use super::check::{Faces, Fault, middle};
+use super::super::between::middle;
+use super::super::plane::{self, Mesh, corners, handle, inside, key};
+use super::check::{Faces, Fault};
 use super::field::Field;
-use super::ground::{Ground, NONE};
+use super::ground::Ground;
 use super::samples::Samples;
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, distance_squared};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
+use crate::solid::half_edges::NONE;
 use rayon::prelude::*;
-use spade::handles::{FaceHandle, FixedVertexHandle, InnerTag};
-use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+use spade::{HasPosition, Point2, Triangulation};
 
 /// Rounds in which places are added by samples.
 const SAMPLED: usize = 48;
@@ -54,7 +56,7 @@ pub(super) struct Sheet<'a> {
     pub(super) ground: &'a Ground,
     pub(super) field: Field,
     pub(super) faces: Faces,
-    mesh: ConstrainedDelaunayTriangulation<Vertex>,
+    mesh: Mesh<Vertex>,
     numbers: NameMap<[u64; 2], u32>,
     /// Triangles that were found to be as they should be.
     known: NameMap<u128, ()>,
@@ -64,28 +66,13 @@ pub(super) struct Sheet<'a> {
     fresh: Vec<u32>,
 }
 
-/// What a triangle is called.
-fn key(triangle: &[u32; 3]) -> u128 {
-    let mut sorted = *triangle;
-    sorted.sort_unstable();
-    sorted.iter().fold(0, |key, &vertex| key << 32 | u128::from(vertex))
-}
-
-fn corners(face: FaceHandle<'_, InnerTag, Vertex, (), CdtEdge<()>, ()>) -> [u32; 3] {
-    face.vertices().map(|vertex| vertex.fix().index() as u32)
-}
-
-fn handle(number: u32) -> FixedVertexHandle {
-    FixedVertexHandle::from_index(number as usize)
-}
-
 impl<'a> Sheet<'a> {
     pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &Limits<'_>) -> Self {
         Self {
             ground,
-            field: Field::new(ground, [limits.inner, limits.outer]),
+            field: Field::new(ground, &faces, [limits.inner, limits.outer]),
             faces,
-            mesh: ConstrainedDelaunayTriangulation::new(),
+            mesh: Mesh::new(),
             numbers: NameMap::default(),
             known: NameMap::default(),
             posts: Vec::new(),
@@ -131,7 +118,7 @@ impl<'a> Sheet<'a> {
 
     /// Makes an edge of the border; false where it would cross another.
     pub(super) fn join(&mut self, from: u32, to: u32) -> bool {
-        self.mesh.can_add_constraint(handle(from), handle(to)) && self.mesh.add_constraint(handle(from), handle(to))
+        plane::join(&mut self.mesh, handle(from), handle(to))
     }
 
     /// Takes an edge of the border out.
@@ -140,20 +127,9 @@ impl<'a> Sheet<'a> {
         edge.is_some_and(|edge| self.mesh.remove_constraint_edge(edge))
     }
 
-    /// The triangles within the border, counter-clockwise.
-    pub(super) fn base(&self) -> Vec<[u32; 3]> {
-        let mesh = &self.mesh;
-        let mut is_outside = vec![false; mesh.num_all_faces()];
-        let mut open: Vec<_> = mesh.convex_hull().filter(|edge| !edge.is_constraint_edge()).map(|edge| edge.rev().face().fix()).collect();
-        while let Some(face) = open.pop() {
-            if !std::mem::replace(&mut is_outside[face.index()], true)
-                && let Some(inner) = mesh.face(face).as_inner()
-            {
-                let edges = inner.adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge());
-                open.extend(edges.map(|edge| edge.rev().face().fix()));
-            }
-        }
-        mesh.inner_faces().filter(|face| !is_outside[face.fix().index()]).map(corners).collect()
+    /// The triangles within the border, counter-clockwise; none where it is not closed.
+    pub(super) fn base(&self) -> Option<Vec<[u32; 3]>> {
+        inside(&self.mesh, |edge| edge.is_constraint_edge())
     }
 
     /// Whether a triangle is still there.
@@ -181,7 +157,7 @@ impl<'a> Sheet<'a> {
         let is_new = |triangle: &[u32; 3]| !self.known.contains_key(&key(triangle));
         new.retain(is_new);
         if new.is_empty() {
-            new = self.base();
+            new = self.base().unwrap_or_default();
             new.retain(is_new);
         }
         // What is near to each other in a row.
@@ -195,7 +171,7 @@ impl<'a> Sheet<'a> {
     /// [`Stopped`].
     pub(super) fn sample(&mut self, most: usize, limits: &Limits<'_>, budget: &Budget) -> Result<(), Stopped> {
         let half = 0.5 * (limits.outer - limits.inner);
-        let samples = Samples::new(&self.field, limits.inner + half, self.ground.triangles.len(), budget)?;
+        let samples = Samples::new(&self.field, limits.inner + half, self.ground.len(), budget)?;
         for round in 0..SAMPLED {
             budget.cancel.check()?;
             let new = self.unknown(round == 0);

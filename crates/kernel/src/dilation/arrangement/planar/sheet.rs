@@ -3,27 +3,24 @@
 //! Rings, and lines along creases between them, are the constraints of a Delaunay triangulation of the plane (Chew, "Constrained Delaunay triangulations", 1989). What is within the lowest rings, the rim, is the sheet's base. Above it the sheet has a height everywhere but at the rim: so it
 //! crosses nothing, nor does it meet its mirror image, which closes it. Every triangle is held against all bodies; where it is too near to one, or too far from all, places are added.
 
+use super::super::between::{Body as _, lowest, middle, too_far};
+use super::super::plane::{self, Edge, corners, handle, inside, join, key};
 use super::rings::Ring;
 use super::valleys::Lines;
-use super::wires::{Body, Wires, cross as cross_in_plane, dot, minus, plus};
+use super::wires::{Wires, cross as cross_in_plane, dot, minus, plus};
 use super::{Limits, Place};
-use crate::attractor::cell::{Point, cross, distance_squared, dot as dot_in_space, subtract, unit};
+use crate::attractor::cell::{Point, cross, distance_squared, subtract, unit};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex as _;
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
-use crate::measure::contact::closest_on_segments;
-use crate::measure::triangle::closest_on_triangle;
 use crate::solid::box_tree::Box32;
 use rayon::prelude::*;
-use spade::handles::{DirectedEdgeHandle, FaceHandle, FixedDirectedEdgeHandle, FixedVertexHandle, InnerTag};
-use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+use spade::handles::{FixedDirectedEdgeHandle, FixedVertexHandle};
+use spade::{HasPosition, Point2, Triangulation};
 
 /// Rounds in which places are added.
 const ROUNDS: usize = 24;
-/// How often a triangle is halved at most that no one body is near to, how many parts are looked at, and how much wider than the reach what is that is not asked for.
-const DEPTH: u32 = 24;
-const MOST_PARTS: u32 = 1 << 20;
-const WIDE: f64 = 4.0;
 /// How far out in the band a place is added where the surface is too near, and where it is too far.
 const OUT: [f64; 2] = [0.85, 0.4];
 /// What is lower than this, in units of the band's inner end, is at the rim.
@@ -68,8 +65,6 @@ enum Fault {
     Low(Point),
 }
 
-type Mesh = ConstrainedDelaunayTriangulation<Vertex>;
-
 /// The sheet over rings and lines between them, between the ends of the band from all bodies; none where rings cross, or places do not make it so.
 ///
 /// # Errors
@@ -113,37 +108,25 @@ pub(super) fn sheet(
     Ok(None)
 }
 
-/// What a triangle is called.
-fn key(triangle: &[u32; 3]) -> u128 {
-    let mut sorted = *triangle;
-    sorted.sort_unstable();
-    sorted.iter().fold(0, |key, &vertex| key << 32 | u128::from(vertex))
-}
-
-/// The corners of a face.
-fn corners(face: FaceHandle<'_, InnerTag, Vertex, (), CdtEdge<()>, ()>) -> [u32; 3] {
-    face.vertices().map(|vertex| vertex.fix().index() as u32)
-}
-
 /// The ends of a triangle's sides.
 fn sides(triangle: &[u32; 3]) -> [[FixedVertexHandle; 2]; 3] {
-    [0, 1, 2].map(|k| [triangle[k], triangle[(k + 1) % 3]].map(|vertex| FixedVertexHandle::from_index(vertex as usize)))
+    [0, 1, 2].map(|k| [triangle[k], triangle[(k + 1) % 3]].map(handle))
 }
 
 /// Whether an edge is one of the rim.
-fn is_rim(edge: &DirectedEdgeHandle<'_, Vertex, (), CdtEdge<()>, ()>) -> bool {
+fn is_rim(edge: &Edge<'_, Vertex>) -> bool {
     edge.is_constraint_edge() && edge.from().data().height == 0.0 && edge.to().data().height == 0.0
 }
 
 /// The triangulated plane, and the places where it has vertices.
 struct Plane {
-    mesh: Mesh,
+    mesh: plane::Mesh<Vertex>,
     numbers: NameMap<[u64; 2], FixedVertexHandle>,
 }
 
 impl Plane {
     fn new(rings: &[Ring], lines: &Lines) -> Option<Self> {
-        let mut plane = Self { mesh: Mesh::new(), numbers: NameMap::default() };
+        let mut plane = Self { mesh: plane::Mesh::new(), numbers: NameMap::default() };
         let mut own: Vec<FixedVertexHandle> = Vec::new();
         for ring in rings {
             own.clear();
@@ -156,7 +139,7 @@ impl Plane {
             }
             for (k, &from) in own.iter().enumerate() {
                 // What is above the rim is led along rings, and need not follow them.
-                let is_joined = plane.join(from, own[(k + 1) % own.len()]);
+                let is_joined = join(&mut plane.mesh, from, own[(k + 1) % own.len()]);
                 if !is_joined && ring.level == 0 {
                     return None;
                 }
@@ -167,7 +150,7 @@ impl Plane {
         }
         for line in &lines.all {
             if let [Some(&from), Some(&to)] = line.map(|at| plane.numbers.get(&at.map(f64::to_bits))) {
-                plane.join(from, to);
+                join(&mut plane.mesh, from, to);
             }
         }
         Some(plane)
@@ -186,13 +169,8 @@ impl Plane {
         if vertex.height > 0.0 { self.add(vertex) } else { None }
     }
 
-    /// Makes an edge between vertices, unless it would cross another.
-    fn join(&mut self, from: FixedVertexHandle, to: FixedVertexHandle) -> bool {
-        self.mesh.can_add_constraint(from, to) && self.mesh.add_constraint(from, to)
-    }
-
     fn vertex(&self, number: u32) -> Vertex {
-        *self.mesh.vertex(FixedVertexHandle::from_index(number as usize)).data()
+        *self.mesh.vertex(handle(number)).data()
     }
 
     fn point(&self, number: u32) -> Point {
@@ -202,28 +180,7 @@ impl Plane {
 
     /// The triangles within an odd number of rims; none where a rim is not closed.
     fn base(&self) -> Option<Vec<[u32; 3]>> {
-        let mesh = &self.mesh;
-        let mut sides: Vec<Option<bool>> = vec![None; mesh.num_all_faces()];
-        let mut open = vec![mesh.outer_face().fix()];
-        sides[open[0].index()] = Some(false);
-        let hull: Vec<_> = mesh.convex_hull().collect();
-        while let Some(face) = open.pop() {
-            let own = sides[face.index()] == Some(true);
-            let inner = mesh.face(face).as_inner().map(|inner| inner.adjacent_edges());
-            for edge in inner.as_ref().map_or(&hull[..], |edges| &edges[..]) {
-                let (other, theirs) = (edge.rev().face().fix(), own != is_rim(edge));
-                match sides[other.index()] {
-                    None => {
-                        sides[other.index()] = Some(theirs);
-                        open.push(other);
-                    }
-                    Some(known) if known != theirs => return None,
-                    Some(_) => {}
-                }
-            }
-        }
-        let inside = mesh.inner_faces().filter(|face| sides[face.fix().index()] == Some(true));
-        Some(inside.map(corners).collect())
+        inside(&self.mesh, is_rim)
     }
 
     /// The middle of an edge between vertices of the rim that is none of its edges.
@@ -231,7 +188,7 @@ impl Plane {
         let [from, to] = (0..3).find_map(|k| {
             let ends = [triangle[k], triangle[(k + 1) % 3]];
             let is_low = ends.iter().all(|&end| self.vertex(end).height == 0.0);
-            let [from, to] = ends.map(|end| FixedVertexHandle::from_index(end as usize));
+            let [from, to] = ends.map(handle);
             let is_inner = is_low && self.mesh.get_edge_from_neighbors(from, to).is_some_and(|edge| !is_rim(&edge));
             is_inner.then(|| ends.map(|end| self.vertex(end)))
         })?;
@@ -265,7 +222,7 @@ impl Plane {
             {
                 let new = self.raise(Vertex { at, height })?;
                 loose.into_iter().flatten().for_each(|end| {
-                    self.join(end, new);
+                    join(&mut self.mesh, end, new);
                 });
                 return Some(());
             }
@@ -316,7 +273,7 @@ impl Plane {
             let is_free = |end: Place| !self.mesh.intersects_constraint(point(end), point(new));
             if is_free(from) && is_free(to) {
                 let new = self.add(Vertex { at: new, height: 0.0 })?;
-                return (self.join(ends[0], new) && self.join(new, ends[1])).then_some(());
+                return (join(&mut self.mesh, ends[0], new) && join(&mut self.mesh, new, ends[1])).then_some(());
             }
         }
         None
@@ -388,7 +345,7 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
     let is_high = triangle.iter().all(|corner| corner[2] >= inner);
     let edge = |k: usize| subtract(&triangle[k], &triangle[0]);
     let normal = unit(&cross(&edge(1), &edge(2)));
-    let height = triangle.iter().map(|corner| dot_in_space(&normal, corner)).fold(f64::INFINITY, f64::min);
+    let height = lowest(triangle, &normal);
     let (mut is_covered, mut found) = (false, None);
     wires.tree.query(&within, 0, |leaf| {
         for (&item, theirs) in wires.tree.items(leaf).iter().zip(wires.tree.boxes(leaf)) {
@@ -396,13 +353,13 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
                 continue;
             }
             let body = &wires.bodies[item as usize];
-            let squares = triangle.map(|[x, y, z]| body.square([x, y]) + z * z);
+            let squares = triangle.map(|corner| body.distance_squared(&corner));
             is_covered |= squares.iter().all(|&square| square <= outer * outer);
             near.push(item);
             // The square of the distance, less that from any point, is concave: on the triangle it is no less than the least at a corner less the square of the radius of a ball around it.
             let least = squares.iter().copied().fold(f64::INFINITY, f64::min);
-            if found.is_none() && !is_high && least - longest / 3.0 < inner * inner && height - body.highest(normal) < inner {
-                found = too_near(triangle, body, inner).map(Fault::Near);
+            if found.is_none() && !is_high && least - longest / 3.0 < inner * inner && height - body.highest(&normal) < inner {
+                found = body.too_near(triangle, inner).map(|[place, _]| Fault::Near(place));
             }
         }
         found.is_none() && !(is_covered && is_high)
@@ -410,79 +367,7 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
     if found.is_some() || is_covered {
         return found;
     }
-    Cover { wires, most: outer, left: MOST_PARTS }.far(&near, triangle, DEPTH).map(Fault::Far)
-}
-
-/// A place of a triangle that is nearer to a body than `least`, unless a plane parts them by as much: the one across the way between their closest places, which are at a corner, at an end, or on a side.
-fn too_near(triangle: &[Point; 3], body: &Body, least: f64) -> Option<Point> {
-    let ends = [body.from, body.to()].map(|[x, y]| [x, y, 0.0]);
-    let closest = |[x, y, _]: Point| body.closest([x, y]);
-    let corners = triangle.iter().map(|&q| (q, closest(q)));
-    let of_ends = ends.iter().map(|p| (closest_on_triangle(p, &triangle[0], &triangle[1], &triangle[2]), [p[0], p[1]]));
-    let sides = (0..3).map(|k| {
-        let (q, p) = closest_on_segments(&[triangle[k], triangle[(k + 1) % 3]], &ends);
-        (q, [p[0], p[1]])
-    });
-    let way = |q: &Point, p: &Place| [q[0] - p[0], q[1] - p[1], q[2]];
-    let square = |(q, p): &(Point, Place)| dot_in_space(&way(q, p), &way(q, p));
-    let (q, p) = corners.chain(of_ends).chain(sides).min_by(|a, b| square(a).total_cmp(&square(b)))?;
-    let unit = unit(&way(&q, &p));
-    let lowest = triangle.iter().map(|corner| dot_in_space(corner, &unit)).fold(f64::INFINITY, f64::min);
-    (lowest - body.highest(unit) < least).then_some(q)
-}
-
-fn middle(triangle: &[Point; 3]) -> Point {
-    std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0)
-}
-
-impl Body {
-    /// The largest value of its places along a direction in space.
-    fn highest(&self, direction: Point) -> f64 {
-        let across = [direction[0], direction[1]];
-        dot(across, self.from) + (self.length * dot(across, self.along)).max(0.0)
-    }
-}
-
-/// Whether bodies are near to all of a triangle.
-struct Cover<'a> {
-    wires: &'a Wires,
-    most: f64,
-    /// Parts that may be looked at.
-    left: u32,
-}
-
-impl Cover<'_> {
-    /// A place of a triangle that may be farther from all of some bodies. The distance grows by no more than the way; and that from a convex body is convex, so that one that is near to all corners is near to all.
-    fn far(&mut self, near: &[u32], triangle: &[Point; 3], depth: u32) -> Option<Point> {
-        let (wires, most) = (self.wires, self.most);
-        let square = |body: u32, [x, y, z]: &Point| wires.bodies[body as usize].square([*x, *y]) + z * z;
-        let centre = middle(triangle);
-        let wide = triangle.iter().map(|corner| distance_squared(corner, &centre)).fold(0.0, f64::max).sqrt();
-        let reach = (most + wide).powi(2);
-        let (mut least, mut left) = (f64::INFINITY, Vec::new());
-        for &body in near {
-            let square = square(body, &centre);
-            if square <= reach {
-                least = least.min(square);
-                left.push(body);
-            }
-        }
-        let least = least.sqrt();
-        self.left = self.left.saturating_sub(1);
-        if least > most || depth == 0 || self.left == 0 {
-            return Some(centre);
-        }
-        let covers = |&body: &u32| triangle.iter().all(|corner| square(body, corner) <= most * most);
-        // Of what is much wider than the reach, nothing covers all.
-        if least + wide <= most || (wide < WIDE * most && left.iter().any(covers)) {
-            return None;
-        }
-        let long = |k: usize| distance_squared(&triangle[k], &triangle[(k + 1) % 3]);
-        let k = (0..3).max_by(|&a, &b| long(a).total_cmp(&long(b)))?;
-        let (a, b, c) = (triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-        let half: Point = std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]));
-        self.far(&left, &[a, half, c], depth - 1).or_else(|| self.far(&left, &[half, b, c], depth - 1))
-    }
+    too_far(&wires.bodies, &mut near, triangle, outer).map(Fault::Far)
 }
 
 #[cfg(test)]

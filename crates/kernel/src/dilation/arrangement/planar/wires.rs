@@ -1,9 +1,11 @@
 //! Points and segments in a plane, as a graph: what is next around its vertices, and which of it is near to each other.
 
+use super::super::between;
 use super::Place;
 use super::contour::STRAIGHT;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex;
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
 use crate::solid::box_tree::{Box32, BoxTree};
@@ -188,6 +190,30 @@ impl Body {
         let at = |x: Place, by: f64| -> Point { [x[0] + by, x[1] + by, 0.0] };
         let (from, to) = (self.from, self.to());
         Box32::of(&[at(from, -distance), at(from, distance), at(to, -distance), at(to, distance)])
+    }
+}
+
+impl Convex for Body {
+    fn deficit(&self) -> f64 {
+        0.0
+    }
+
+    #[inline]
+    fn closest(&self, x: &Point) -> Point {
+        let [x, y] = self.closest([x[0], x[1]]);
+        [x, y, 0.0]
+    }
+
+    #[inline]
+    fn highest(&self, direction: &Point) -> f64 {
+        let across = [direction[0], direction[1]];
+        dot(across, self.from) + (self.length * dot(across, self.along)).max(0.0)
+    }
+}
+
+impl between::Body for Body {
+    fn corners(&self) -> impl AsRef<[Point]> {
+        [self.from, self.to()].map(|[x, y]| [x, y, 0.0])
     }
 }
 
