@@ -320,7 +320,8 @@ impl Given<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::Arrangement;
-    use super::super::tests::{arranged, block, lowered_as, plan, topology};
+    use super::super::testing::{arranged, lowered_as, plan, topology};
+    use super::super::tests::block;
     use super::*;
     use crate::dilation::{Dilation, DilationError, dilate};
     use crate::model::{self, Group, Interior, Model, Part, PartRadius, PolygonMesh};

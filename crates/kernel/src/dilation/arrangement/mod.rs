@@ -34,6 +34,8 @@ mod solids;
 mod steady;
 mod structure;
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;
 mod triangulate;
 mod tubes;

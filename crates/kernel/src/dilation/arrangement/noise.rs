@@ -434,7 +434,7 @@ mod tests {
     use crate::attractor::cell::{Site, between};
     use crate::dilation::arrangement::Arrangement;
     use crate::dilation::arrangement::figure::joined;
-    use crate::dilation::arrangement::tests::{arranged, lowered_as, plan, topology};
+    use crate::dilation::arrangement::testing::{arranged, lowered_as, plan, topology};
     use crate::dilation::convex::Convex;
     use crate::dilation::tree::Weighted;
     use crate::model::Interior;

@@ -1,104 +1,18 @@
-use super::Arrangement;
 use super::bodies::{Common, Kind, Near};
 use super::cubes::{ANY, Cube, MOST_BODIES, PRESENT, Search, is_covered};
 use super::ellipsoid::Place;
 use super::engine::Engine;
 use super::nerve::{Change, Doubt, Sets};
 use super::polytopes::height;
-use crate::attractor::Attractor;
+use super::testing::*;
 use crate::budget::{Budget, StopReason};
 use crate::dilation::convex::Convex;
-use crate::dilation::plan::{Balls, Plan};
-use crate::dilation::{Dilation, DilationError, dilate};
-use crate::measure::triangle::closest_on_triangle;
-use crate::model::{Interior, Model, PolygonMesh, Shape};
+use crate::dilation::{DilationError, dilate};
+use crate::model::Interior;
 use crate::solid::Inside;
 use crate::split_mix::Random;
 use crate::tolerance::{Radius, Tolerance};
 use glam::{DMat3, DVec3};
-use std::fmt::Display;
-
-fn number(random: &mut Random) -> f64 {
-    random.share()
-}
-
-fn place(random: &mut Random, size: f64) -> DVec3 {
-    DVec3::from_array(std::array::from_fn(|_| size * number(random)))
-}
-
-fn lowered(vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Attractor {
-    lowered_as(Interior::Surface, vertices, faces).unwrap()
-}
-
-/// None where a solid is asked for and there is none.
-pub(super) fn lowered_as(interior: Interior, vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Option<Attractor> {
-    let shape = Shape::Mesh(PolygonMesh { vertices: vertices.to_vec(), faces, interior });
-    Model { name: None, shape }.lower().ok().map(|lowered| lowered.attractor)
-}
-
-fn points(vertices: &[DVec3]) -> Attractor {
-    lowered(vertices, (0..vertices.len() as u32).map(|k| vec![k]).collect())
-}
-
-pub(super) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
-    let vertices: Vec<DVec3> = segments.iter().flatten().copied().collect();
-    lowered(&vertices, (0..segments.len() as u32).map(|k| vec![2 * k, 2 * k + 1]).collect())
-}
-
-/// Segments of some length in a cube of some size.
-fn sticks(random: &mut Random, count: usize, size: f64, length: f64) -> Vec<[DVec3; 2]> {
-    (0..count)
-        .map(|_| {
-            let at = place(random, size);
-            [at, at + place(random, length)]
-        })
-        .collect()
-}
-
-pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
-    let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
-    Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
-}
-
-pub(super) fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
-    let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
-    let setting = plan.setting(plan.pitch(), &budget);
-    plan.arranged(&setting, &plan.space(&setting), &budget).unwrap()
-}
-
-pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
-    arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
-}
-
-fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
-    let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
-    let setting = plan.setting(plan.pitch(), &budget);
-    plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap()
-}
-
-/// Components, cavities and the Euler number.
-pub(super) fn topology(dilation: &Dilation) -> (u64, u64, i64) {
-    let topology = dilation.solid.topology();
-    (topology.components, topology.cavities, topology.euler)
-}
-
-/// Asserts that a place is inside if it is deeper than the bounds, and not if it is beyond; d is its distance from what was dilated.
-fn assert_bounds(case: impl Display, inside: &Inside<'_>, dilation: &Dilation, radius: f64, x: DVec3, d: f64) {
-    if d < radius - dilation.inner_mm {
-        assert_eq!(inside.winding(x), 1, "{case}: {x} is {d} from the sites");
-    } else if d > radius + dilation.outer_mm {
-        assert_eq!(inside.winding(x), 0, "{case}: {x} is {d} from the sites");
-    }
-}
-
-/// The distance of a place from triangles.
-fn distance_of_triangles(x: DVec3, vertices: &[DVec3], faces: &[Vec<u32>]) -> f64 {
-    let of = |face: &Vec<u32>| {
-        let [a, b, c] = [0, 1, 2].map(|k| vertices[face[k] as usize].to_array());
-        x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
-    };
-    faces.iter().map(of).fold(f64::INFINITY, f64::min)
-}
 
 /// Whether a place is in the dilation of a body by 1, and in its polytope.
 fn is_in(engine: &Engine<'_>, body: u32, x: DVec3) -> [bool; 2] {
@@ -115,37 +29,14 @@ fn around() -> Cube {
     Cube { centre: [0.0; 3], half: 1e5 }
 }
 
-/// What is told of a shape's arrangement, which there is.
-fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&mut Arrangement) -> T) -> T {
-    let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
-    let setting = plan.setting(plan.pitch(), &budget);
-    told(&mut Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
-}
-
-/// The distance of a place from segments.
-pub(super) fn distance_of_segments(x: DVec3, segments: &[[DVec3; 2]]) -> f64 {
-    let of = |[a, b]: &[DVec3; 2]| {
-        let along = *b - *a;
-        let share = if along.length_squared() > 0.0 { ((x - *a).dot(along) / along.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
-        x.distance(*a + share * along)
-    };
-    segments.iter().map(of).fold(f64::INFINITY, f64::min)
-}
-
-/// Whether all places deeper than the bounds are inside and all beyond are not.
-pub(super) fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, size: f64, random: &mut Random) {
-    let inside = Inside::new(dilation.solid.mesh());
-    for _ in 0..400 {
-        // Half of them near a segment's surface.
-        let x = if random.next().is_multiple_of(2) {
-            let [a, b] = segments[(random.next() % segments.len() as u64) as usize];
-            let away = place(random, 2.0) - DVec3::ONE;
-            a.lerp(b, number(random)) + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(random))
-        } else {
-            place(random, size)
-        };
-        assert_bounds("segments", &inside, dilation, radius, x, distance_of_segments(x, segments));
-    }
+/// Segments of some length in a cube of some size.
+fn sticks(random: &mut Random, count: usize, size: f64, length: f64) -> Vec<[DVec3; 2]> {
+    (0..count)
+        .map(|_| {
+            let at = place(random, size);
+            [at, at + place(random, length)]
+        })
+        .collect()
 }
 
 #[test]

@@ -49,7 +49,7 @@ pub(super) struct Pair<'a> {
 }
 
 /// A polygon around a convex one, between two distances from it: its sides touch what is as far as the first.
-fn rim(corners: &[Place], limits: &Limits<'_>) -> Vec<Place> {
+pub(super) fn rim(corners: &[Place], limits: &Limits<'_>) -> Vec<Place> {
     let [near, far] = RIM.map(|share| limits.at(share));
     let widest = 2.0 * (near / far).acos();
     let count = corners.len();
@@ -248,7 +248,7 @@ impl<'a> Pair<'a> {
 }
 
 /// Whether triangles cover the inside of a rim, whose places are the first ones, once, and nothing else; seen from above. The rim turns once around a place, and all triangles turn the same way.
-fn is_plane(places: &[Point], triangles: &[[u32; 3]], rim: &[Point]) -> bool {
+pub(super) fn is_plane(places: &[Point], triangles: &[[u32; 3]], rim: &[Point]) -> bool {
     let middle = [0, 1].map(|axis| rim.iter().map(|place| place[axis]).sum::<f64>() / rim.len() as f64);
     let middle = [middle[0], middle[1], 0.0];
     let mut turned = 0.0;

@@ -1,11 +1,11 @@
-use super::super::tests::{arranged, arranged_unless_left, distance_of_segments, keeps_its_bounds, plan, topology, wires as lowered};
+use super::super::testing::{
+    arranged, arranged_unless_left, distance_of_segments, holds_everywhere, is_flat, keeps_its_bounds, topology, wires as lowered,
+};
 use super::contour::contour;
 use super::wires::Wires;
 use super::{Place, levels};
-use crate::attractor::Attractor;
 use crate::budget::{Budget, CancelToken, Limits, StopReason};
-use crate::dilation::{Dilation, DilationError, dilate};
-use crate::solid::mend;
+use crate::dilation::{DilationError, dilate};
 use crate::split_mix::Random;
 use crate::tolerance::{Radius, Tolerance};
 use glam::{DMat3, DVec3};
@@ -83,29 +83,6 @@ fn raised(drawing: &Drawing, axis: usize, height: f64) -> Vec<[DVec3; 2]> {
     drawing.iter().map(|ends| ends.map(place)).collect()
 }
 
-/// Whether a shape's surface is a sheet and its mirror image.
-fn is_sheet(shape: &Attractor, radius: f64, tolerance: f64) -> bool {
-    let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
-    let setting = plan.setting(plan.pitch(), &budget);
-    let arrangement = super::super::Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap();
-    arrangement.is_some_and(|arrangement| arrangement.flat.is_some())
-}
-
-/// Whether no triangle has a place that is nearer or farther than the bounds say, or meets another.
-fn holds_everywhere(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, random: &mut Random) -> bool {
-    let mesh = dilation.solid.mesh();
-    let mut holds = |x: DVec3| (radius - dilation.inner_mm..=radius + dilation.outer_mm).contains(&distance_of_segments(x, segments));
-    let is_within = mesh.triangles.iter().all(|triangle| {
-        let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
-        let shares = [random.share(), random.share()];
-        let [s, t] = if shares[0] + shares[1] > 1.0 { shares.map(|share| 1.0 - share) } else { shares };
-        [a, a.midpoint(b), b.midpoint(c), c.midpoint(a), (a + b + c) / 3.0, a + s * (b - a) + t * (c - a)].into_iter().all(&mut holds)
-    });
-    let points = mesh.vertices.iter().map(|vertex| vertex.to_array()).collect();
-    let made = mend::mend(points, mesh.triangles.clone(), 1e-6, &Budget::default()).unwrap();
-    is_within && made.crossings == 0
-}
-
 #[test]
 fn sheets_keep_their_bounds_and_have_the_topology_of_what_is_turned_out_of_its_plane() {
     let mut random = Random(11);
@@ -117,13 +94,13 @@ fn sheets_keep_their_bounds_and_have_the_topology_of_what_is_turned_out_of_its_p
         let (radius, tolerance) = ([0.5, 0.93, 1.51][round / 6 % 3], [0.1, 0.025][round % 2]);
         let shape = lowered(&segments);
         let tolerance = tolerance * radius;
-        if !is_sheet(&shape, radius, tolerance) {
+        if !is_flat(&shape, radius, tolerance) {
             continue;
         }
         sheets += 1;
         let made = arranged(&shape, radius, tolerance);
         assert!(made.topology_exact && made.inner_mm <= tolerance && made.outer_mm <= tolerance, "{round}");
-        assert!(holds_everywhere(&made, &segments, radius, &mut random), "{round}");
+        assert!(holds_everywhere(&made, radius, |x| distance_of_segments(x, &segments), &mut random), "{round}");
         keeps_its_bounds(&made, &segments, radius, 20.0, &mut random);
         let turned: Vec<[DVec3; 2]> = segments.iter().map(|ends| ends.map(|end| turn * end)).collect();
         if let Some(other) = arranged_unless_left(&lowered(&turned), radius, tolerance).filter(|other| other.topology_exact) {
@@ -195,7 +172,7 @@ fn what_is_stated_twice_or_ends_on_another_is_as_if_it_were_not() {
     stated.extend([[place(7.0, 0.0), place(2.0, 0.0)], [place(6.0, 4.0), place(5.0, 1e-13)], [place(3.0, 0.0); 2]]);
     for (radius, tolerance) in [(2.0, 0.2), (2.6, 0.05)] {
         let [one, other] = [&plain, &stated].map(|drawing| lowered(&raised(drawing, 2, 1.0)));
-        assert!(is_sheet(&one, radius, tolerance) && is_sheet(&other, radius, tolerance));
+        assert!(is_flat(&one, radius, tolerance) && is_flat(&other, radius, tolerance));
         let [one, other] = [one, other].map(|shape| arranged(&shape, radius, tolerance));
         assert_eq!(topology(&one), topology(&other));
         assert!(other.topology_exact);
@@ -206,11 +183,11 @@ fn what_is_stated_twice_or_ends_on_another_is_as_if_it_were_not() {
 fn what_does_not_lie_in_a_plane_or_apart_is_left() {
     let mut random = Random(5);
     let mut segments = raised(&drawing(3, &mut random), 2, 0.0);
-    assert!(is_sheet(&lowered(&segments), 0.9, 0.09));
+    assert!(is_flat(&lowered(&segments), 0.9, 0.09));
     segments[7][1].z += 1e-3;
-    assert!(!is_sheet(&lowered(&segments), 0.9, 0.09));
+    assert!(!is_flat(&lowered(&segments), 0.9, 0.09));
     let apart: Drawing = (0..5).map(|k| [[10.0 * f64::from(k), 0.0], [10.0 * f64::from(k), 0.1 * f64::from(k * k)]]).collect();
-    assert!(!is_sheet(&lowered(&raised(&apart, 2, 0.0)), 0.9, 0.09));
+    assert!(!is_flat(&lowered(&raised(&apart, 2, 0.0)), 0.9, 0.09));
 }
 
 #[test]
@@ -233,7 +210,7 @@ fn sheets_do_not_depend_on_threads_and_can_be_stopped() {
     let mut random = Random(23);
     let shape = lowered(&raised(&drawing(1, &mut random), 1, 3.0));
     let (radius, tolerance) = (Radius::new(0.9).unwrap(), Tolerance::new(0.02).unwrap());
-    assert!(is_sheet(&shape, 0.9, 0.02));
+    assert!(is_flat(&shape, 0.9, 0.02));
     let made = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| dilate(&shape, radius, tolerance, &Budget::default()).unwrap()).solid.mesh().clone()
@@ -256,9 +233,9 @@ fn drawings_anywhere_are_sheets_and_copies_are_put() {
     let made = |drawing: &Drawing, height: f64| {
         let segments = raised(drawing, 2, height);
         let shape = lowered(&segments);
-        assert!(is_sheet(&shape, 0.9, 0.09));
+        assert!(is_flat(&shape, 0.9, 0.09));
         let made = arranged(&shape, 0.9, 0.09);
-        assert!(made.topology_exact && holds_everywhere(&made, &segments, 0.9, &mut Random(1)));
+        assert!(made.topology_exact && holds_everywhere(&made, 0.9, |x| distance_of_segments(x, &segments), &mut Random(1)));
         topology(&made)
     };
     let one = made(&drawing, 0.0);
@@ -271,17 +248,17 @@ fn drawings_anywhere_are_sheets_and_copies_are_put() {
         segments.extend(raised(&moved(x, y), 2, height));
     }
     let shape = lowered(&segments);
-    assert!(is_sheet(&shape, 0.9, 0.09));
+    assert!(is_flat(&shape, 0.9, 0.09));
     let four = arranged(&shape, 0.9, 0.09);
     assert_eq!(topology(&four), (4 * one.0, one.1, 4 * one.2));
-    assert!(four.topology_exact && holds_everywhere(&four, &segments, 0.9, &mut random));
+    assert!(four.topology_exact && holds_everywhere(&four, 0.9, |x| distance_of_segments(x, &segments), &mut random));
 }
 
 #[test]
 fn limits_hold_for_sheets_and_long_bodies_with_very_many_near_are_left() {
     let shape = lowered(&raised(&lattice(12), 2, 0.0));
     let (radius, tolerance) = (Radius::new(0.4).unwrap(), Tolerance::new(0.02).unwrap());
-    assert!(is_sheet(&shape, 0.4, 0.02));
+    assert!(is_flat(&shape, 0.4, 0.02));
     let budget = |triangles: u64| Budget { limits: Limits { triangles, ..Limits::default() }, ..Budget::default() };
     let made = dilate(&shape, radius, tolerance, &Budget::default()).unwrap().solid.mesh().triangles.len() as u64;
     assert!(dilate(&shape, radius, tolerance, &budget(made)).is_ok());

@@ -1,0 +1,142 @@
+//! What tests of arrangements have in common.
+
+use super::Arrangement;
+use crate::attractor::Attractor;
+use crate::budget::Budget;
+use crate::dilation::Dilation;
+use crate::dilation::plan::{Balls, Plan};
+use crate::measure::triangle::closest_on_triangle;
+use crate::model::{Interior, Model, PolygonMesh, Shape};
+use crate::solid::{Inside, mend};
+use crate::split_mix::Random;
+use crate::tolerance::{Radius, Tolerance};
+use glam::DVec3;
+use std::fmt::Display;
+
+pub(super) fn number(random: &mut Random) -> f64 {
+    random.share()
+}
+
+pub(super) fn place(random: &mut Random, size: f64) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|_| size * number(random)))
+}
+
+pub(super) fn lowered(vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Attractor {
+    lowered_as(Interior::Surface, vertices, faces).unwrap()
+}
+
+/// None where a solid is asked for and there is none.
+pub(super) fn lowered_as(interior: Interior, vertices: &[DVec3], faces: Vec<Vec<u32>>) -> Option<Attractor> {
+    let shape = Shape::Mesh(PolygonMesh { vertices: vertices.to_vec(), faces, interior });
+    Model { name: None, shape }.lower().ok().map(|lowered| lowered.attractor)
+}
+
+pub(super) fn points(vertices: &[DVec3]) -> Attractor {
+    lowered(vertices, (0..vertices.len() as u32).map(|k| vec![k]).collect())
+}
+
+pub(super) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
+    let vertices: Vec<DVec3> = segments.iter().flatten().copied().collect();
+    lowered(&vertices, (0..segments.len() as u32).map(|k| vec![2 * k, 2 * k + 1]).collect())
+}
+
+pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
+    let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
+    Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
+}
+
+pub(super) fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
+    let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
+    let setting = plan.setting(plan.pitch(), &budget);
+    plan.arranged(&setting, &plan.space(&setting), &budget).unwrap()
+}
+
+pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+    arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
+}
+
+pub(super) fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+    let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
+    let setting = plan.setting(plan.pitch(), &budget);
+    plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap()
+}
+
+/// Components, cavities and the Euler number.
+pub(super) fn topology(dilation: &Dilation) -> (u64, u64, i64) {
+    let topology = dilation.solid.topology();
+    (topology.components, topology.cavities, topology.euler)
+}
+
+/// Whether the surface is one over a plane.
+pub(super) fn is_flat(shape: &Attractor, radius: f64, tolerance: f64) -> bool {
+    let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
+    let setting = plan.setting(plan.pitch(), &budget);
+    let arrangement = Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap();
+    arrangement.is_some_and(|arrangement| arrangement.flat.is_some())
+}
+
+/// Whether no triangle has a place whose distance from what was dilated is below or above the bounds, or meets another.
+pub(super) fn holds_everywhere(dilation: &Dilation, radius: f64, distance: impl Fn(DVec3) -> f64, random: &mut Random) -> bool {
+    let mesh = dilation.solid.mesh();
+    let holds = |x: DVec3| (radius - dilation.inner_mm..=radius + dilation.outer_mm).contains(&distance(x));
+    let is_within = mesh.triangles.iter().all(|triangle| {
+        let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
+        let shares = [random.share(), random.share()];
+        let [s, t] = if shares[0] + shares[1] > 1.0 { shares.map(|share| 1.0 - share) } else { shares };
+        [a, a.midpoint(b), b.midpoint(c), c.midpoint(a), (a + b + c) / 3.0, a + s * (b - a) + t * (c - a)].into_iter().all(&holds)
+    });
+    let points = mesh.vertices.iter().map(|vertex| vertex.to_array()).collect();
+    let made = mend::mend(points, mesh.triangles.clone(), 1e-6, &Budget::default()).unwrap();
+    is_within && made.crossings == 0
+}
+
+/// Asserts that a place is inside if it is deeper than the bounds, and not if it is beyond; d is its distance from what was dilated.
+pub(super) fn assert_bounds(case: impl Display, inside: &Inside<'_>, dilation: &Dilation, radius: f64, x: DVec3, d: f64) {
+    if d < radius - dilation.inner_mm {
+        assert_eq!(inside.winding(x), 1, "{case}: {x} is {d} from the sites");
+    } else if d > radius + dilation.outer_mm {
+        assert_eq!(inside.winding(x), 0, "{case}: {x} is {d} from the sites");
+    }
+}
+
+/// The distance of a place from triangles.
+pub(super) fn distance_of_triangles(x: DVec3, vertices: &[DVec3], faces: &[Vec<u32>]) -> f64 {
+    let of = |face: &Vec<u32>| {
+        let [a, b, c] = [0, 1, 2].map(|k| vertices[face[k] as usize].to_array());
+        x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
+    };
+    faces.iter().map(of).fold(f64::INFINITY, f64::min)
+}
+
+/// What is told of a shape's arrangement, which there is.
+pub(super) fn with_arrangement<T>(shape: &Attractor, radius: f64, tolerance: f64, told: impl FnOnce(&mut Arrangement) -> T) -> T {
+    let (plan, budget) = (plan(shape, radius, tolerance), Budget::default());
+    let setting = plan.setting(plan.pitch(), &budget);
+    told(&mut Arrangement::new(&setting, plan.rule(), plan.space(&setting).candidates(), &budget).unwrap().unwrap())
+}
+
+/// The distance of a place from segments.
+pub(super) fn distance_of_segments(x: DVec3, segments: &[[DVec3; 2]]) -> f64 {
+    let of = |[a, b]: &[DVec3; 2]| {
+        let along = *b - *a;
+        let share = if along.length_squared() > 0.0 { ((x - *a).dot(along) / along.length_squared()).clamp(0.0, 1.0) } else { 0.0 };
+        x.distance(*a + share * along)
+    };
+    segments.iter().map(of).fold(f64::INFINITY, f64::min)
+}
+
+/// Whether all places deeper than the bounds are inside and all beyond are not.
+pub(super) fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], radius: f64, size: f64, random: &mut Random) {
+    let inside = Inside::new(dilation.solid.mesh());
+    for _ in 0..400 {
+        // Half of them near a segment's surface.
+        let x = if random.next().is_multiple_of(2) {
+            let [a, b] = segments[(random.next() % segments.len() as u64) as usize];
+            let away = place(random, 2.0) - DVec3::ONE;
+            a.lerp(b, number(random)) + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(random))
+        } else {
+            place(random, size)
+        };
+        assert_bounds("segments", &inside, dilation, radius, x, distance_of_segments(x, segments));
+    }
+}
