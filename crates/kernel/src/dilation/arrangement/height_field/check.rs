@@ -180,12 +180,13 @@ impl Faces {
     /// A place of a part of a triangle that is too far from all faces. Faces below the middles of parts, and those that are closest to the corners, mostly show that all of these are near to them; for the rest all are asked.
     fn far(&self, field: &Field, question: &Question, part: &[Point; 3], near: &mut Vec<u32>, depth: u32) -> Option<Point> {
         let &Question { inner, outer, owners, .. } = question;
-        let centre = middle(part);
-        let below = field.top([centre[0], centre[1]], 0.5 * (inner + outer)).map_or(u32::MAX, |top| top.owner);
         let face = |owner: u32| self.all.get(owner as usize);
-        if face(below).is_some_and(|face| face.distance_squared(&centre).sqrt() + radius(part, &centre) <= outer)
-            || [below, owners[0], owners[1], owners[2]].into_iter().filter_map(face).any(|face| face.covers(part, outer))
-        {
+        if owners.iter().any(|&owner| face(owner).is_some_and(|face| face.covers(part, outer))) {
+            return None;
+        }
+        let centre = middle(part);
+        let below = field.top([centre[0], centre[1]], 0.5 * (inner + outer)).and_then(|top| face(top.owner));
+        if below.is_some_and(|face| face.distance_squared(&centre).sqrt() + radius(part, &centre) <= outer || face.covers(part, outer)) {
             return None;
         }
         if depth > 0 {
