@@ -56,31 +56,37 @@ impl HalfEdges {
         result
     }
 
-    /// Finds the twins: half-edges are listed at their end of lower number.
+    /// Finds the twins: half-edges are listed at their end of lower number, in the order of the other.
     fn pair(&mut self) {
         let mut starts = vec![0_u32; self.points.len() + 1];
-        let lower = |half: usize, corners: &[u32]| corners[half].min(corners[next(half as u32) as usize]) as usize;
-        for half in 0..self.corners.len() {
-            starts[lower(half, &self.corners) + 1] += 1;
+        let ends_of = |half: u32, corners: &[u32]| {
+            let [a, b] = [half, next(half)].map(|half| corners[half as usize]);
+            [a.min(b), a.max(b)]
+        };
+        let halves = self.corners.len() as u32;
+        for half in 0..halves {
+            starts[ends_of(half, &self.corners)[0] as usize + 1] += 1;
         }
         for index in 1..starts.len() {
             starts[index] += starts[index - 1];
         }
         let mut ends = starts.clone();
         let mut listed = vec![0_u32; self.corners.len()];
-        for half in 0..self.corners.len() {
-            let end = &mut ends[lower(half, &self.corners)];
-            listed[*end as usize] = half as u32;
+        for half in 0..halves {
+            let end = &mut ends[ends_of(half, &self.corners)[0] as usize];
+            listed[*end as usize] = half;
             *end += 1;
         }
         for vertex in 0..self.points.len() {
-            let own = &listed[starts[vertex] as usize..starts[vertex + 1] as usize];
-            for (index, &half) in own.iter().enumerate() {
-                let (from, to) = (self.corners[half as usize], self.end(half));
-                let is_twin = |&&other: &&u32| self.corners[other as usize] == to && self.end(other) == from;
-                if let Some(&other) = own[index + 1..].iter().find(is_twin) {
-                    self.twins[half as usize] = other;
-                    self.twins[other as usize] = half;
+            let own = &mut listed[starts[vertex] as usize..starts[vertex + 1] as usize];
+            own.sort_unstable_by_key(|&half| (ends_of(half, &self.corners)[1], half));
+            for edge in own.chunk_by(|&a, &b| ends_of(a, &self.corners)[1] == ends_of(b, &self.corners)[1]) {
+                for (index, &half) in edge.iter().enumerate() {
+                    let from = self.corners[half as usize];
+                    if let Some(&other) = edge[index + 1..].iter().find(|&&other| self.corners[other as usize] != from) {
+                        self.twins[half as usize] = other;
+                        self.twins[other as usize] = half;
+                    }
                 }
             }
         }

@@ -6,9 +6,12 @@ use super::ground::Ground;
 use super::parts::{Part, Top, parts};
 use super::squares::Squares;
 
-/// How wide squares are that parts are sorted into, in units of the largest distance, and how many there are at most for each triangle.
-const PITCH: f64 = 0.3;
-const MOST: f64 = 4.0;
+/// How wide squares are that parts, and samples, are sorted into, in units of the largest distance, and how many there are at most for each triangle.
+pub(super) const PITCH: f64 = 0.3;
+pub(super) const MOST: f64 = 4.0;
+/// In how many squares a part may be at most, as a mean, and all together in any case.
+const MOST_OF_PART: usize = 64;
+const FEW: usize = 1 << 20;
 /// The least difference of slopes on both sides of a crease.
 const CREASE: f64 = 0.25;
 /// Slopes are no steeper than this in units of its height.
@@ -26,8 +29,8 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// What is above a graph with such faces, between two distances.
-    pub(super) fn new(ground: &Ground, faces: &Faces, distances: [f64; 2]) -> Self {
+    /// What is above a graph with such faces, between two distances; none where parts are so large beside most that there is no room for their lists.
+    pub(super) fn new(ground: &Ground, faces: &Faces, distances: [f64; 2]) -> Option<Self> {
         let parts = parts(&ground.mesh, faces, distances);
         let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for Part { bounds: [low, high], .. } in &parts {
@@ -36,8 +39,9 @@ impl Field {
         let squares = Squares::new(bounds, PITCH * distances[1], MOST * ground.len() as f64);
         let mut order: Vec<u32> = (0..parts.len() as u32).collect();
         order.sort_unstable_by(|&a, &b| parts[b as usize].highest.total_cmp(&parts[a as usize].highest).then(a.cmp(&b)));
-        let (starts, items) = squares.lists(order.iter().map(|&part| (part, parts[part as usize].bounds)));
-        Self { parts, bounds, squares, starts, items }
+        let (starts, items) =
+            squares.lists((MOST_OF_PART * parts.len()).max(FEW), order.iter().map(|&part| (part, parts[part as usize].bounds)))?;
+        Some(Self { parts, bounds, squares, starts, items })
     }
 
     /// The parts that may be below a place.

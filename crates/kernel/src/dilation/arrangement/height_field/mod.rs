@@ -5,8 +5,8 @@
 //!
 //! * All of their triangles have s <= d <= t (`check`).
 //! * Seen from above, each sheet with its side of the strip covers the inside of the rim once: so neither crosses itself.
-//! * All vertices of the sheets are nearer to P than s, so that all places over which they are have some of D(s) over them, as P is convex. A sheet does not meet it, and these places hang together: so it is above all of D(s), as one place of it is that is higher than S; and the lower one is below. So they do not meet
-//!   each other, nor do the sides of the strip, which have the same edges seen from above, and the same rim.
+//! * The border of each sheet, and so all of it, is nearer to P than s, as P is convex: there is some of D(s) over each place of a sheet. It does not meet that, and these places hang together, as the strip around them is a ring. So it is above all of D(s), if one of its vertices is higher than all of S; and the lower one is below. So they do not
+//!   meet each other, nor do the sides of the strip, which have the same edges seen from above, and the same rim.
 //!
 //! Then the surface is a sphere, and what it bounds holds D(s). It is in D(t), as over each place both of its ends are, and D(t) has one interval there.
 //!
@@ -30,7 +30,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
 use check::{Faces, Question};
 use ground::Ground;
-use pair::Pair;
+use pair::{BYTES_PER_FACE, Pair};
 
 /// A place in the plane.
 type Place = [f64; 2];
@@ -95,12 +95,16 @@ fn around(
         rounding: setting.rounding,
         round: &|x| round(x) + 0.0,
     };
+    if BYTES_PER_FACE * ground.len() as f64 > budget.limits.memory_bytes as f64 {
+        return Ok(None);
+    }
     let faces = Faces::new(ground, 1.0);
     if faces.crowding(ground, setting.slack, limits.outer) < LEAST_NEAR {
         return Ok(None);
     }
     budget.cancel.check()?;
-    let mut made = Pair::new(ground, faces, &limits).run(budget)?;
+    let Some(pair) = Pair::new(ground, faces, &limits) else { return Ok(None) };
+    let mut made = pair.run(budget)?;
     if let Some(Flat::Made(surface)) = &mut made {
         for vertex in &mut surface.vertices {
             let own = *vertex;

@@ -4,7 +4,7 @@
 
 use super::super::Flat;
 use super::check::{Faces, Fault};
-use super::ground::{Ground, border};
+use super::ground::{Ground, border, turned_left};
 use super::sheet::{Found, Sheet};
 use super::{Limits, Place};
 use crate::attractor::cell::Point;
@@ -19,6 +19,8 @@ use std::f64::consts::TAU;
 const ROUNDS: usize = 48;
 /// How far out in the band the rim is, along straight sides, and at most around corners.
 const RIM: [f64; 2] = [0.4, 0.7];
+/// Sides of the rim around a corner at most.
+const MOST_STEPS: f64 = 10_000.0;
 /// How far the border is from the inner distance, as a share of it, and in units of rounding.
 const BORDER: f64 = 1e-4;
 const ROUNDINGS: f64 = 4.0;
@@ -27,7 +29,7 @@ const LEAST_SHARE: f64 = 0.1;
 /// Triangles for each vertex of a sheet, about.
 const PER_VERTEX: f64 = 2.0;
 /// Bytes held at most for each triangle of the graph, and for each vertex of a sheet.
-const BYTES_PER_FACE: f64 = 1_600.0;
+pub(super) const BYTES_PER_FACE: f64 = 1_600.0;
 const BYTES_PER_VERTEX: f64 = 400.0;
 
 /// A place of the rim, and the vertices of both sheets at the border next to it.
@@ -48,32 +50,32 @@ pub(super) struct Pair<'a> {
     limits: &'a Limits<'a>,
 }
 
-/// A polygon around a convex one, between two distances from it: its sides touch what is as far as the first.
-pub(super) fn rim(corners: &[Place], limits: &Limits<'_>) -> Vec<Place> {
+/// A polygon around a convex one, between two distances from it: its sides touch what is as far as the first. None where it would have very many sides.
+pub(super) fn rim(corners: &[Place], limits: &Limits<'_>) -> Option<Vec<Place>> {
     let [near, far] = RIM.map(|share| limits.at(share));
     let widest = 2.0 * (near / far).acos();
     let count = corners.len();
-    let outward = |from: Place, to: Place| (from[0] - to[0]).atan2(to[1] - from[1]);
     let mut rim = Vec::new();
     for k in 0..count {
         let [a, b, c] = [k + count - 1, k, k + 1].map(|k| corners[k % count]);
-        let first = outward(a, b);
-        let turn = (outward(b, c) - first).rem_euclid(TAU);
+        let (before, after) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
+        let (first, turn) = ((-before[0]).atan2(before[1]), turned_left(before, after));
         let steps = (turn / widest).ceil().max(1.0);
+        (steps <= MOST_STEPS).then_some(())?;
         let reach = near / (0.5 * turn / steps).cos();
         for step in 0..steps as u32 {
             let (sine, cosine) = (first + turn * (f64::from(step) + 0.5) / steps).sin_cos();
             rim.push([b[0] + reach * cosine, b[1] + reach * sine]);
         }
     }
-    rim
+    Some(rim)
 }
 
 impl<'a> Pair<'a> {
-    /// Both sheets without places, given the faces seen from above.
-    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &'a Limits<'a>) -> Self {
+    /// Both sheets without places, given the faces seen from above; none where there is no room for what is known of the graph.
+    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &'a Limits<'a>) -> Option<Self> {
         let (above, below) = rayon::join(|| Sheet::new(ground, faces, limits), || Sheet::new(ground, Faces::new(ground, -1.0), limits));
-        Self { sheets: [above, below], posts: Vec::new(), next: Vec::new(), limits }
+        Some(Self { sheets: [above?, below?], posts: Vec::new(), next: Vec::new(), limits })
     }
 
     /// The surface in the frame of the graph, once all of it is between the distances; none where places do not make it so, or there is no room for it.
@@ -83,22 +85,23 @@ impl<'a> Pair<'a> {
     pub(super) fn run(mut self, budget: &Budget) -> Result<Option<Flat>, Stopped> {
         let limits = self.limits;
         let most = 2.0 * budget.limits.triangles as f64;
-        let room = budget.limits.memory_bytes as f64 - BYTES_PER_FACE * self.sheets[0].ground.len() as f64;
-        if room < 0.0 || self.begin().is_none() {
+        let (room, ground) = (budget.limits.memory_bytes as f64, self.sheets[0].ground);
+        let most_vertices = (room - BYTES_PER_FACE * ground.len() as f64) / BYTES_PER_VERTEX;
+        if self.begin().is_none() {
             return Ok(None);
         }
         // Samples alone make neither sheet have more than may be of both.
-        let vertices = (most / PER_VERTEX).min(room / BYTES_PER_VERTEX).min(f64::from(u32::MAX >> 2)) as usize;
+        let vertices = (most / PER_VERTEX).min(most_vertices).min(f64::from(u32::MAX >> 2)) as usize;
         let [above, below] = &mut self.sheets;
         let (first, second) = rayon::join(|| above.sample(vertices, limits, budget), || below.sample(vertices, limits, budget));
         first.and(second)?;
+        if PER_VERTEX * self.vertices() > most {
+            return Ok(Some(Flat::Beyond(PER_VERTEX * self.vertices())));
+        }
         let mut all = true;
         for _ in 0..ROUNDS {
-            let vertices = self.sheets.each_ref().map(Sheet::len).into_iter().sum::<usize>() as f64;
-            if PER_VERTEX * vertices > most {
-                return Ok(Some(Flat::Beyond(PER_VERTEX * vertices)));
-            }
-            if BYTES_PER_VERTEX * vertices > room {
+            // Places without end are no reason to refuse what others may do.
+            if PER_VERTEX * self.vertices() > most || self.vertices() > most_vertices {
                 return Ok(None);
             }
             let ([above, below], next) = (&mut self.sheets, &self.next);
@@ -107,10 +110,11 @@ impl<'a> Pair<'a> {
             let is_done = first.is_done && second.is_done;
             let of_sheets = [first, second].into_iter().flat_map(|Found { bends, .. }| bends);
             let bends: Vec<(u32, Place)> = of_sheets.chain(self.check_strip(budget)?).collect();
-            if is_done && bends.is_empty() {
+            // What is new was looked at; what had faults before may still be there.
+            if is_done && bends.is_empty() && all {
                 return Ok(self.finish().map(|surface| Flat::Made(Box::new(surface))));
             }
-            all = !bends.is_empty();
+            all = is_done || !bends.is_empty();
             let mut is_bent = vec![false; self.posts.len()];
             for (post, at) in bends {
                 if !std::mem::replace(&mut is_bent[post as usize], true) && self.bend(post, at).is_none() {
@@ -121,9 +125,14 @@ impl<'a> Pair<'a> {
         Ok(None)
     }
 
+    /// The number of vertices of both sheets.
+    fn vertices(&self) -> f64 {
+        self.sheets.iter().map(Sheet::len).sum::<usize>() as f64
+    }
+
     /// Makes the first posts.
     fn begin(&mut self) -> Option<()> {
-        let rim = rim(&self.sheets[0].ground.corners, self.limits);
+        let rim = rim(&self.sheets[0].ground.corners, self.limits)?;
         for &at in &rim {
             self.post(at)?;
         }
@@ -218,25 +227,27 @@ impl<'a> Pair<'a> {
         let count = rim.len() as u32;
         for (side, sheet) in self.sheets.iter().enumerate() {
             let mut numbers = vec![NONE; sheet.len()];
-            let (mut is_above, mut is_inside) = (false, true);
+            let mut is_above = false;
             let highest = sheet.faces.highest();
             let mut number = |corner: u32| {
                 let number = &mut numbers[corner as usize];
                 if *number == NONE {
                     let [x, y, height] = sheet.point(corner);
                     is_above |= height > highest;
-                    is_inside &= sheet.ground.away([x, y]).0 < self.limits.inner;
                     *number = surface.vertices.len() as u32;
                     surface.vertices.push([x, y, [height, -height][side]]);
                 }
                 *number
             };
-            let mut own: Vec<[u32; 3]> = sheet.base()?.iter().map(|triangle| triangle.map(&mut number)).collect();
+            let mut own: Vec<[u32; 3]> = sheet.known_base()?.iter().map(|triangle| triangle.map(&mut number)).collect();
             for (k, &post) in (0..).zip(&order) {
                 let next = (k + 1) % count;
                 let [c, d] = [order[next as usize], post].map(|post| number(self.posts[post as usize].ends[side]));
                 own.extend([[k, next, c], [k, c, d]]);
             }
+            // The sheet is within its border, and so as near to the part, which is convex, as that.
+            let mut border = self.posts.iter().map(|post| sheet.point(post.ends[side]));
+            let is_inside = border.all(|[x, y, _]| sheet.ground.away([x, y]).0 < self.limits.inner);
             (is_above && is_inside && is_plane(&surface.vertices, &own, &rim)).then_some(())?;
             if side == 1 {
                 own.iter_mut().for_each(|triangle| triangle.swap(1, 2));

@@ -11,8 +11,11 @@ const BEYOND: f64 = 1e-9;
 const RIDGE: f64 = 1e-12;
 /// How far beyond its sides a tip's cone may be, as a sine.
 const WIDER: f64 = 1e-9;
-/// Ridges that meet in a tip at least, but at the border.
+/// Ridges that meet in a tip, unless it is at the border, at least; and how many of them are looked at, pair by pair.
 const RIDGES: u32 = 3;
+const MOST_RIDGES: usize = 24;
+/// Triangles around a corner at most of which more is asked.
+const MOST_AROUND: usize = 256;
 
 /// A part, and what of it is where.
 #[derive(Clone, Copy, Debug)]
@@ -161,11 +164,15 @@ pub(super) fn parts(mesh: &HalfEdges, faces: &Faces, distances: [f64; 2]) -> Vec
     for (corner, End { at, owner, ridges, is_border }) in (0..).zip(ends) {
         if is_border {
             maker.add(Shape::Tip(at), owner, &[at], &[]);
-        } else if ridges >= RIDGES && mesh.star(corner, usize::MAX, &mut star) {
-            cone.around(&star, faces);
-            if !cone.sides.is_empty() {
+        } else if ridges >= RIDGES && mesh.star(corner, MOST_AROUND, &mut star) {
+            cone.around(&star, mesh, faces);
+            if cone.ridges.len() > MOST_RIDGES {
+                maker.add(Shape::Tip(at), owner, &[at], &[]);
+            } else if cone.find_sides() {
                 maker.add(Shape::Tip(at), owner, &[at], &cone.sides);
             }
+        } else if ridges >= RIDGES {
+            maker.add(Shape::Tip(at), owner, &[at], &[]);
         }
     }
     maker.parts
@@ -174,29 +181,41 @@ pub(super) fn parts(mesh: &HalfEdges, faces: &Faces, distances: [f64; 2]) -> Vec
 /// The directions in which nothing next to a corner is above it.
 #[derive(Default)]
 struct Cone {
-    /// The unit vectors from the corner to those next to it.
+    /// The unit vectors from the corner to those next to it, and those along ridges.
     ways: Vec<Point>,
-    /// The sides of the cone: each is across two of these.
+    ridges: Vec<Point>,
+    /// The sides of the cone.
     sides: Vec<Point>,
 }
 
 impl Cone {
-    fn around(&mut self, star: &Star, faces: &Faces) {
-        let Self { ways, sides } = self;
-        ways.clear();
-        sides.clear();
-        ways.extend(star.halves.iter().map(|&half| {
+    /// Begins with a corner.
+    fn around(&mut self, star: &Star, mesh: &HalfEdges, faces: &Faces) {
+        self.ways.clear();
+        self.ridges.clear();
+        for &half in &star.halves {
             let [from, to] = [half, next(half)].map(|half| &faces.all[(half / 3) as usize].corners[(half % 3) as usize]);
-            unit(&subtract(to, from))
-        }));
-        for (k, a) in ways.iter().enumerate() {
-            for b in &ways[k + 1..] {
-                let normal = unit(&cross(a, b));
-                let up = if normal[2] < 0.0 { normal.map(|x| -x) } else { normal };
-                if ways.iter().all(|way| dot(way, &up) <= WIDER) {
-                    sides.push(up);
+            let (way, twin) = (subtract(to, from), mesh.twin(half));
+            self.ways.push(unit(&way));
+            if twin != NONE && faces.above(half, twin) < 0.0 {
+                self.ridges.push(unit(&way));
+            }
+        }
+    }
+
+    /// Finds the sides, each of which is across two ridges; false where there are none.
+    fn find_sides(&mut self) -> bool {
+        let Self { ways, ridges, sides } = self;
+        sides.clear();
+        for (k, a) in ridges.iter().enumerate() {
+            for b in &ridges[k + 1..] {
+                let across = cross(a, b);
+                let normal = unit(&if across[2] < 0.0 { across.map(|x| -x) } else { across });
+                if normal != [0.0; 3] && ways.iter().all(|way| dot(way, &normal) <= WIDER) {
+                    sides.push(normal);
                 }
             }
         }
+        !sides.is_empty()
     }
 }

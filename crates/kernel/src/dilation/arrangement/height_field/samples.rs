@@ -1,15 +1,12 @@
 //! Places over which it is known how high a sheet should be, about.
 
 use super::Place;
-use super::field::Field;
+use super::field::{Field, MOST, PITCH};
 use super::squares::Squares;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 
-/// How far samples are from each other, in units of the distance, and how many there are at most for each triangle of the graph.
-const PITCH: f64 = 0.3;
-const MOST: f64 = 4.0;
 /// How far creases are followed from a sample, in units of the pitch.
 const ACROSS: f64 = 0.75;
 
@@ -52,7 +49,8 @@ impl Samples {
         };
         let rows: Vec<Vec<Sample>> = (0..squares.size[1]).into_par_iter().map(row).collect::<Result<_, Stopped>>()?;
         let all = rows.concat();
-        let (starts, items) = squares.lists((0..).zip(&all).map(|(number, sample)| (number, [sample.at; 2])));
+        let lists = squares.lists(all.len(), (0..).zip(&all).map(|(number, sample)| (number, [sample.at; 2])));
+        let (starts, items) = lists.unwrap_or_default();
         let all = items.into_iter().map(|number| all[number as usize]).collect();
         Ok(Self { squares, starts, all })
     }

@@ -67,17 +67,18 @@ pub(super) struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &Limits<'_>) -> Self {
-        Self {
+    /// One without places; none where there is no room for what is known of the graph.
+    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &Limits<'_>) -> Option<Self> {
+        Some(Self {
             ground,
-            field: Field::new(ground, &faces, [limits.inner, limits.outer]),
+            field: Field::new(ground, &faces, [limits.inner, limits.outer])?,
             faces,
             mesh: Mesh::new(),
             numbers: NameMap::default(),
             known: NameMap::default(),
             posts: Vec::new(),
             fresh: Vec::new(),
-        }
+        })
     }
 
     /// The number of its vertices.
@@ -91,12 +92,12 @@ impl<'a> Sheet<'a> {
     }
 
     /// Adds a vertex over a place, next to another if one is known; none where there is one, or no graph is below.
-    fn raise(&mut self, at: Place, out: f64, hint: Option<u32>, limits: &Limits<'_>) -> Option<u32> {
+    pub(super) fn raise(&mut self, at: Place, out: f64, hint: Option<u32>, limits: &Limits<'_>) -> Option<u32> {
         let at = at.map(limits.round);
         if self.numbers.contains_key(&at.map(f64::to_bits)) {
             return None;
         }
-        let top = self.field.top(at, limits.at(out))?;
+        let top = self.field.top(at, limits.at(out)).filter(|top| top.height.is_finite())?;
         let vertex = Vertex { at, height: (limits.round)(top.height), owner: top.owner };
         let inserted = match hint {
             Some(hint) => self.mesh.insert_with_hint(vertex, handle(hint)),
@@ -130,6 +131,11 @@ impl<'a> Sheet<'a> {
     /// The triangles within the border, counter-clockwise; none where it is not closed.
     pub(super) fn base(&self) -> Option<Vec<[u32; 3]>> {
         inside(&self.mesh, |edge| edge.is_constraint_edge())
+    }
+
+    /// The same, if each was found to be as it should be.
+    pub(super) fn known_base(&self) -> Option<Vec<[u32; 3]>> {
+        self.base().filter(|base| base.iter().all(|triangle| self.known.contains_key(&key(triangle))))
     }
 
     /// Whether a triangle is still there.
@@ -175,8 +181,11 @@ impl<'a> Sheet<'a> {
         for round in 0..SAMPLED {
             budget.cancel.check()?;
             let new = self.unknown(round == 0);
-            let worst = |triangle: &[u32; 3]| samples.worst(&triangle.map(|corner| self.point(corner)));
-            let all: Vec<Option<(f64, Place)>> = new.par_iter().with_min_len(IN_A_ROW).map(worst).collect();
+            let worst = |some: &[[u32; 3]]| -> Result<Vec<Option<(f64, Place)>>, Stopped> {
+                budget.cancel.check()?;
+                Ok(some.iter().map(|triangle| samples.worst(&triangle.map(|corner| self.point(corner)))).collect())
+            };
+            let all = new.par_chunks(IN_A_ROW).map(worst).collect::<Result<Vec<_>, Stopped>>()?.concat();
             let mut open: Vec<(f64, Place, [u32; 3])> = Vec::new();
             for (triangle, worst) in new.iter().zip(all) {
                 match worst.filter(|(off, _)| off.abs() > OFF * half) {
@@ -190,7 +199,10 @@ impl<'a> Sheet<'a> {
                 break;
             }
             open.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-            for (off, at, triangle) in open {
+            for (number, (off, at, triangle)) in open.into_iter().enumerate() {
+                if number.is_multiple_of(IN_A_ROW) {
+                    budget.cancel.check()?;
+                }
                 if self.has(&triangle) && self.raise(at, OUT[usize::from(off > 0.0)], Some(triangle[0]), limits).is_none() {
                     self.known.insert(key(&triangle), ());
                 }
@@ -218,7 +230,10 @@ impl<'a> Sheet<'a> {
         };
         let faults: Vec<Option<Fault>> = new.par_chunks(IN_A_ROW).map(check).collect::<Result<Vec<_>, Stopped>>()?.concat();
         let mut found = Found { is_done: true, ..Found::default() };
-        for (triangle, fault) in new.iter().zip(faults) {
+        for (number, (triangle, fault)) in new.iter().zip(faults).enumerate() {
+            if number.is_multiple_of(IN_A_ROW) {
+                budget.cancel.check()?;
+            }
             let Some(fault) = fault else {
                 self.known.insert(key(triangle), ());
                 continue;
@@ -247,10 +262,11 @@ impl<'a> Sheet<'a> {
         {
             return Some((post, at));
         }
+        let [x, y, _] = middle(&triangle.map(|corner| self.point(corner)));
         let at = self.ground.inward(at, INSIDE * limits.inner);
-        if self.raise(at, out, Some(triangle[0]), limits).is_none() {
-            let [x, y, _] = middle(&triangle.map(|corner| self.point(corner)));
-            // A neighbour's fault may have been there, too.
+        let is_beyond = self.mesh.intersects_constraint(Point2::new(x, y), Point2::new(at[0], at[1]));
+        // A neighbour's fault may have been there, too.
+        if is_beyond || self.raise(at, out, Some(triangle[0]), limits).is_none() {
             self.raise([x, y], out, Some(triangle[0]), limits);
         }
         None

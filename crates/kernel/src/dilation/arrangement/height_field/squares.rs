@@ -37,12 +37,20 @@ impl Squares {
         self.place(at[1], 1) * self.size[0] + self.place(at[0], 0)
     }
 
-    /// Numbers of what is in each square, in the order that they are given with their boxes: where the list of every square begins, and the lists.
-    pub(super) fn lists(&self, boxes: impl Iterator<Item = (u32, [Place; 2])> + Clone) -> (Vec<u32>, Vec<u32>) {
+    /// Numbers of what is in each square, in the order that they are given with their boxes: where the list of every square begins, and the lists. None where these have more than `most` numbers.
+    pub(super) fn lists(&self, most: usize, boxes: impl Iterator<Item = (u32, [Place; 2])> + Clone) -> Option<(Vec<u32>, Vec<u32>)> {
         let squares = |[low, high]: [Place; 2]| {
             let [first, last] = [low, high].map(|at| [0, 1].map(|axis| self.place(at[axis], axis)));
             (first[1]..=last[1]).flat_map(move |y| (first[0]..=last[0]).map(move |x| y * self.size[0] + x))
         };
+        let count = |[low, high]: [Place; 2]| -> usize {
+            [0, 1].map(|axis| self.place(high[axis], axis) - self.place(low[axis], axis) + 1).iter().product()
+        };
+        let mut total = 0_usize;
+        for (_, own) in boxes.clone() {
+            total += count(own);
+            (total <= most.min(u32::MAX as usize)).then_some(())?;
+        }
         let mut starts = vec![0_u32; self.size[0] * self.size[1] + 1];
         boxes.clone().flat_map(|(_, own)| squares(own)).for_each(|square| starts[square + 1] += 1);
         for square in 0..self.size[0] * self.size[1] {
@@ -55,6 +63,6 @@ impl Squares {
                 ends[square] += 1;
             }
         }
-        (starts, items)
+        Some((starts, items))
     }
 }

@@ -3,6 +3,8 @@ use super::check::{Faces, Fault, Question};
 use super::field::Field;
 use super::ground::Ground;
 use super::pair::{is_plane, rim};
+use super::sheet::Sheet;
+use super::squares::Squares;
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, distance_squared};
 use crate::budget::{Budget, CancelToken, Limits as Most, StopReason};
@@ -159,7 +161,7 @@ fn triangles_are_held_against_their_bounds() {
     let ground = ground(&triangles).unwrap();
     let faces = Faces::new(&ground, 1.0);
     let (inner, outer) = (1.1, 1.4);
-    let field = Field::new(&ground, &faces, [inner, outer]);
+    let field = Field::new(&ground, &faces, [inner, outer]).unwrap();
     let distance = |x: &Point| faces.all.iter().map(|face| face.distance_squared(x)).fold(f64::INFINITY, f64::min).sqrt();
     let (mut counts, mut near) = ([0; 3], Vec::new());
     for _ in 0..3_000 {
@@ -197,11 +199,13 @@ fn triangles_are_held_against_their_bounds() {
 #[test]
 fn what_is_above_a_graph_is_as_far_from_it_as_is_asked() {
     let mut random = Random(29);
-    for round in 0..12 {
-        let ground = ground(&graph(round, &mut random)).unwrap();
+    for round in 0..13 {
+        // The last has more around its middle than is looked at pair by pair.
+        let triangles = if round < 12 { graph(round, &mut random) } else { Part::disc(400, 1).graph(height(2, &mut random)) };
+        let ground = ground(&triangles).unwrap();
         for sign in [1.0, -1.0] {
             let faces = Faces::new(&ground, sign);
-            let field = Field::new(&ground, &faces, [1.2, 1.5]);
+            let field = Field::new(&ground, &faces, [1.2, 1.5]).unwrap();
             for _ in 0..200 {
                 let at = [13.0 * random.share() - 1.5, 13.0 * random.share() - 1.5];
                 let asked = 1.2 + 0.3 * random.share();
@@ -220,6 +224,50 @@ fn what_is_above_a_graph_is_as_far_from_it_as_is_asked() {
     }
 }
 
+/// A sheet with a coarse border: whatever is added to it, it is known only if each of its triangles would be found right.
+#[test]
+fn sheets_are_known_only_where_all_triangles_are_right() {
+    let mut random = Random(37);
+    let triangles = Part::rectangle(10, &mut random).graph(height(0, &mut random));
+    let (ground, limits) = (ground(&triangles).unwrap(), Limits { inner: 1.1, outer: 1.4, rounding: 0.0, round: &|x| x });
+    let mut sheet = Sheet::new(&ground, Faces::new(&ground, 1.0), &limits).unwrap();
+    let corners = (0..40).map(|k| f64::from(k % 10) * 1.15).map(|x| x - 0.75).zip(0..);
+    let border = corners.map(|(x, k)| [[x, -0.75], [10.75, x], [10.0 - x, 10.75], [-0.75, 10.0 - x]][k / 10]);
+    let posts: Vec<u32> = (0..).zip(border).map(|(k, at)| sheet.raise_post(at, k, &limits).unwrap()).collect();
+    let next: Vec<u32> = (0..40).map(|k| (k + 1) % 40).collect();
+    assert!((0..40).all(|k| sheet.join(posts[k], posts[next[k] as usize])));
+    let (mut near, mut known) = (Vec::new(), 0);
+    for round in 0..200 {
+        // Triangles that were not mended are left, and something else is new.
+        let found = sheet.check(&next, round % 3 == 0, &limits, &Budget::default()).unwrap();
+        let base = sheet.base().unwrap();
+        let is_right = |triangle: &[u32; 3]| {
+            let question = limits.question(triangle.map(|corner| sheet.point(corner)), [u32::MAX; 3]);
+            sheet.faces.fault(&sheet.field, &question, &mut near).is_none()
+        };
+        let are_right = base.iter().all(is_right);
+        assert!(are_right || sheet.known_base().is_none(), "{round}");
+        known += u32::from(sheet.known_base().is_some());
+        if round % 3 == 0 && found.is_done {
+            assert!(are_right && sheet.known_base().is_some(), "{round}");
+            break;
+        }
+        let at = [10.0 * random.share(), 10.0 * random.share()];
+        sheet.raise(at, 0.5, None, &limits);
+    }
+    assert!(known > 0);
+}
+
+#[test]
+fn lists_of_squares_have_no_more_than_they_may() {
+    let squares = Squares::new([[0.0; 2], [10.0; 2]], 1.0, 1e6);
+    let boxes = [(7, [[0.5, 0.5], [2.5, 1.5]]), (8, [[9.5, 9.5], [30.0, 30.0]])];
+    let (starts, items) = squares.lists(10, boxes.into_iter()).unwrap();
+    assert_eq!((starts[0], starts[1], items.len()), (0, 1, 10));
+    assert_eq!(items.iter().filter(|&&item| item == 7).count(), 6);
+    assert!(squares.lists(9, boxes.into_iter()).is_none());
+}
+
 #[test]
 fn what_is_no_graph_over_a_convex_part_is_none() {
     let mut random = Random(41);
@@ -231,6 +279,12 @@ fn what_is_no_graph_over_a_convex_part_is_none() {
     let turned: Vec<[Point; 3]> =
         flat.iter().rev().enumerate().map(|(k, &[a, b, c])| if k % 3 == 0 { [c, b, a] } else { [b, c, a] }).collect();
     assert!(is_graph(&turned));
+    // Nor is the sign of a zero.
+    let signed: Vec<[Point; 3]> = (0..)
+        .zip(&flat)
+        .map(|(k, own)| if k % 2 == 0 { *own } else { own.map(|at| at.map(|x| if x == 0.0 { -0.0 } else { x })) })
+        .collect();
+    assert!(is_graph(&signed));
     let with = |more: [Point; 3]| [&flat[..], &[more]].concat();
     let without =
         |gone: &dyn Fn(usize) -> bool| flat.iter().enumerate().filter(|(k, _)| !gone(*k)).map(|(_, own)| *own).collect::<Vec<_>>();
@@ -301,7 +355,7 @@ fn rims_are_between_their_distances_from_convex_polygons() {
         let part = Part::disc(count, 1);
         let triangles = part.graph(|_, _| 0.0);
         let ground = ground(&triangles).unwrap();
-        let rim = rim(&ground.corners, &limits);
+        let rim = rim(&ground.corners, &limits).unwrap();
         for (k, from) in rim.iter().enumerate() {
             let to = rim[(k + 1) % rim.len()];
             for share in 0..=20 {
