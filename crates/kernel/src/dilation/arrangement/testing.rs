@@ -2,9 +2,9 @@
 
 use super::Arrangement;
 use crate::attractor::Attractor;
-use crate::budget::Budget;
-use crate::dilation::Dilation;
+use crate::budget::{Budget, StopReason};
 use crate::dilation::plan::{Balls, Plan};
+use crate::dilation::{Dilation, DilationError, dilate};
 use crate::measure::triangle::closest_on_triangle;
 use crate::model::{Interior, Model, PolygonMesh, Shape};
 use crate::solid::{Inside, mend};
@@ -88,6 +88,22 @@ pub(super) fn holds_everywhere(dilation: &Dilation, radius: f64, distance: impl 
     let points = mesh.vertices.iter().map(|vertex| vertex.to_array()).collect();
     let made = mend::mend(points, mesh.triangles.clone(), 1e-6, &Budget::default()).unwrap();
     is_within && made.crossings == 0
+}
+
+/// Asserts that an arrangement's dilation is the same for any number of threads, and that one which is cancelled is stopped.
+pub(super) fn assert_steady(shape: &Attractor, radius: f64, tolerance: f64) {
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| arranged(shape, radius, tolerance))
+    };
+    let one = with(1);
+    for threads in [2, 5] {
+        assert_eq!(one.solid.mesh(), with(threads).solid.mesh());
+    }
+    let budget = Budget::default();
+    budget.cancel.fire(StopReason::Cancelled);
+    let stopped = dilate(shape, Radius::new(radius).unwrap(), Tolerance::new(tolerance).unwrap(), &budget);
+    assert!(matches!(stopped, Err(DilationError::Stopped(_))), "{stopped:?}");
 }
 
 /// Asserts that a place is inside if it is deeper than the bounds, and not if it is beyond; d is its distance from what was dilated.

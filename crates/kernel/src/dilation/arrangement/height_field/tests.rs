@@ -1,4 +1,4 @@
-use super::super::testing::{arranged, assert_bounds, distance_of_triangles, holds_everywhere, is_flat, lowered, topology};
+use super::super::testing::{arranged, assert_bounds, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, topology};
 use super::check::{Faces, Fault, Question};
 use super::field::Field;
 use super::ground::Ground;
@@ -7,7 +7,7 @@ use super::sheet::Sheet;
 use super::squares::Squares;
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, distance_squared};
-use crate::budget::{Budget, CancelToken, Limits as Most, StopReason};
+use crate::budget::{Budget, Limits as Most};
 use crate::dilation::convex::Convex as _;
 use crate::dilation::{DilationError, dilate};
 use crate::solid::Inside;
@@ -390,19 +390,7 @@ fn height_fields_do_not_depend_on_threads_and_can_be_stopped() {
     let (vertices, faces) = surface(&graph(6, &mut Random(61)), 1);
     let shape = lowered(&vertices, faces);
     assert!(is_flat(&shape, 2.1, 0.08));
-    let (radius, tolerance) = (Radius::new(2.1).unwrap(), Tolerance::new(0.08).unwrap());
-    let made = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| dilate(&shape, radius, tolerance, &Budget::default()).unwrap()).solid.mesh().clone()
-    };
-    let one = made(1);
-    for threads in [2, 3] {
-        let other = made(threads);
-        assert_eq!((&one.vertices, &one.triangles), (&other.vertices, &other.triangles));
-    }
-    let cancel = CancelToken::new();
-    cancel.fire(StopReason::Cancelled);
-    assert!(matches!(dilate(&shape, radius, tolerance, &Budget { cancel, ..Budget::default() }), Err(DilationError::Stopped(_))));
+    assert_steady(&shape, 2.1, 0.08);
 }
 
 #[test]

@@ -1,10 +1,11 @@
 use super::super::testing::{
-    arranged, arranged_unless_left, distance_of_segments, holds_everywhere, is_flat, keeps_its_bounds, topology, wires as lowered,
+    arranged, arranged_unless_left, assert_steady, distance_of_segments, holds_everywhere, is_flat, keeps_its_bounds, topology,
+    wires as lowered,
 };
 use super::contour::contour;
 use super::wires::Wires;
 use super::{Place, levels};
-use crate::budget::{Budget, CancelToken, Limits, StopReason};
+use crate::budget::{Budget, Limits};
 use crate::dilation::{DilationError, dilate};
 use crate::split_mix::Random;
 use crate::tolerance::{Radius, Tolerance};
@@ -209,20 +210,8 @@ fn profiles_are_between_their_circles() {
 fn sheets_do_not_depend_on_threads_and_can_be_stopped() {
     let mut random = Random(23);
     let shape = lowered(&raised(&drawing(1, &mut random), 1, 3.0));
-    let (radius, tolerance) = (Radius::new(0.9).unwrap(), Tolerance::new(0.02).unwrap());
     assert!(is_flat(&shape, 0.9, 0.02));
-    let made = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| dilate(&shape, radius, tolerance, &Budget::default()).unwrap()).solid.mesh().clone()
-    };
-    let one = made(1);
-    for threads in [2, 3] {
-        let other = made(threads);
-        assert_eq!((&one.vertices, &one.triangles), (&other.vertices, &other.triangles));
-    }
-    let cancel = CancelToken::new();
-    cancel.fire(StopReason::Cancelled);
-    assert!(matches!(dilate(&shape, radius, tolerance, &Budget { cancel, ..Budget::default() }), Err(DilationError::Stopped(_))));
+    assert_steady(&shape, 0.9, 0.02);
 }
 
 #[test]
