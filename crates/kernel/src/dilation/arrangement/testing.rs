@@ -2,7 +2,7 @@
 
 use super::Arrangement;
 use crate::attractor::Attractor;
-use crate::budget::{Budget, StopReason};
+use crate::budget::{Budget, Limits, StopReason};
 use crate::dilation::plan::{Balls, Plan};
 use crate::dilation::{Dilation, DilationError, dilate};
 use crate::measure::triangle::closest_on_triangle;
@@ -104,6 +104,19 @@ pub(super) fn assert_steady(shape: &Attractor, radius: f64, tolerance: f64) {
     budget.cancel.fire(StopReason::Cancelled);
     let stopped = dilate(shape, Radius::new(radius).unwrap(), Tolerance::new(tolerance).unwrap(), &budget);
     assert!(matches!(stopped, Err(DilationError::Stopped(_))), "{stopped:?}");
+}
+
+/// Asserts that as many triangles as there are may be, and that fewer are refused.
+pub(super) fn assert_limited(shape: &Attractor, radius: f64, tolerance: f64) {
+    let with = |triangles: u64| {
+        let budget = Budget { limits: Limits { triangles, ..Limits::default() }, ..Budget::default() };
+        dilate(shape, Radius::new(radius).unwrap(), Tolerance::new(tolerance).unwrap(), &budget)
+    };
+    let made = with(Limits::default().triangles).unwrap().solid.mesh().triangles.len() as u64;
+    assert!(with(made).is_ok());
+    for triangles in [made - 1, made / 3, made / 50, 7] {
+        assert!(matches!(with(triangles), Err(DilationError::Triangles { .. })), "{triangles}");
+    }
 }
 
 /// Asserts that a place is inside if it is deeper than the bounds, and not if it is beyond; d is its distance from what was dilated.

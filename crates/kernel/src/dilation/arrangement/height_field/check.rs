@@ -124,9 +124,10 @@ impl Faces {
     pub(super) fn crowding(&self, ground: &Ground, flatness: f64, distance: f64) -> f64 {
         let (count, mesh) = (self.all.len(), &ground.mesh);
         let mut groups = Groups::new(count);
-        for half in (0..3 * mesh.triangles()).filter(|&half| mesh.twin(half) != NONE && mesh.twin(half) > half) {
-            if self.above(half, mesh.twin(half)).abs() <= flatness {
-                groups.join((half / 3) as usize, (mesh.twin(half) / 3) as usize);
+        let pairs = (0..3 * mesh.triangles()).map(|half| (half, mesh.twin(half)));
+        for (half, twin) in pairs.filter(|&(half, twin)| twin != NONE && twin > half) {
+            if self.above(half, twin).abs() <= flatness {
+                groups.join((half / 3) as usize, (twin / 3) as usize);
             }
         }
         let (step, mut near, mut total) = (count.div_ceil(SAMPLE), Vec::new(), 0);

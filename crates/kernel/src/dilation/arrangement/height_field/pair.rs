@@ -268,8 +268,8 @@ pub(super) fn is_plane(places: &[Point], triangles: &[[u32; 3]], rim: &[Point]) 
         if turn(2, &middle, a, b) <= 0.0 {
             return false;
         }
-        let [[ax, ay], [bx, by]] = [a, b].map(|place| [place[0] - middle[0], place[1] - middle[1]]);
-        turned += (ax * by - ay * bx).atan2(ax * bx + ay * by);
+        let [from, to] = [a, b].map(|place| [place[0] - middle[0], place[1] - middle[1]]);
+        turned += turned_left(from, to);
     }
     let turns = |&[a, b, c]: &[u32; 3]| turn(2, &places[a as usize], &places[b as usize], &places[c as usize]) > 0.0;
     let is_around = |border: Vec<u32>| is_same(&border, rim.len() as u32);

@@ -162,17 +162,14 @@ pub(super) fn parts(mesh: &HalfEdges, faces: &Faces, distances: [f64; 2]) -> Vec
     }
     let (mut star, mut cone) = (Star::default(), Cone::default());
     for (corner, End { at, owner, ridges, is_border }) in (0..).zip(ends) {
-        if is_border {
-            maker.add(Shape::Tip(at), owner, &[at], &[]);
-        } else if ridges >= RIDGES && mesh.star(corner, MOST_AROUND, &mut star) {
-            cone.around(&star, mesh, faces);
-            if cone.ridges.len() > MOST_RIDGES {
-                maker.add(Shape::Tip(at), owner, &[at], &[]);
-            } else if cone.find_sides() {
-                maker.add(Shape::Tip(at), owner, &[at], &cone.sides);
-            }
-        } else if ridges >= RIDGES {
-            maker.add(Shape::Tip(at), owner, &[at], &[]);
+        if !is_border && ridges < RIDGES {
+            continue;
+        }
+        // Where the cone is not known, all directions may be in it.
+        let is_known = !is_border && mesh.star(corner, MOST_AROUND, &mut star) && cone.find(&star, mesh, faces);
+        let directions = if is_known { &cone.sides[..] } else { &[] };
+        if !is_known || !directions.is_empty() {
+            maker.add(Shape::Tip(at), owner, &[at], directions);
         }
     }
     maker.parts
@@ -189,24 +186,23 @@ struct Cone {
 }
 
 impl Cone {
-    /// Begins with a corner.
-    fn around(&mut self, star: &Star, mesh: &HalfEdges, faces: &Faces) {
-        self.ways.clear();
-        self.ridges.clear();
+    /// Finds the sides around a corner, each of which is across two ridges, or that there are none; false where there are too many ridges.
+    fn find(&mut self, star: &Star, mesh: &HalfEdges, faces: &Faces) -> bool {
+        let Self { ways, ridges, sides } = self;
+        ways.clear();
+        ridges.clear();
+        sides.clear();
         for &half in &star.halves {
             let [from, to] = [half, next(half)].map(|half| &faces.all[(half / 3) as usize].corners[(half % 3) as usize]);
-            let (way, twin) = (subtract(to, from), mesh.twin(half));
-            self.ways.push(unit(&way));
+            let (way, twin) = (unit(&subtract(to, from)), mesh.twin(half));
+            ways.push(way);
             if twin != NONE && faces.above(half, twin) < 0.0 {
-                self.ridges.push(unit(&way));
+                ridges.push(way);
             }
         }
-    }
-
-    /// Finds the sides, each of which is across two ridges; false where there are none.
-    fn find_sides(&mut self) -> bool {
-        let Self { ways, ridges, sides } = self;
-        sides.clear();
+        if ridges.len() > MOST_RIDGES {
+            return false;
+        }
         for (k, a) in ridges.iter().enumerate() {
             for b in &ridges[k + 1..] {
                 let across = cross(a, b);
@@ -216,6 +212,6 @@ impl Cone {
                 }
             }
         }
-        !sides.is_empty()
+        true
     }
 }

@@ -1,4 +1,6 @@
-use super::super::testing::{arranged, assert_bounds, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, topology};
+use super::super::testing::{
+    arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, topology,
+};
 use super::check::{Faces, Fault, Question};
 use super::field::Field;
 use super::ground::Ground;
@@ -7,12 +9,10 @@ use super::sheet::Sheet;
 use super::squares::Squares;
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, distance_squared};
-use crate::budget::{Budget, Limits as Most};
+use crate::budget::Budget;
 use crate::dilation::convex::Convex as _;
-use crate::dilation::{DilationError, dilate};
 use crate::solid::Inside;
 use crate::split_mix::Random;
-use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -397,14 +397,8 @@ fn height_fields_do_not_depend_on_threads_and_can_be_stopped() {
 fn limits_hold_for_height_fields() {
     let (vertices, faces) = surface(&graph(6, &mut Random(67)), 2);
     let shape = lowered(&vertices, faces);
-    let (radius, tolerance) = (Radius::new(2.1).unwrap(), Tolerance::new(0.08).unwrap());
     assert!(is_flat(&shape, 2.1, 0.08));
-    let budget = |triangles: u64| Budget { limits: Most { triangles, ..Most::default() }, ..Budget::default() };
-    let made = dilate(&shape, radius, tolerance, &Budget::default()).unwrap().solid.mesh().triangles.len() as u64;
-    assert!(dilate(&shape, radius, tolerance, &budget(made)).is_ok());
-    for triangles in [made - 1, made / 3, 7] {
-        assert!(matches!(dilate(&shape, radius, tolerance, &budget(triangles)), Err(DilationError::Triangles { .. })), "{triangles}");
-    }
+    assert_limited(&shape, 2.1, 0.08);
 }
 
 #[test]

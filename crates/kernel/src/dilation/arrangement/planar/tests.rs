@@ -1,14 +1,12 @@
 use super::super::testing::{
-    arranged, arranged_unless_left, assert_steady, distance_of_segments, holds_everywhere, is_flat, keeps_its_bounds, topology,
-    wires as lowered,
+    arranged, arranged_unless_left, assert_limited, assert_steady, distance_of_segments, holds_everywhere, is_flat, keeps_its_bounds,
+    topology, wires as lowered,
 };
 use super::contour::contour;
 use super::wires::Wires;
 use super::{Place, levels};
-use crate::budget::{Budget, Limits};
-use crate::dilation::{DilationError, dilate};
+use crate::budget::Budget;
 use crate::split_mix::Random;
-use crate::tolerance::{Radius, Tolerance};
 use glam::{DMat3, DVec3};
 
 /// A shape's segments, over the plane.
@@ -246,14 +244,8 @@ fn drawings_anywhere_are_sheets_and_copies_are_put() {
 #[test]
 fn limits_hold_for_sheets_and_long_bodies_with_very_many_near_are_left() {
     let shape = lowered(&raised(&lattice(12), 2, 0.0));
-    let (radius, tolerance) = (Radius::new(0.4).unwrap(), Tolerance::new(0.02).unwrap());
     assert!(is_flat(&shape, 0.4, 0.02));
-    let budget = |triangles: u64| Budget { limits: Limits { triangles, ..Limits::default() }, ..Budget::default() };
-    let made = dilate(&shape, radius, tolerance, &Budget::default()).unwrap().solid.mesh().triangles.len() as u64;
-    assert!(dilate(&shape, radius, tolerance, &budget(made)).is_ok());
-    for triangles in [made - 1, made / 50] {
-        assert!(matches!(dilate(&shape, radius, tolerance, &budget(triangles)), Err(DilationError::Triangles { .. })), "{triangles}");
-    }
+    assert_limited(&shape, 0.4, 0.02);
     // All cross one of them.
     let mut drawing: Drawing = (0..6_000).map(|k| f64::from(k) * 0.01).map(|x| [[x, -0.1], [x + 0.001, 0.1]]).collect();
     drawing.push([[-1.0, 0.0], [61.0, 0.0]]);
