@@ -3,7 +3,7 @@
 use super::convex::{Convex, SiteSearch};
 use super::surface::NameHasher;
 use super::tree::{NodeId, SiteId, in_space};
-use crate::attractor::cell::{Point, between, distance_squared, dot, subtract};
+use crate::attractor::cell::{Point, between, distance_squared, dot, subtract, unit};
 use crate::measure::triangle::closest_on_triangle;
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
@@ -88,16 +88,22 @@ impl Places {
         self.starts = starts;
     }
 
-    /// Visits all sites within `reach` + `radius` of x, with their closest points and squared distances.
+    /// Visits all sites within `reach` + `radius` of x, those within less than `size` together: see [`SiteSearch::visit_near`].
     #[inline]
-    fn visit(&mut self, search: &mut impl SiteSearch, x: &Point, radius: f64, reach: f64, visit: impl FnMut(SiteId, &Point, f64)) {
+    fn visit(
+        &mut self,
+        search: &mut impl SiteSearch,
+        x: &Point,
+        [radius, reach, size]: [f64; 3],
+        visit: impl FnMut(SiteId, &Point, f64, Option<NodeId>),
+    ) {
         let mut level = 0;
         while level < self.top && radius > self.edge * f64::from(1_u32 << level) {
             level += 1;
         }
         self.refine(search, level, x, reach);
         let list = self.lists.get(&self.key(level, x)).unwrap_or(&self.starts);
-        search.visit_near(x, list, reach + radius, visit);
+        search.visit_near(x, list, reach + radius, size, visit);
     }
 
     fn place(&self, level: u32, x: &Point) -> [i32; 3] {
@@ -135,14 +141,17 @@ struct Marked {
     distance: f64,
 }
 
-/// A site seen from a vertex.
+/// A site seen from a vertex, or a group of sites within a small ball.
 #[derive(Clone, Copy, Debug)]
 struct View {
     site: SiteId,
-    /// Squared distance.
+    /// The node whose sites it stands for, if it is not the site alone.
+    group: Option<NodeId>,
+    /// Squared distance, and the least that any of the sites may have.
     square: f64,
-    /// The unit vector from the site's closest point to the vertex, and the largest value along it on the site: what has larger values is
-    /// as far from the site as they differ, at least.
+    least: f64,
+    /// The unit vector from the closest point of the site, or the ball, to the vertex, and the largest value along it on that: what has larger values is
+    /// as far from it as they differ, at least.
     normal: Point,
     highest: f64,
     deficit: f64,
@@ -164,6 +173,8 @@ struct Range {
     count: u32,
     /// All sites within this squared distance are there; 0 before they were looked for.
     square: f64,
+    /// The least squared distance that any may have.
+    least: f64,
 }
 
 /// The sites around vertices, looked for once, and what is known of those around a star.
@@ -175,6 +186,8 @@ pub(super) struct Nearby {
     square: f64,
     first_square: f64,
     reach: f64,
+    /// Sites within a ball of less than this radius are looked at together.
+    size: f64,
     /// Sites with a bit, and what bit a site has in the star of that number.
     sites: Vec<SiteId>,
     bits: Vec<(u32, u32)>,
@@ -182,9 +195,12 @@ pub(super) struct Nearby {
     /// Corners of the star with the sites within reach.
     marked: Vec<Marked>,
     pieces: Vec<[Marked; 4]>,
-    /// Which triangle a site was told last to be clear of, by the number of it, and how many were asked for.
+    /// Which triangle a site, or what is below a node, was told last to be clear of, by the number of it, and how many were asked for.
     cleared: Vec<u32>,
+    cleared_groups: Vec<u32>,
     asked: u32,
+    /// Nodes and sites of groups that a triangle is close to.
+    open: (Vec<NodeId>, Vec<SiteId>),
     /// Directions that showed it.
     directions: Vec<Direction>,
 }
@@ -195,16 +211,18 @@ impl Nearby {
         size_of_val(&*self.views)
     }
 
-    /// Forgets all; sites cover within `reach` and are looked for up to the root of `first_square` at first.
-    pub(super) fn reset(&mut self, vertices: usize, reach: f64, first_square: f64) {
+    /// Forgets all; sites cover within `reach`, are looked for up to the root of `first_square` at first, and together within a ball smaller than `size`.
+    pub(super) fn reset(&mut self, vertices: usize, reach: f64, first_square: f64, size: f64) {
         self.ranges.clear();
         // One more for a place that is tried.
         self.ranges.resize(vertices + 1, Range::default());
         self.views.clear();
         (self.reach, self.square, self.first_square) = (reach, reach * reach, first_square.max(reach * reach));
+        self.size = size;
         self.bits.clear();
         self.star = 0;
         self.cleared.clear();
+        self.cleared_groups.clear();
         self.asked = 0;
     }
 
@@ -242,14 +260,26 @@ impl Nearby {
         let square = if square <= self.first_square { self.first_square } else { self.first_square + 2.0 * (square - self.first_square) };
         let first = self.views.len();
         let views = &mut self.views;
-        places.visit(search, x, square.sqrt() - self.reach, self.reach, |site, closest, square| {
-            views.push(View { site, square, normal: *closest, highest: f64::INFINITY, deficit: 0.0 });
+        places.visit(search, x, [square.sqrt() - self.reach, self.reach, self.size], |site, closest, square, group| {
+            views.push(View { site, group, square, least: square, normal: *closest, highest: f64::INFINITY, deficit: 0.0 });
         });
+        let mut least = f64::INFINITY;
         for view in &mut views[first..] {
-            let site = search.site(view.site);
-            let (deficit, length) = (site.deficit(), site.in_space(view.square.sqrt()));
-            view.normal = if length > 0.0 { subtract(x, &view.normal).map(|part| part / length) } else { [0.0; 3] };
-            (view.highest, view.deficit) = (site.highest(&view.normal), deficit);
+            match view.group.map(|node| search.ball(node)) {
+                None => {
+                    let site = search.site(view.site);
+                    let length = site.in_space(view.square.sqrt());
+                    view.normal = if length > 0.0 { subtract(x, &view.normal).map(|part| part / length) } else { [0.0; 3] };
+                    (view.highest, view.deficit) = (site.highest(&view.normal), site.deficit());
+                }
+                Some(ball) => {
+                    let way = subtract(x, &ball.centre);
+                    view.normal = unit(&way);
+                    (view.highest, view.deficit) = (ball.highest(&view.normal), ball.deficit);
+                    view.least = (dot(&way, &way).sqrt() - ball.radius).max(0.0).powi(2) + ball.deficit;
+                }
+            }
+            least = least.min(view.least);
         }
         let views = &mut views[first..];
         let nearer = |a: &View, b: &View| a.square.total_cmp(&b.square).then_with(|| a.site.cmp(&b.site));
@@ -261,7 +291,7 @@ impl Nearby {
         views[..sorted].sort_unstable_by(nearer);
         let count = views.len() as u32;
         // What begins nowhere ends nowhere, even after other views are gone.
-        self.ranges[vertex as usize] = Range { first: if count > 0 { first as u32 } else { 0 }, count, square };
+        self.ranges[vertex as usize] = Range { first: if count > 0 { first as u32 } else { 0 }, count, square, least };
     }
 
     #[inline]
@@ -298,7 +328,7 @@ impl Nearby {
             if view.square > self.square {
                 break;
             }
-            let (star, bit) = entry(&mut self.bits, view.site);
+            let (star, bit) = entry(&mut self.bits, number(view.site));
             if *star != self.star {
                 if self.sites.len() == MOST_COVERING {
                     continue;
@@ -317,7 +347,10 @@ impl Nearby {
         self.forget_many();
         self.see(search, places, vertex, x, self.square);
         let mut foot: Option<(Point, f64)> = None;
-        for view in self.views(vertex).iter().filter(|view| view.square <= self.square) {
+        for view in self.views(vertex).iter().filter(|view| view.least <= self.square) {
+            if view.group.is_some() {
+                return None;
+            }
             let length = in_space(view.square.sqrt(), view.deficit);
             let closest = std::array::from_fn(|axis| x[axis] - length * view.normal[axis]);
             if foot.is_some_and(|(known, _)| distance_squared(&known, &closest) > 1e-12 * self.square) {
@@ -455,36 +488,40 @@ impl Nearby {
         for (&corner, point) in corners.iter().zip(triangle) {
             self.see(search, places, corner, point, enough);
         }
-        let Self { ranges, views, cleared, asked, directions, .. } = self;
+        if corners.iter().all(|&corner| self.ranges[corner as usize].least >= enough) {
+            return true;
+        }
+        let Self { ranges, views, cleared, cleared_groups, asked, open, directions, .. } = self;
         let views = |corner: u32| {
             let range = ranges[corner as usize];
             &views[range.first as usize..(range.first + range.count) as usize]
         };
-        if corners.iter().all(|&corner| views(corner).first().is_none_or(|view| view.square >= enough)) {
-            return true;
-        }
         *asked += 1;
         directions.clear();
         for corner in corners {
             for view in views(corner) {
-                if view.square >= enough || view.parts(triangle, least) {
+                if view.least >= enough || view.parts(triangle, least) {
                     continue;
                 }
-                let last = entry(cleared, view.site);
+                let last = match view.group {
+                    None => entry(cleared, number(view.site)),
+                    Some(node) => entry(cleared_groups, node as usize),
+                };
                 if *last == *asked {
                     continue;
                 }
-                let site = search.site(view.site);
                 if directions.is_empty() {
                     // Sites with a common closest point are parted by one plane.
                     let nearest = corners.iter().filter_map(|&corner| views(corner).first());
                     let sum = nearest.fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.normal[axis]));
-                    let length = dot(&sum, &sum).sqrt().max(f64::MIN_POSITIVE);
-                    directions.push(Direction::new(sum.map(|part| part / length), triangle));
+                    directions.push(Direction::new(unit(&sum), triangle));
                 }
-                if !directions.iter().any(|direction| direction.parts(&site, least)) {
-                    let Some(direction) = parting(triangle, &site, least) else { return false };
-                    directions.push(direction);
+                let is_clear = match view.group {
+                    None => is_parted(triangle, &search.site(view.site), least, directions),
+                    Some(node) => is_group_parted(search, node, triangle, least, directions, open),
+                };
+                if !is_clear {
+                    return false;
                 }
                 *last = *asked;
             }
@@ -493,13 +530,52 @@ impl Nearby {
     }
 }
 
-/// What a table has of a site; it grows as far as it takes.
+/// Whether a known direction, or one that is found and kept, shows that a triangle is farther than `least` from a convex set.
 #[inline]
-fn entry<T: Clone + Default>(table: &mut Vec<T>, site: SiteId) -> &mut T {
-    let number = match site {
+fn is_parted(triangle: &[Point; 3], site: &impl Convex, least: f64, directions: &mut Vec<Direction>) -> bool {
+    directions.iter().any(|direction| direction.parts(site, least)) || {
+        let found = parting(triangle, site, least);
+        directions.extend(found);
+        found.is_some()
+    }
+}
+
+/// Likewise for all sites below a node: by the balls around them, and where these do not tell, by what is in them.
+fn is_group_parted(
+    search: &mut impl SiteSearch,
+    node: NodeId,
+    triangle: &[Point; 3],
+    least: f64,
+    directions: &mut Vec<Direction>,
+    (nodes, sites): &mut (Vec<NodeId>, Vec<SiteId>),
+) -> bool {
+    nodes.clear();
+    nodes.push(node);
+    while let Some(node) = nodes.pop() {
+        if is_parted(triangle, &search.ball(node), least, directions) {
+            continue;
+        }
+        sites.clear();
+        search.add_below(node, nodes, sites);
+        if !sites.iter().all(|&site| is_parted(triangle, &search.site(site), least, directions)) {
+            return false;
+        }
+    }
+    true
+}
+
+/// The number of a site in tables.
+#[inline]
+fn number(site: SiteId) -> usize {
+    match site {
         SiteId::Point(index) => 2 * index as usize,
         SiteId::Listed(index) => 2 * index as usize + 1,
-    };
+    }
+}
+
+/// What a table has of a number; it grows as far as it takes.
+#[inline]
+fn entry<T: Clone + Default>(table: &mut Vec<T>, number: usize) -> &mut T {
     if number >= table.len() {
         table.resize(number + 1, T::default());
     }
@@ -513,4 +589,127 @@ fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
         mask &= mask.wrapping_sub(1);
         (bit < 64).then_some(bit)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attractor::Attractor;
+    use crate::attractor::cell::Site;
+    use crate::budget::Budget;
+    use crate::dilation::plan::{Balls, Plan};
+    use crate::dilation::tree::Tree;
+    use crate::model::{AffineMap, Ifs, Model, Shape};
+    use crate::split_mix::Random;
+    use crate::tolerance::{Radius, Tolerance};
+    use glam::{DMat3, DVec3};
+    use std::collections::BTreeSet;
+
+    /// A surface of points: Takagi's function of both coordinates, 10 mm wide.
+    fn takagi() -> Attractor {
+        let map = |x: f64, y: f64| AffineMap {
+            linear: DMat3::from_cols_array(&[0.5, 0.0, 0.5 - x, 0.0, 0.5, 0.5 - y, 0.0, 0.0, 0.5]),
+            translation: DVec3::new(5.0 * x, 5.0 * y, 5.0 * (x + y)),
+        };
+        let maps = vec![map(0.0, 0.0), map(0.0, 1.0), map(1.0, 0.0), map(1.0, 1.0)];
+        Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) }.lower().unwrap().attractor
+    }
+
+    const RADIUS: f64 = 1.0;
+    const TOLERANCE: f64 = 0.2;
+
+    /// What is told of a tree over the surface, its starts, and all of its sites.
+    fn with_tree(told: impl FnOnce(&mut Tree<'_>, Vec<NodeId>, &[SiteId])) {
+        let (attractor, budget) = (takagi(), Budget::default());
+        let balls = Balls { least: Radius::new(RADIUS).unwrap().mm(), most: RADIUS };
+        let plan = Plan::new(&attractor, balls, Tolerance::new(TOLERANCE).unwrap(), true, &budget).unwrap();
+        let setting = plan.setting(plan.pitch(), &budget);
+        let space = plan.space(&setting);
+        let mut tree = Tree::of(plan.rule(), &setting);
+        let starts = tree.reset(space.candidates());
+        let mut all = Vec::new();
+        tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
+        assert!(all.len() > 10_000, "{}", all.len());
+        told(&mut tree, starts, &all);
+    }
+
+    fn corners(tree: &Tree<'_>, site: SiteId) -> Vec<Point> {
+        match tree.site(site).site {
+            Site::Point(at) => vec![at],
+            Site::Segment(ends) => ends.to_vec(),
+            Site::Triangle(corners) => corners.to_vec(),
+        }
+    }
+
+    fn place(random: &mut Random) -> Point {
+        [12.0, 12.0, 14.0].map(|wide| wide * random.share() - 1.0)
+    }
+
+    #[test]
+    fn what_is_looked_at_together_is_all_that_is_near() {
+        with_tree(|tree, starts, all| {
+            let mut random = Random(5);
+            let mut groups = 0;
+            for round in 0..80 {
+                let (x, reach, size) = (place(&mut random), 4.0 * random.share(), [0.0, 1.1, 1.5, 2.5][round % 4]);
+                let mut found = Vec::new();
+                tree.visit_near(&x, &starts, reach, size, |site, closest, square, group| found.push((site, *closest, square, group)));
+                let mut seen = BTreeSet::new();
+                for (site, closest, square, group) in found {
+                    assert!((distance_squared(&x, &closest) - square).abs() < 1e-12 && tree.site(site).closest(&x) == closest);
+                    let Some(node) = group else {
+                        seen.insert(site);
+                        continue;
+                    };
+                    // All that is below a node is in its ball, and the site that stands for it is below.
+                    let (mut nodes, mut sites) = (vec![node], Vec::new());
+                    while let Some(node) = nodes.pop() {
+                        tree.add_below(node, &mut nodes, &mut sites);
+                    }
+                    let ball = tree.ball(node);
+                    let is_within = |corner: &Point| distance_squared(corner, &ball.centre) <= ball.radius * ball.radius;
+                    assert!(ball.radius < size && sites.contains(&site));
+                    assert!(sites.iter().all(|&site| corners(tree, site).iter().all(is_within)), "{round}");
+                    seen.extend(sites);
+                    groups += 1;
+                }
+                let mut near = all.iter().filter(|&&site| tree.site(site).distance_squared(&x) < reach * reach);
+                assert!(near.all(|site| seen.contains(site)), "{round}");
+            }
+            assert!(groups > 100, "{groups}");
+        });
+    }
+
+    /// Random triangles about as far from the surface as the radius: those that are told to be clear of all sites are, and nearly all that are clear are told, whatever is looked at together.
+    #[test]
+    fn triangles_that_are_clear_are_so_of_all_sites() {
+        with_tree(|tree, starts, all| {
+            let least = RADIUS - TOLERANCE;
+            let places: Vec<Point> = all.iter().flat_map(|&site| corners(tree, site)).collect();
+            // Of those that are clear by a twentieth, how many are told to be.
+            let shares = [0.0, 1.1, 1.5].map(|size| {
+                let (mut random, mut told, mut clear) = (Random(7), 0, 0);
+                let (mut nearby, mut around) = (Nearby::default(), Places::default());
+                around.reset([-3.0; 3], 1.0, 5, starts.clone());
+                for round in 0..400 {
+                    let (x, wide) = (place(&mut random), 1.2 * random.share());
+                    let foot = places.iter().min_by(|a, b| distance_squared(a, &x).total_cmp(&distance_squared(b, &x))).unwrap();
+                    let out = unit(&subtract(&x, foot)).map(|x| x * (least + 0.25 * random.share()));
+                    let triangle: [Point; 3] =
+                        std::array::from_fn(|_| std::array::from_fn(|axis| foot[axis] + out[axis] + wide * (random.share() - 0.5)));
+                    nearby.reset(3, RADIUS + TOLERANCE, least * least, size);
+                    let is_clear = nearby.is_clear(tree, &mut around, [0, 1, 2], &triangle, least);
+                    let of = |site: &Point| distance_squared(site, &closest_on_triangle(site, &triangle[0], &triangle[1], &triangle[2]));
+                    let distance = places.iter().map(of).fold(f64::INFINITY, f64::min).sqrt();
+                    assert!(!is_clear || distance >= least, "{size} {round}: {distance}");
+                    if distance > 1.05 * least {
+                        (told, clear) = (told + u32::from(is_clear), clear + 1);
+                    }
+                }
+                assert!(clear > 60 && clear < 340, "{clear}");
+                f64::from(told) / f64::from(clear)
+            });
+            assert!(shares.iter().all(|&share| share > 0.95), "{shares:?}");
+        });
+    }
 }

@@ -1,7 +1,7 @@
 //! What a certificate asks of sites: each of them is a convex set, and those near a place are found.
 
 use super::tree::{NodeId, SiteId, in_space};
-use crate::attractor::cell::{Point, distance_squared};
+use crate::attractor::cell::{Point, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteError;
 
 /// A convex set, with its deficit.
@@ -45,6 +45,34 @@ impl<C: Convex> Convex for &C {
     }
 }
 
+/// A ball that holds sites, with the least of their deficits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    pub(super) centre: Point,
+    pub(super) radius: f64,
+    pub(super) deficit: f64,
+}
+
+impl Convex for Ball {
+    #[inline]
+    fn deficit(&self) -> f64 {
+        self.deficit
+    }
+
+    #[inline]
+    fn closest(&self, x: &Point) -> Point {
+        let way = subtract(x, &self.centre);
+        let length = dot(&way, &way).sqrt();
+        if length > self.radius { std::array::from_fn(|axis| self.centre[axis] + self.radius / length * way[axis]) } else { *x }
+    }
+
+    /// Of a unit vector.
+    #[inline]
+    fn highest(&self, direction: &Point) -> f64 {
+        dot(&self.centre, direction) + self.radius
+    }
+}
+
 /// Convex sites and nodes above them, all by their numbers.
 pub(super) trait SiteSearch {
     type Site<'b>: Convex
@@ -60,8 +88,14 @@ pub(super) trait SiteSearch {
     /// A site by its number.
     fn site(&self, id: SiteId) -> Self::Site<'_>;
 
-    /// Calls `visit` with all sites below `starts` that are within `reach` of x, their closest points and squared distances.
-    fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, visit: impl FnMut(SiteId, &Point, f64));
+    /// Calls `visit` with all sites below `starts` that are within `reach` of x, their closest points and squared distances. Of all below a node whose ball is smaller than `size` it gives one, with the node, if any may be so near.
+    fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, size: f64, visit: impl FnMut(SiteId, &Point, f64, Option<NodeId>));
+
+    /// The ball around what is below a node.
+    fn ball(&self, node: NodeId) -> Ball;
+
+    /// Adds the nodes and the sites that are directly below a node.
+    fn add_below(&mut self, node: NodeId, nodes: &mut Vec<NodeId>, sites: &mut Vec<SiteId>);
 
     /// Nodes below `starts` that may hold a site within `reach` of x: as small as possible without becoming many.
     fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>);

@@ -65,6 +65,9 @@ const LEAST_TURN: f64 = 0.7;
 /// Sites are looked for as far as triangles need whose smallest balls have this radius in units of the pitch.
 const FIRST_LOOK: f64 = 0.6;
 
+/// Sites within a ball of this radius, in units of the band, are looked at together: where points lie closer to each other, a vertex has a view of few of them, which tell coverage farther around, too.
+const TOGETHER: f64 = 1.2;
+
 /// Working memory of a thread.
 pub(super) struct Simplifier<S> {
     search: S,
@@ -176,7 +179,8 @@ impl<S: SiteSearch> Simplifier<S> {
         let top = (size / edge).log2().ceil().max(0.0) as u32 + 1;
         self.places.reset(core.low, edge, top, starts);
         let first_square = setting.least * setting.least + (FIRST_LOOK * setting.lattice.pitch).powi(2);
-        self.nearby.reset(mesh.points.len(), setting.outer + setting.rounding - self.search.deviation(), first_square);
+        let reach = setting.outer + setting.rounding - self.search.deviation();
+        self.nearby.reset(mesh.points.len(), reach, first_square, TOGETHER * (setting.outer - setting.least));
         self.mender.start(mesh);
     }
 

@@ -6,7 +6,7 @@
 //! `slack` of the best distance, and among equal distances the lexicographically first closest point wins.
 //! So blocks agree on shared lattice vertices, and results do not depend on the number of threads.
 
-use super::convex::{Convex, SiteSearch};
+use super::convex::{Ball, Convex, SiteSearch};
 use super::plan::Setting;
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared, dot};
@@ -368,9 +368,24 @@ impl<'a> Tree<'a> {
         }
     }
 
+    /// A site below a node; none where there were too many nodes.
+    fn first_below(&mut self, mut id: NodeId) -> Option<SiteId> {
+        loop {
+            id = match self.nodes[id as usize].content {
+                Content::Points(first, count) => return (count > 0).then_some(SiteId::Point(first)),
+                Content::Sites(first, count) => return (count > 0).then_some(SiteId::Listed(first)),
+                Content::Open(first, count) => (count > 0).then_some(first)?,
+                Content::Closed(points) => {
+                    let (first, count) = self.expand(id, points);
+                    (count > 0).then_some(first)?
+                }
+            };
+        }
+    }
+
     /// All sites below `starts` that are within `reach` of x.
     pub(super) fn collect(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<SiteId>) {
-        self.visit_near(x, starts, reach, |id, _, _| found.push(id));
+        self.visit_near(x, starts, reach, 0.0, |id, _, _, _| found.push(id));
     }
 
     /// All sites below `starts` that are within `reach` of x and reach higher than `lowest` along a unit vector.
@@ -477,9 +492,15 @@ impl<'a> SiteSearch for Tree<'a> {
         Weighted { site, deficit: self.site_deficits[kind].get(index as usize).copied().unwrap_or(0.0) }
     }
 
-    /// Calls `visit` with all sites below `starts` that are within `reach` of x, their closest points and squared distances.
     #[inline]
-    fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, mut visit: impl FnMut(SiteId, &Point, f64)) {
+    fn visit_near(
+        &mut self,
+        x: &Point,
+        starts: &[NodeId],
+        reach: f64,
+        size: f64,
+        mut visit: impl FnMut(SiteId, &Point, f64, Option<NodeId>),
+    ) {
         let mut stack = std::mem::take(&mut self.stack);
         stack.clear();
         stack.extend_from_slice(starts);
@@ -488,6 +509,15 @@ impl<'a> SiteSearch for Tree<'a> {
             let node = &self.nodes[id as usize];
             let threshold = self.threshold(id, reach);
             if distance_squared(x, &node.centre) > threshold * threshold {
+                continue;
+            }
+            if node.radius < size && !matches!(node.content, Content::Points(_, 1) | Content::Sites(_, 1)) {
+                self.looked += 1;
+                if let Some(site) = self.first_below(id) {
+                    self.found += 1;
+                    let closest = self.site(site).closest(x);
+                    visit(site, &closest, distance_squared(x, &closest) + self.site(site).deficit, Some(id));
+                }
                 continue;
             }
             let deficit = self.deficit(id);
@@ -499,7 +529,7 @@ impl<'a> SiteSearch for Tree<'a> {
                         let square = distance_squared(x, point) + deficit;
                         if square <= limit {
                             self.found += 1;
-                            visit(SiteId::Point(index), point, square);
+                            visit(SiteId::Point(index), point, square, None);
                         }
                     }
                 }
@@ -510,7 +540,7 @@ impl<'a> SiteSearch for Tree<'a> {
                         let square = distance_squared(x, &closest) + deficit;
                         if square <= limit {
                             self.found += 1;
-                            visit(SiteId::Listed(index), &closest, square);
+                            visit(SiteId::Listed(index), &closest, square, None);
                         }
                     }
                 }
@@ -526,6 +556,22 @@ impl<'a> SiteSearch for Tree<'a> {
             }
         }
         self.stack = stack;
+    }
+
+    #[inline]
+    fn ball(&self, node: NodeId) -> Ball {
+        let Node { centre, radius, .. } = self.nodes[node as usize];
+        Ball { centre, radius, deficit: self.deficit(node) }
+    }
+
+    fn add_below(&mut self, node: NodeId, nodes: &mut Vec<NodeId>, sites: &mut Vec<SiteId>) {
+        let (first, count) = match self.nodes[node as usize].content {
+            Content::Points(first, count) => return sites.extend((first..first + count).map(SiteId::Point)),
+            Content::Sites(first, count) => return sites.extend((first..first + count).map(SiteId::Listed)),
+            Content::Open(first, count) => (first, count),
+            Content::Closed(points) => self.expand(node, points),
+        };
+        nodes.extend(first..first + count);
     }
 
     /// Nodes that may hold a site within `reach` of x: as small as possible without becoming many.

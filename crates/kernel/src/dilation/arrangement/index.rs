@@ -1,9 +1,9 @@
 //! The figures of an arrangement by their places.
 
 use super::figure::Figure;
-use crate::attractor::cell::{Point, distance_squared};
+use crate::attractor::cell::{Point, between, distance_squared};
 use crate::attractor::sites::SiteError;
-use crate::dilation::convex::{Convex, SiteSearch};
+use crate::dilation::convex::{Ball, Convex, SiteSearch};
 use crate::dilation::simplify::Core;
 use crate::dilation::tree::{NodeId, SiteId};
 
@@ -79,13 +79,23 @@ impl SiteSearch for &Index {
     }
 
     #[inline]
-    fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, mut visit: impl FnMut(SiteId, &Point, f64)) {
+    fn visit_near(&mut self, x: &Point, starts: &[NodeId], reach: f64, _: f64, mut visit: impl FnMut(SiteId, &Point, f64, Option<NodeId>)) {
         let limit = self.limit(reach);
         for &id in starts {
             if let Some((closest, square)) = self.closest(id, x, limit) {
-                visit(SiteId::Listed(id), &closest, square);
+                visit(SiteId::Listed(id), &closest, square, None);
             }
         }
+    }
+
+    fn ball(&self, node: NodeId) -> Ball {
+        let [low, high] = &self.boxes[node as usize];
+        let centre = between(low, high, 0.5);
+        Ball { centre, radius: distance_squared(&centre, high).sqrt() + self.slack, deficit: self.figures[node as usize].deficit }
+    }
+
+    fn add_below(&mut self, node: NodeId, _: &mut Vec<NodeId>, sites: &mut Vec<SiteId>) {
+        sites.push(SiteId::Listed(node));
     }
 
     fn gather(&mut self, x: &Point, starts: &[NodeId], reach: f64, found: &mut Vec<NodeId>) {
