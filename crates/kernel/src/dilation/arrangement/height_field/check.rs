@@ -1,6 +1,6 @@
 //! Whether a triangle is between two distances from a graph.
 
-use super::super::between::{Body, halves, lowest, middle, radius, too_far};
+use super::super::between::{Body, Memory, lowest, middle, radius, too_far};
 use super::field::Field;
 use super::ground::Ground;
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
@@ -11,8 +11,6 @@ use crate::measure::triangle::closest_on_triangle;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::half_edges::{NONE, previous};
 
-/// How often a triangle is halved at most where only faces below its parts are asked.
-const QUICK: u32 = 4;
 /// How often the way between two triangles is sought from one to the other before corners and sides are.
 const STEPS: usize = 2;
 /// Triangles that tell how many parts are near to each other, and how many near to one are asked for.
@@ -84,8 +82,13 @@ impl Face {
         Self { normal, radius: radius(&corners, &centre), corners, centre }
     }
 
-    /// Whether a plane across the way from it to a triangle shows that both are as far apart. The way is found by going back and forth, from the middle.
+    /// Whether a plane shows that it is as far from a triangle: its own, or one across the way between both middles, or between closest places, which are found by going back and forth.
     fn is_apart(&self, triangle: &[Point; 3], centre: &Point, least: f64) -> bool {
+        if lowest(triangle, &self.normal) - dot(&self.normal, &self.corners[0]) >= least
+            || self.is_parted(triangle, &unit(&subtract(centre, &self.centre)), least)
+        {
+            return true;
+        }
         let [a, b, c] = triangle;
         let mut q = *centre;
         for _ in 0..STEPS {
@@ -147,16 +150,16 @@ impl Faces {
     /// Calls `visit` with the faces whose boxes are within a distance of a triangle's, until it answers false.
     pub(super) fn around(&self, triangle: &[Point; 3], distance: f64, mut visit: impl FnMut(u32) -> bool) {
         let grown = |by: f64| triangle.map(|corner| corner.map(|x| x + by));
-        let within = Box32::of(&[grown(-distance), grown(distance)].concat());
+        let within = Box32::of(&grown(-distance)).union(&Box32::of(&grown(distance)));
         self.tree.query(&within, 0, |leaf| {
             let mut own = self.tree.items(leaf).iter().zip(self.tree.boxes(leaf));
             own.all(|(&item, theirs)| !within.meets(theirs) || visit(item))
         });
     }
 
-    /// Where a triangle is nearer or farther than it has to be, with a list to be used. Cost: about a tenth of a microsecond for each face near to it.
-    pub(super) fn fault(&self, field: &Field, question: &Question, near: &mut Vec<u32>) -> Option<Fault> {
-        let Question { triangle, inner, .. } = question;
+    /// Where a triangle is nearer or farther than it has to be. Cost: about a tenth of a microsecond for each face near to it.
+    pub(super) fn fault(&self, field: &Field, question: &Question, memory: &mut Memory) -> Option<Fault> {
+        let Question { triangle, owners, inner, outer } = question;
         let normal = unit(&cross(&subtract(&triangle[1], &triangle[0]), &subtract(&triangle[2], &triangle[0])));
         let highest = lowest(triangle, &normal) - inner;
         let centre = middle(triangle);
@@ -176,32 +179,15 @@ impl Faces {
         if let Some([place, close]) = found {
             return Some(Fault::Near(place, close));
         }
-        self.far(field, question, triangle, near, QUICK).map(Fault::Far)
-    }
-
-    /// A place of a part of a triangle that is too far from all faces. Faces below the middles of parts, and those that are closest to the corners, mostly show that all of these are near to them; for the rest all are asked.
-    fn far(&self, field: &Field, question: &Question, part: &[Point; 3], near: &mut Vec<u32>, depth: u32) -> Option<Point> {
-        let &Question { inner, outer, owners, .. } = question;
-        let face = |owner: u32| self.all.get(owner as usize);
-        if owners.iter().any(|&owner| face(owner).is_some_and(|face| face.covers(part, outer))) {
-            return None;
-        }
-        let centre = middle(part);
-        let below = field.top([centre[0], centre[1]], 0.5 * (inner + outer)).and_then(|top| face(top.owner));
-        if below.is_some_and(|face| face.distance_squared(&centre).sqrt() + radius(part, &centre) <= outer || face.covers(part, outer)) {
-            return None;
-        }
-        if depth > 0 {
-            return halves(part).iter().find_map(|half| self.far(field, question, half, near, depth - 1));
-        }
-        if field.top([centre[0], centre[1]], outer).is_none_or(|top| centre[2] > top.height) {
-            return Some(centre);
-        }
-        near.clear();
-        self.around(part, outer, |item| {
+        // Faces that are closest to the corners, and those below what these leave, mostly show that nothing is too far; where they do not, all are asked.
+        let owners = (0..3).map(|k| owners[k]).enumerate().filter(|&(k, owner)| owner != NONE && !owners[..k].contains(&owner));
+        let below = |at: &Point| field.top([at[0], at[1]], 0.5 * (inner + outer)).map(|top| top.owner);
+        too_far(&self.all, owners.map(|(_, owner)| owner), below, triangle, *outer, memory)?;
+        let mut near = Vec::new();
+        self.around(triangle, *outer, |item| {
             near.push(item);
             true
         });
-        too_far(&self.all, near, part, outer)
+        too_far(&self.all, near, |_| None, triangle, *outer, memory).map(Fault::Far)
     }
 }

@@ -6,8 +6,8 @@ use super::ground::Ground;
 use super::parts::{Part, Top, parts};
 use super::squares::Squares;
 
-/// How wide squares are that parts, and samples, are sorted into, in units of the largest distance, and how many there are at most for each triangle.
-pub(super) const PITCH: f64 = 0.3;
+/// How wide squares are that parts are sorted into, in units of the largest distance, and how many there are at most for each triangle.
+const PITCH: f64 = 0.2;
 pub(super) const MOST: f64 = 4.0;
 /// In how many squares a part may be at most, as a mean, and all together in any case.
 const MOST_OF_PART: usize = 64;

@@ -3,6 +3,7 @@
 //! Both sheets end at a border beside the graph, not farther from its part of the plane than the inner distance; the rim is beyond that. Between them is a strip of two triangles after each post, on either side, with the same edges seen from above.
 
 use super::super::Flat;
+use super::super::between::Memory;
 use super::check::{Faces, Fault};
 use super::ground::{Ground, border, turned_left};
 use super::sheet::{Found, Sheet};
@@ -197,11 +198,11 @@ impl<'a> Pair<'a> {
         let open: Vec<u32> = (0..self.posts.len() as u32).filter(|&post| !self.posts[post as usize].is_known).collect();
         let fault = |&post: &u32| {
             budget.cancel.check()?;
-            let mut near = Vec::new();
+            let mut memory = Memory::default();
             let mut all = [0, 1].into_iter().flat_map(|side| self.strip(side, post).map(|triangle| (side, triangle)));
             Ok(all.find_map(|(side, triangle)| {
                 let Sheet { faces, field, .. } = &self.sheets[side];
-                faces.fault(field, &self.limits.question(triangle, [NONE; 3]), &mut near)
+                faces.fault(field, &self.limits.question(triangle, [NONE; 3]), &mut memory)
             }))
         };
         let faults: Vec<Option<Fault>> = open.par_iter().map(fault).collect::<Result<_, Stopped>>()?;

@@ -1,12 +1,14 @@
 //! Places over which it is known how high a sheet should be, about.
 
 use super::Place;
-use super::field::{Field, MOST, PITCH};
+use super::field::{Field, MOST};
 use super::squares::Squares;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 
+/// How wide squares are that have a sample, in units of the distance.
+const PITCH: f64 = 0.3;
 /// How far creases are followed from a sample, in units of the pitch.
 const ACROSS: f64 = 0.75;
 

@@ -2,7 +2,7 @@
 //!
 //! Places are added where samples are far off the sheet (Garland, Heckbert, "Fast polygonal approximation of terrains and height fields", 1995), on creases as on all else, and then where triangles are nearer to the graph or farther from it than they may be, each held against all of it.
 
-use super::super::between::middle;
+use super::super::between::{Memory, middle};
 use super::super::plane::{self, Mesh, corners, handle, inside, key};
 use super::check::{Faces, Fault};
 use super::field::Field;
@@ -220,11 +220,11 @@ impl<'a> Sheet<'a> {
         let new = self.unknown(all);
         let check = |some: &[[u32; 3]]| -> Result<Vec<Option<Fault>>, Stopped> {
             budget.cancel.check()?;
-            let mut near = Vec::new();
+            let mut memory = Memory::default();
             let fault = |triangle: &[u32; 3]| {
                 let owners = triangle.map(|vertex| self.mesh.vertex(handle(vertex)).data().owner);
                 let question = limits.question(triangle.map(|vertex| self.point(vertex)), owners);
-                self.faces.fault(&self.field, &question, &mut near)
+                self.faces.fault(&self.field, &question, &mut memory)
             };
             Ok(some.iter().map(fault).collect())
         };

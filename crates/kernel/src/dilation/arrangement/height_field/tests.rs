@@ -1,3 +1,4 @@
+use super::super::between::Memory;
 use super::super::testing::{
     arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, topology,
 };
@@ -163,7 +164,7 @@ fn triangles_are_held_against_their_bounds() {
     let (inner, outer) = (1.1, 1.4);
     let field = Field::new(&ground, &faces, [inner, outer]).unwrap();
     let distance = |x: &Point| faces.all.iter().map(|face| face.distance_squared(x)).fold(f64::INFINITY, f64::min).sqrt();
-    let (mut counts, mut near) = ([0; 3], Vec::new());
+    let (mut counts, mut memory) = ([0; 3], Memory::default());
     for _ in 0..3_000 {
         let (x, y) = (12.0 * random.share() - 1.0, 12.0 * random.share() - 1.0);
         let Some(top) = field.top([x, y], inner + (outer - inner) * (1.8 * random.share() - 0.4)) else { continue };
@@ -178,7 +179,7 @@ fn triangles_are_held_against_their_bounds() {
         }
         let close = 0.06 * wide + 1e-9;
         let question = Question { triangle, owners: [top.owner; 3], inner, outer };
-        match faces.fault(&field, &question, &mut near) {
+        match faces.fault(&field, &question, &mut memory) {
             None => {
                 assert!(found[0] >= inner - 1e-9 && found[1] <= outer + 1e-9, "{triangle:?}: {found:?}");
                 counts[0] += 1;
@@ -236,14 +237,14 @@ fn sheets_are_known_only_where_all_triangles_are_right() {
     let posts: Vec<u32> = (0..).zip(border).map(|(k, at)| sheet.raise_post(at, k, &limits).unwrap()).collect();
     let next: Vec<u32> = (0..40).map(|k| (k + 1) % 40).collect();
     assert!((0..40).all(|k| sheet.join(posts[k], posts[next[k] as usize])));
-    let (mut near, mut known) = (Vec::new(), 0);
+    let (mut memory, mut known) = (Memory::default(), 0);
     for round in 0..200 {
         // Triangles that were not mended are left, and something else is new.
         let found = sheet.check(&next, round % 3 == 0, &limits, &Budget::default()).unwrap();
         let base = sheet.base().unwrap();
         let is_right = |triangle: &[u32; 3]| {
             let question = limits.question(triangle.map(|corner| sheet.point(corner)), [u32::MAX; 3]);
-            sheet.faces.fault(&sheet.field, &question, &mut near).is_none()
+            sheet.faces.fault(&sheet.field, &question, &mut memory).is_none()
         };
         let are_right = base.iter().all(is_right);
         assert!(are_right || sheet.known_base().is_none(), "{round}");

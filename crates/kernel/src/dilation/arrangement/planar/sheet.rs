@@ -3,7 +3,7 @@
 //! Rings, and lines along creases between them, are the constraints of a Delaunay triangulation of the plane (Chew, "Constrained Delaunay triangulations", 1989). What is within the lowest rings, the rim, is the sheet's base. Above it the sheet has a height everywhere but at the rim: so it
 //! crosses nothing, nor does it meet its mirror image, which closes it. Every triangle is held against all bodies; where it is too near to one, or too far from all, places are added.
 
-use super::super::between::{Body as _, lowest, middle, too_far};
+use super::super::between::{Body as _, Memory, lowest, middle, too_far};
 use super::super::plane::{self, Edge, corners, handle, inside, join, key};
 use super::rings::Ring;
 use super::valleys::Lines;
@@ -339,7 +339,6 @@ impl Plane {
 fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Option<Fault> {
     let flat = triangle.map(|corner| [corner[0], corner[1], 0.0]);
     let within = Box32::of(&flat);
-    let mut near: Vec<u32> = Vec::new();
     let longest = (0..3).map(|k| distance_squared(&triangle[k], &triangle[(k + 1) % 3])).fold(0.0, f64::max);
     // Nothing is nearer to what is so high.
     let is_high = triangle.iter().all(|corner| corner[2] >= inner);
@@ -355,7 +354,6 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
             let body = &wires.bodies[item as usize];
             let squares = triangle.map(|corner| body.distance_squared(&corner));
             is_covered |= squares.iter().all(|&square| square <= outer * outer);
-            near.push(item);
             // The square of the distance, less that from any point, is concave: on the triangle it is no less than the least at a corner less the square of the radius of a ball around it.
             let least = squares.iter().copied().fold(f64::INFINITY, f64::min);
             if found.is_none() && !is_high && least - longest / 3.0 < inner * inner && height - body.highest(&normal) < inner {
@@ -367,7 +365,8 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
     if found.is_some() || is_covered {
         return found;
     }
-    too_far(&wires.bodies, &mut near, triangle, outer).map(Fault::Far)
+    let offer = |x: &Point| wires.closest([x[0], x[1]]).map(|(item, _)| item);
+    too_far(&wires.bodies, [], offer, triangle, outer, &mut Memory::default()).map(Fault::Far)
 }
 
 #[cfg(test)]

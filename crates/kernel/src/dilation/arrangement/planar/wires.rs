@@ -302,22 +302,28 @@ impl Wires {
         self.near(body, 2.0 * own.sqrt()).map(|other| self.bodies[other as usize].square(x)).fold(own, f64::min)
     }
 
-    /// How far a place is from the body closest to it, and the unit vector away from that, where one is within half the reach.
-    pub(super) fn away(&self, at: Place) -> Option<(f64, Place)> {
+    /// The body closest to a place, and the way from that, where one is within half the reach.
+    pub(super) fn closest(&self, at: Place) -> Option<(u32, Place)> {
         let within = Box32::of(&[[at[0], at[1], 0.0]]);
-        let mut best = (f64::INFINITY, [0.0; 2]);
+        let (mut least, mut closest) = (f64::INFINITY, None);
         self.tree.query(&within, 0, |leaf| {
             for &item in self.tree.items(leaf) {
                 let way = minus(at, self.bodies[item as usize].closest(at));
                 let square = dot(way, way);
-                if square < best.0 {
-                    best = (square, way);
+                if square < least {
+                    (least, closest) = (square, Some((item, way)));
                 }
             }
             true
         });
-        let distance = best.0.sqrt();
-        (distance > 0.0 && distance.is_finite()).then(|| (distance, best.1.map(|part| part / distance)))
+        closest
+    }
+
+    /// How far a place is from the body closest to it, and the unit vector away from that, likewise.
+    pub(super) fn away(&self, at: Place) -> Option<(f64, Place)> {
+        let (_, way) = self.closest(at)?;
+        let distance = length(way);
+        (distance > 0.0).then(|| (distance, way.map(|part| part / distance)))
     }
 
     /// Finds what is next around vertices; false where segments lie on each other.
