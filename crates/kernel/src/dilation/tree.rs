@@ -368,18 +368,25 @@ impl<'a> Tree<'a> {
         }
     }
 
+    /// The nodes below one, which is expanded unless it was: the first, and how many there are; none where it holds sites.
+    #[inline]
+    fn children(&mut self, id: NodeId) -> Option<(NodeId, u32)> {
+        match self.nodes[id as usize].content {
+            Content::Open(first, count) => Some((first, count)),
+            Content::Closed(points) => Some(self.expand(id, points)),
+            Content::Points(..) | Content::Sites(..) => None,
+        }
+    }
+
     /// A site below a node; none where there were too many nodes.
     fn first_below(&mut self, mut id: NodeId) -> Option<SiteId> {
-        loop {
-            id = match self.nodes[id as usize].content {
-                Content::Points(first, count) => return (count > 0).then_some(SiteId::Point(first)),
-                Content::Sites(first, count) => return (count > 0).then_some(SiteId::Listed(first)),
-                Content::Open(first, count) => (count > 0).then_some(first)?,
-                Content::Closed(points) => {
-                    let (first, count) = self.expand(id, points);
-                    (count > 0).then_some(first)?
-                }
-            };
+        while let Some((first, count)) = self.children(id) {
+            id = (count > 0).then_some(first)?;
+        }
+        match self.nodes[id as usize].content {
+            Content::Points(first, count) => (count > 0).then_some(SiteId::Point(first)),
+            Content::Sites(first, count) => (count > 0).then_some(SiteId::Listed(first)),
+            Content::Open(..) | Content::Closed(_) => None,
         }
     }
 
@@ -513,10 +520,11 @@ impl<'a> SiteSearch for Tree<'a> {
             }
             if node.radius < size && !matches!(node.content, Content::Points(_, 1) | Content::Sites(_, 1)) {
                 self.looked += 1;
-                if let Some(site) = self.first_below(id) {
+                if let Some(first) = self.first_below(id) {
                     self.found += 1;
-                    let closest = self.site(site).closest(x);
-                    visit(site, &closest, distance_squared(x, &closest) + self.site(site).deficit, Some(id));
+                    let site = self.site(first);
+                    let closest = site.closest(x);
+                    visit(first, &closest, distance_squared(x, &closest) + site.deficit, Some(id));
                 }
                 continue;
             }
@@ -565,13 +573,14 @@ impl<'a> SiteSearch for Tree<'a> {
     }
 
     fn add_below(&mut self, node: NodeId, nodes: &mut Vec<NodeId>, sites: &mut Vec<SiteId>) {
-        let (first, count) = match self.nodes[node as usize].content {
-            Content::Points(first, count) => return sites.extend((first..first + count).map(SiteId::Point)),
-            Content::Sites(first, count) => return sites.extend((first..first + count).map(SiteId::Listed)),
-            Content::Open(first, count) => (first, count),
-            Content::Closed(points) => self.expand(node, points),
-        };
-        nodes.extend(first..first + count);
+        if let Some((first, count)) = self.children(node) {
+            nodes.extend(first..first + count);
+        }
+        match self.nodes[node as usize].content {
+            Content::Points(first, count) => sites.extend((first..first + count).map(SiteId::Point)),
+            Content::Sites(first, count) => sites.extend((first..first + count).map(SiteId::Listed)),
+            Content::Open(..) | Content::Closed(_) => {}
+        }
     }
 
     /// Nodes that may hold a site within `reach` of x: as small as possible without becoming many.
@@ -587,12 +596,7 @@ impl<'a> SiteSearch for Tree<'a> {
             next.clear();
             let mut opened = false;
             for &id in found.iter() {
-                let children = match self.nodes[id as usize].content {
-                    Content::Open(first, count) => Some((first, count)),
-                    Content::Closed(points) => Some(self.expand(id, points)),
-                    Content::Points(..) | Content::Sites(..) => None,
-                };
-                let Some((first, count)) = children else {
+                let Some((first, count)) = self.children(id) else {
                     next.push(id);
                     continue;
                 };
