@@ -33,6 +33,7 @@ mod polytopes;
 mod solids;
 mod steady;
 mod structure;
+mod sum;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -181,20 +182,37 @@ impl Arrangement {
             }
             return Ok(Some(arrangement));
         }
+        let triangles = |list: &[Figure]| -> Option<Vec<[crate::attractor::cell::Point; 3]>> { list.iter().map(|figure| if figure.deficit == 0.0 { figure.corners().try_into().ok() } else { None }).collect() };
         let slack = CLEARED * setting.slack;
         let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
         let (error, leaves) = (kinds.error, kinds.leaves);
+        let faces = if surfaces.is_empty() { triangles(&kinds.list) } else { None };
         let (plain, left) = kinds.joined(&setting, budget)?;
         let copies = Arc::new(copies);
         if let Some(Cleared { figures, moved }) = cleared {
             let narrower = setting.narrower(moved, slack);
+            let faces = if surfaces.is_empty() { triangles(&figures) } else { None };
             let (clear, left) = Sites { list: figures, error, leaves }.joined(&narrower, budget)?;
+            if let Some(faces) = faces && let Some(flat) = sum::surface(&faces, &clear.list, &narrower, |x| copies.rounded(x), budget)? {
+                let mut arrangement = Self::empty(clear, narrower, surfaces, copies);
+                    arrangement.made = flat.triangles.len() as f64;
+                    arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
+                    arrangement.flat = Some(BlockSurface { leaves, site_error: error, ..flat });
+                return Ok(Some(arrangement));
+            }
             if (clear.list.len() as f64) < WORTH * plain.list.len() as f64
                 && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), copies.clone(), budget)?
                 && is_steady(&arrangement.sites.list[..arrangement.tubes.figures], moved + slack)?
             {
                 return Ok(Some(arrangement));
             }
+        }
+        if let Some(faces) = faces && let Some(flat) = sum::surface(&faces, &plain.list, &setting, |x| copies.rounded(x), budget)? {
+            let mut arrangement = Self::empty(plain, setting, surfaces, copies);
+                    arrangement.made = flat.triangles.len() as f64;
+                    arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
+                    arrangement.flat = Some(BlockSurface { leaves, site_error: error, ..flat });
+            return Ok(Some(arrangement));
         }
         Self::of(plain, left, setting, surfaces, copies, budget)
     }

@@ -85,6 +85,11 @@ impl Sets {
         Ok(Some(Self { doubts: vec![Vec::new(); cubes.len()], cubes }))
     }
 
+    /// Whether nothing is up to the polytopes.
+    pub(super) fn are_settled(&self) -> bool {
+        self.cubes.is_empty()
+    }
+
     /// Those that are in doubt.
     pub(super) fn doubts(&self) -> Vec<Doubt> {
         let all: BTreeMap<Set, Common> = self.doubts.iter().flatten().copied().collect();
