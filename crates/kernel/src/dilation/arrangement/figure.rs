@@ -111,6 +111,11 @@ impl Figure {
     }
 }
 
+/// The corners of figures that are triangles, with no deficit; none where others are among them.
+pub(super) fn triangles(figures: &[Figure]) -> Option<Vec<[Point; 3]>> {
+    figures.iter().map(|figure| if figure.deficit == 0.0 { figure.corners().try_into().ok() } else { None }).collect()
+}
+
 impl Convex for Figure {
     #[inline]
     fn deficit(&self) -> f64 {

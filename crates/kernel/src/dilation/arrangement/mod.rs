@@ -4,7 +4,7 @@
 //! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does, see `engine`.
 //!
-//! Points and segments in one plane need no polytopes where many are near to each other, see `planar`, nor do triangles with one height over each place of one, see `height_field`.
+//! Points and segments in one plane need no such polytopes where many are near to each other, see `planar`, nor do triangles with one height over each place of one, see `height_field`, and polygons that are near to each other only where they hang together, see `sum`.
 
 mod between;
 mod bodies;
@@ -44,7 +44,7 @@ mod tubes;
 use super::plan::{self, Setting};
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
-use crate::attractor::cell::{Cell, ControlPoint, child_points};
+use crate::attractor::cell::{Cell, ControlPoint, Point, child_points};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -101,7 +101,7 @@ pub(super) struct Arrangement {
     loose: Loose,
     /// Where parts were that are like others.
     copies: Arc<Copies>,
-    /// The surface, where all lies in a plane, or has one height over it.
+    /// The surface, where it needs no polytopes.
     flat: Option<BlockSurface>,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
@@ -113,7 +113,7 @@ pub(super) struct Arrangement {
     pub(super) triangles: f64,
 }
 
-/// What comes of figures over a plane.
+/// What comes of figures that need no polytopes.
 enum Flat {
     Made(Box<BlockSurface>),
     /// There would be far more triangles than may be: about how many.
@@ -171,67 +171,66 @@ impl Arrangement {
         };
         if let Some(flat) = flat {
             let mut arrangement = Self::empty(kinds, setting, surfaces, Arc::new(copies));
-            match flat {
-                Flat::Beyond(triangles) => (arrangement.made, arrangement.triangles) = (triangles, triangles),
-                Flat::Made(flat) => {
-                    arrangement.made = flat.triangles.len() as f64;
-                    arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
-                    let (leaves, site_error) = (arrangement.sites.leaves, arrangement.sites.error);
-                    arrangement.flat = Some(BlockSurface { leaves, site_error, ..*flat });
-                }
-            }
+            arrangement.take(flat);
             return Ok(Some(arrangement));
         }
-        let triangles = |list: &[Figure]| -> Option<Vec<[crate::attractor::cell::Point; 3]>> { list.iter().map(|figure| if figure.deficit == 0.0 { figure.corners().try_into().ok() } else { None }).collect() };
         let slack = CLEARED * setting.slack;
         let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
         let (error, leaves) = (kinds.error, kinds.leaves);
-        let faces = if surfaces.is_empty() { triangles(&kinds.list) } else { None };
+        let triangles = figure::triangles(&kinds.list);
         let (plain, left) = kinds.joined(&setting, budget)?;
         let copies = Arc::new(copies);
         if let Some(Cleared { figures, moved }) = cleared {
             let narrower = setting.narrower(moved, slack);
-            let faces = if surfaces.is_empty() { triangles(&figures) } else { None };
+            let triangles = figure::triangles(&figures);
             let (clear, left) = Sites { list: figures, error, leaves }.joined(&narrower, budget)?;
-            if let Some(faces) = faces && let Some(flat) = sum::surface(&faces, &clear.list, &narrower, |x| copies.rounded(x), budget)? {
-                let mut arrangement = Self::empty(clear, narrower, surfaces, copies);
-                    arrangement.made = flat.triangles.len() as f64;
-                    arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
-                    arrangement.flat = Some(BlockSurface { leaves, site_error: error, ..flat });
-                return Ok(Some(arrangement));
-            }
             if (clear.list.len() as f64) < WORTH * plain.list.len() as f64
-                && let Some(arrangement) = Self::of(clear, left, narrower, surfaces.clone(), copies.clone(), budget)?
+                && let Some(arrangement) = Self::of(clear, left, triangles, narrower, surfaces.clone(), copies.clone(), budget)?
                 && is_steady(&arrangement.sites.list[..arrangement.tubes.figures], moved + slack)?
             {
                 return Ok(Some(arrangement));
             }
         }
-        if let Some(faces) = faces && let Some(flat) = sum::surface(&faces, &plain.list, &setting, |x| copies.rounded(x), budget)? {
-            let mut arrangement = Self::empty(plain, setting, surfaces, copies);
-                    arrangement.made = flat.triangles.len() as f64;
-                    arrangement.triangles = arrangement.copies.triangles(&flat) as f64;
-                    arrangement.flat = Some(BlockSurface { leaves, site_error: error, ..flat });
-            return Ok(Some(arrangement));
-        }
-        Self::of(plain, left, setting, surfaces, copies, budget)
+        Self::of(plain, left, triangles, setting, surfaces, copies, budget)
     }
 
-    /// The arrangement of joined sites, with the share of faces that no polyhedron has, and the surfaces of solids; `None` likewise.
+    /// The arrangement of joined sites, with the share of faces that no polyhedron has, the triangles that they were joined of, if they were, and the surfaces of solids; `None` likewise.
     fn of(
         sites: Sites,
         left: f64,
+        triangles: Option<Vec<[Point; 3]>>,
         setting: Setting,
         solids: Vec<TriMesh>,
         copies: Arc<Copies>,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
         let mut arrangement = Self::empty(sites, setting, solids, copies);
+        if let Some(triangles) = triangles {
+            let Self { sites, setting, copies, .. } = &arrangement;
+            if let Some(surface) = sum::surface(&triangles, &sites.list, setting, |x| copies.rounded(x), budget)? {
+                arrangement.take(surface);
+                return Ok(Some(arrangement));
+            }
+        }
         // About half of what is around the faces of solids is inside of these, but where one body stands for all of them.
         let faces: usize = arrangement.solids.iter().map(|solid| solid.triangles.len()).sum();
         let inside = 0.5 * left * faces as f64 / arrangement.sites.leaves as f64;
         arrangement.inside = inside;
         Ok(arrangement.begin(budget)?.then_some(arrangement))
+    }
+
+    /// Takes a surface that needs no polytopes.
+    fn take(&mut self, flat: Flat) {
+        self.tubes = Tubes::none(self.sites.list.len());
+        match flat {
+            Flat::Beyond(triangles) => (self.made, self.triangles) = (triangles, triangles),
+            Flat::Made(flat) => {
+                self.made = flat.triangles.len() as f64;
+                self.triangles = self.copies.triangles(&flat) as f64;
+                let (leaves, site_error) = (self.sites.leaves, self.sites.error);
+                self.flat = Some(BlockSurface { leaves, site_error, ..*flat });
+            }
+        }
     }
 
     /// One without polytopes.
@@ -383,11 +382,12 @@ impl Arrangement {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn run(&mut self, budget: &Budget) -> Result<Option<Arranged>, Stopped> {
-        if let Some(surface) = self.flat.take() {
-            return Ok(Some(Arranged { surface, uncertain: 0, is_done: true }));
-        }
         let solids = std::mem::take(&mut self.solids);
         let inside: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
+        if let Some(mut surface) = self.flat.take() {
+            let is_done = solids::leave_out(&inside, &mut surface);
+            return Ok(is_done.then_some(Arranged { surface, uncertain: 0, is_done }));
+        }
         let (mut trial, mut was_bent) = (0, false);
         while trial < TRIALS {
             let (first, cells) = (std::mem::take(&mut self.polytopes), std::mem::take(&mut self.tubes.cells));

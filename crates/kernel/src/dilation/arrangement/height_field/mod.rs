@@ -24,7 +24,7 @@ mod squares;
 mod tests;
 
 use super::Flat;
-use super::figure::Figure;
+use super::figure::{self, Figure};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
@@ -67,8 +67,7 @@ pub(super) fn surface(
     round: &(dyn Fn(f64) -> f64 + Sync),
     budget: &Budget,
 ) -> Result<Option<Flat>, Stopped> {
-    let corners = |figure: &Figure| if figure.deficit == 0.0 { figure.corners().try_into().ok() } else { None };
-    let Some(triangles) = figures.iter().map(corners).collect::<Option<Vec<[Point; 3]>>>() else { return Ok(None) };
+    let Some(triangles) = figure::triangles(figures) else { return Ok(None) };
     // So that the axis is up where the others are right and ahead.
     for frame in [2, 1, 0].map(|axis| [(axis + 1) % 3, (axis + 2) % 3, axis]) {
         budget.cancel.check()?;

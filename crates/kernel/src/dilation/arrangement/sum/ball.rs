@@ -1,18 +1,19 @@
 //! A polytope between two balls, whose facets go on smoothly along three axes at right angles.
 
-use super::super::polytopes::meeting;
-use crate::attractor::cell::{Point, dot, unit};
-use std::f64::consts::FRAC_PI_2;
+use super::super::polytopes;
+use crate::attractor::cell::{Point, between, dot, unit};
 
 /// Facets at most.
-const MOST_FACETS: usize = 128;
-/// Rounds in which corners are cut off at most.
-const ROUNDS: usize = 8;
-/// What is one place, one plane, or across something, in units of the inner radius.
-const SAME: f64 = 1e-9;
+const MOST_FACETS: usize = 192;
+/// Directions that differ by less are one: noise of single precision is less, and so is what it makes of distances.
+pub(super) const SAME: f64 = 1e-5;
+/// Corners that differ by less are one, in units of the radius.
+const TINY: f64 = 1e-6;
+/// What is beyond all of a ball, in units of its offsets.
+const WIDE: f64 = 4.0;
 
 /// A convex polytope around the origin.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Ball {
     /// The unit normals of its facets.
     pub(super) facets: Vec<Point>,
@@ -22,36 +23,35 @@ pub(super) struct Ball {
     edges: Vec<[usize; 2]>,
 }
 
+/// Whether two directions are one.
+pub(super) fn is_same(a: &Point, b: &Point) -> bool {
+    (0..3).all(|axis| (a[axis] - b[axis]).abs() < SAME)
+}
+
 impl Ball {
-    /// One around the ball with the inner radius, and within that with the outer one, with few facets; none where that takes too many.
+    /// One around the ball with the inner radius, and within that with the outer one, that has facets with some normals and few corners besides; none where that takes too many facets.
     ///
-    /// Across every axis it begins as a prism over a regular polygon with 4 k sides, all of which touch the inner ball. Corners that are too far out are cut off, as far down as the next ones that are not.
-    pub(super) fn between(frame: &[Point; 3], inner: f64, outer: f64) -> Option<Self> {
-        let least = (1..=MOST_FACETS / 12).find(|&count| inner < outer * (0.5 * FRAC_PI_2 / count as f64).cos())?;
-        (least..=MOST_FACETS / 12).find_map(|count| Self::of_prisms(frame, count, inner, outer))
+    /// All of these touch the inner ball. Corners that are too far out are cut off, the farthest ones first, as far down as the next ones that are not, or as the inner ball: whichever leaves fewer.
+    pub(super) fn between(normals: impl IntoIterator<Item = Point>, inner: f64, outer: f64) -> Option<Self> {
+        let mut first = Self::default();
+        normals.into_iter().for_each(|normal| first.add(normal, inner));
+        let made = [true, false].map(|is_shallow| first.clone().cut(inner, outer, is_shallow));
+        made.into_iter().flatten().min_by_key(|own| own.corners.len())
     }
 
-    fn of_prisms(frame: &[Point; 3], count: usize, inner: f64, outer: f64) -> Option<Self> {
-        let mut own = Self::default();
-        for axis in 0..3 {
-            let [u, v] = [(axis + 1) % 3, (axis + 2) % 3].map(|axis| &frame[axis]);
-            for step in 0..4 * count {
-                let (sine, cosine) = (FRAC_PI_2 * step as f64 / count as f64).sin_cos();
-                own.add(std::array::from_fn(|axis| cosine * u[axis] + sine * v[axis]), inner);
+    fn cut(mut self, inner: f64, outer: f64, is_shallow: bool) -> Option<Self> {
+        while self.facets.len() <= MOST_FACETS {
+            self.close();
+            let square = |corner: &Point| dot(corner, corner);
+            let farthest = self.corners.iter().map(square).fold(0.0, f64::max);
+            if farthest <= outer * outer {
+                return Some(self);
             }
-        }
-        for _ in 0..ROUNDS {
-            own.close();
-            let (far, near): (Vec<Point>, Vec<Point>) = own.corners.iter().partition(|corner| dot(corner, corner) > outer * outer);
-            if far.is_empty() {
-                return Some(own);
-            }
-            for normal in far.iter().map(unit) {
+            let near: Vec<Point> = self.corners.iter().filter(|corner| is_shallow && square(corner) <= outer * outer).copied().collect();
+            let far: Vec<Point> = self.corners.iter().filter(|corner| square(corner) >= farthest * (1.0 - SAME)).map(unit).collect();
+            for normal in far {
                 let next = near.iter().map(|corner| dot(corner, &normal)).fold(inner, f64::max);
-                own.add(normal, next);
-            }
-            if own.facets.len() > MOST_FACETS {
-                return None;
+                self.add(normal, next);
             }
         }
         None
@@ -59,38 +59,54 @@ impl Ball {
 
     /// Adds a facet, unless there is one with the same normal.
     fn add(&mut self, normal: Point, offset: f64) {
-        if self.facets.iter().all(|own| dot(own, &normal) < 1.0 - SAME) {
+        if !self.facets.iter().any(|own| is_same(own, &normal)) {
             self.facets.push(normal);
             self.offsets.push(offset);
         }
     }
 
-    /// Finds corners, each of which is on three planes or more, and edges, both ends of which are on two.
+    /// Finds corners, each of which is on three planes or more, and edges: what is left of every plane by the others.
     fn close(&mut self) {
         let Self { facets, offsets, corners, edges } = self;
         corners.clear();
         edges.clear();
-        let count = facets.len();
-        let spare = SAME * offsets.iter().copied().fold(f64::INFINITY, f64::min);
-        let is_same = |a: &Point, b: &Point| (0..3).all(|axis| (a[axis] - b[axis]).abs() < 4.0 * spare);
-        for a in 0..count {
-            for b in a + 1..count {
-                let before = corners.len();
-                let mut ends: Vec<Point> = Vec::new();
-                for c in (0..count).filter(|&c| c != a && c != b) {
-                    let Some(x) = meeting([a, b, c].map(|facet| &facets[facet]), [a, b, c].map(|facet| offsets[facet])) else { continue };
-                    let is_inside = facets.iter().zip(offsets.iter()).all(|(normal, offset)| dot(normal, &x) <= offset + spare);
-                    if is_inside && !ends.iter().any(|end| is_same(end, &x)) {
-                        ends.push(x);
+        let widest = offsets.iter().copied().fold(0.0, f64::max);
+        let tiny = TINY * widest;
+        let widest = WIDE * widest;
+        let is_one = |a: &Point, b: &Point| (0..3).all(|axis| (a[axis] - b[axis]).abs() < tiny);
+        for (own, (normal, offset)) in facets.iter().zip(offsets.iter()).enumerate() {
+            let [u, v, _] = polytopes::frame(normal);
+            // Corners, each with the facet that is across the side after it.
+            let far = widest;
+            let corner = |(x, y): (f64, f64)| -> Point { std::array::from_fn(|axis| offset * normal[axis] + x * u[axis] + y * v[axis]) };
+            let mut outline: Vec<(Point, usize)> =
+                [(far, far), (-far, far), (-far, -far), (far, -far)].map(|at| (corner(at), own)).to_vec();
+            for (other, (normal, offset)) in facets.iter().zip(offsets.iter()).enumerate().filter(|(other, _)| *other != own) {
+                let above: Vec<f64> = outline.iter().map(|(at, _)| dot(normal, at) - offset).collect();
+                if above.iter().all(|&above| above <= tiny) {
+                    continue;
+                }
+                let mut left = Vec::with_capacity(outline.len() + 1);
+                for (k, &(at, across)) in outline.iter().enumerate() {
+                    let next = (k + 1) % outline.len();
+                    let crossing = || between(&at, &outline[next].0, above[k] / (above[k] - above[next]));
+                    match (above[k] <= tiny, above[next] <= tiny) {
+                        (true, true) => left.push((at, across)),
+                        (true, false) => left.extend([(at, across), (if above[k] < -tiny { crossing() } else { at }, other)]),
+                        (false, true) => left.push((if above[next] < -tiny { crossing() } else { outline[next].0 }, across)),
+                        (false, false) => {}
                     }
                 }
-                if ends.len() > 1 {
-                    edges.push([a, b]);
+                outline = left;
+            }
+            let count = outline.len();
+            outline = (0..count).filter(|&k| !is_one(&outline[k].0, &outline[(k + 1) % count].0)).map(|k| outline[k]).collect();
+            for (at, across) in outline {
+                if own < across {
+                    edges.push([own, across]);
                 }
-                for end in ends {
-                    if !corners[..before].iter().any(|corner| is_same(corner, &end)) {
-                        corners.push(end);
-                    }
+                if !corners.iter().any(|corner| is_one(corner, &at)) {
+                    corners.push(at);
                 }
             }
         }
@@ -128,22 +144,35 @@ mod tests {
     #[test]
     fn balls_are_between_the_radii() {
         let mut random = Random(5);
-        for (round, outer) in [1.7, 1.3, 1.2, 1.178, 1.1, 1.051, 1.03].into_iter().enumerate() {
+        for (round, outer) in [1.7, 1.3, 1.2, 1.178, 1.051, 1.1, 1.04].into_iter().enumerate() {
             let mut any = || unit(&std::array::from_fn(|_| random.share() - 0.5));
-            let z = any();
-            let x = unit(&cross(&z, &any()));
-            let frame = if round % 2 == 0 { [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] } else { [x, cross(&z, &x), z] };
-            let ball = Ball::between(&frame, 1.0, outer).expect("few facets");
-            println!("{outer}: {} facets {} corners {} edges", ball.facets.len(), ball.corners.len(), ball.edges.len());
+            let frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let normals: Vec<Point> = if round % 2 == 0 { frame.to_vec() } else { (0..3).map(|_| any()).collect() };
+            let both = normals.iter().flat_map(|normal| [*normal, normal.map(|part| -part)]);
+            let ball = Ball::between(both, 1.0, outer).expect("few facets");
+            println!("{outer}: {} facets {} corners", ball.facets.len(), ball.corners.len());
             assert_eq!(ball.facets.len() + ball.corners.len(), ball.edges.len() + 2);
-            for direction in (0..500).map(|_| any()).chain(frame) {
+            for direction in (0..100).map(|_| any()).chain(frame) {
                 let reach = ball.reach(&direction);
                 assert!((1.0 - 1e-9..=outer).contains(&reach));
+                // The shadow is what its sides leave of the plane across the direction.
                 let sides: Vec<Point> = ball.sides(&direction).collect();
-                assert!(sides.len() >= 3 && sides.iter().all(|side| dot(side, &direction).abs() < 1e-9));
-                let half = sides.iter().map(|side| side.map(|part| ball.reach(side) * part));
-                let sum = half.fold([0.0; 3], |sum: Point, part| std::array::from_fn(|axis| sum[axis] + part[axis]));
-                assert!(dot(&sum, &sum) < 0.1, "{sum:?}");
+                assert!(sides.iter().all(|side| dot(side, &direction).abs() < 1e-9));
+                let across = unit(&cross(&direction, &sides[0]));
+                let corners: Vec<Point> = (0..sides.len())
+                    .flat_map(|k| (0..k).map(move |other| (k, other)))
+                    .filter_map(|(k, other)| {
+                        let pair = [&sides[k], &sides[other], &direction];
+                        polytopes::meeting(pair, [ball.reach(pair[0]), ball.reach(pair[1]), 0.0])
+                    })
+                    .filter(|corner| sides.iter().all(|side| dot(side, corner) <= ball.reach(side) + 1e-9))
+                    .collect();
+                for step in 0..40 {
+                    let (sine, cosine) = (0.157 * f64::from(step)).sin_cos();
+                    let way: Point = std::array::from_fn(|axis| cosine * sides[0][axis] + sine * across[axis]);
+                    let reach = corners.iter().map(|corner| dot(corner, &way)).fold(0.0, f64::max);
+                    assert!((reach - ball.reach(&way)).abs() < 1e-6, "{outer}: {reach} {}", ball.reach(&way));
+                }
             }
         }
     }

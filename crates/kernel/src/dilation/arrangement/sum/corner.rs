@@ -3,14 +3,17 @@
 //! A sector C is a convex cone in a plane with the vertex at its tip, and K = C + B (Minkowski sum) is the set of x with n . x <= h(n) for all n that are normals of C's plane, of facets of B below which C is, or of sides of B's shadow along a side of C below which C is. Here h(n) is how far B reaches along n, so that a plane
 //! has the same place for all sectors that have it: the facets of several sectors are one, and where they end within one of another nothing is to be seen. All K hold the vertex in their interior. So does their union along every way out: it is a graph over directions.
 //!
-//! Its edges are on lines where two planes meet. Along one it is known, interval by interval, which K it is inside of, or on one of the planes of, or on both: see [`Kind`].
+//! Its edges are on lines where planes meet. Along one it is known, interval by interval, which K hold it, and what the others have of the ways across it: see [`Wedge`].
 
-use super::ball::Ball;
+use super::ball::{Ball, SAME, is_same};
 use crate::attractor::cell::{Point, cross, dot, unit};
+use std::f64::consts::{FRAC_PI_2 as QUARTER, TAU};
 
-/// What is one place, in units of the ball's radius; and one direction.
-const SAME: f64 = 1e-7;
-pub(super) const PARALLEL: f64 = 1e-9;
+/// Planes whose normals have a smaller sine than this have no line in common to speak of.
+const LEAST_SINE: f64 = 1e-3;
+/// Parts of lines that are shorter are none, and points closer to each other are one, in units of the radius: what noise makes of points where more than three planes meet.
+const TINY: f64 = 1e-4;
+const ONE: f64 = 4.0;
 /// Sectors are cut to this angle at most, if they are wider than the other.
 const WIDE: f64 = 2.9;
 const NARROWER: f64 = 2.1;
@@ -47,15 +50,33 @@ pub(super) struct Patch {
     pub(super) chains: Vec<Chain>,
 }
 
-/// How a body has part of a line on its boundary, or inside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Inside,
-    /// It is on one plane.
-    First,
-    Second,
-    /// It is on both: its own edge.
-    Both,
+/// What a body has of the ways across a line that is on some of its planes: from one angle on, counter-clockwise, to another, and the planes that it ends at.
+#[derive(Clone, Copy, Debug)]
+struct Wedge {
+    angles: [f64; 2],
+    planes: [usize; 2],
+}
+
+/// A part of a line that is an edge, with the facet that has it on its left, and the one that has it on its right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    ends: [f64; 2],
+    facets: [usize; 2],
+}
+
+/// A line, and what is known of all planes along it: how far below each it begins, and how steeply it goes up to it.
+#[derive(Default)]
+struct Line {
+    from: Point,
+    way: Point,
+    left: Vec<f64>,
+    slopes: Vec<f64>,
+    /// The planes that it is on, in ascending order, with the angles of their normals about it, of which the first is 0.
+    own: Vec<(usize, f64)>,
+    /// What bodies have along it and across it; all across where they hold it.
+    parts: Vec<([f64; 2], Option<Wedge>)>,
+    stops: Vec<f64>,
+    spans: Vec<Span>,
 }
 
 /// An end of an edge: a point, or a way out.
@@ -87,9 +108,9 @@ impl Patch {
                 around.add(&arc.normal, [way(step as f64), way(step as f64 + 1.0)], ball)?;
             }
         }
-        around.tiny = SAME * around.heights.iter().copied().fold(f64::INFINITY, f64::min);
+        around.tiny = TINY * around.heights.iter().copied().fold(f64::INFINITY, f64::min);
         let sides = around.sides()?;
-        let arc_of = |normal: &Point| arcs.iter().position(|arc| dot(&arc.normal, normal).abs() > 1.0 - PARALLEL);
+        let arc_of = |normal: &Point| arcs.iter().position(|arc| is_same(&arc.normal, normal) || is_same(&arc.normal.map(|part| -part), normal));
         let mut chains = Vec::new();
         for (facet, mut sides) in sides.into_iter().enumerate() {
             let normal = around.normals[facet];
@@ -140,7 +161,7 @@ struct Around<'a> {
 impl Around<'_> {
     /// Adds the body of a sector.
     fn add(&mut self, up: &Point, sides: [Point; 2], ball: &Ball) -> Option<()> {
-        let is_below = |normal: &Point| sides.iter().all(|side| dot(side, normal) <= PARALLEL);
+        let is_below = |normal: &Point| sides.iter().all(|side| dot(side, normal) <= SAME);
         let of_sides = sides.iter().flat_map(|side| ball.sides(side)).filter(is_below);
         let all: Vec<Point> =
             [*up, up.map(|part| -part)].into_iter().chain(ball.facets.iter().copied().filter(is_below)).chain(of_sides).collect();
@@ -153,133 +174,167 @@ impl Around<'_> {
 
     /// The number of a plane.
     fn plane(&mut self, normal: &Point, ball: &Ball) -> usize {
-        let is_same = |own: &Point| dot(own, normal) > 1.0 - PARALLEL && (0..3).all(|axis| (own[axis] - normal[axis]).abs() < SAME);
-        self.normals.iter().position(is_same).unwrap_or_else(|| {
+        self.normals.iter().position(|own| is_same(own, normal)).unwrap_or_else(|| {
             self.normals.push(*normal);
             self.heights.push(ball.reach(normal));
             self.normals.len() - 1
         })
     }
 
-    /// The sides of every facet.
+    /// The sides of every facet; none where more than two facets meet along an edge, or an edge leads far out along no way.
     fn sides(&mut self) -> Option<Vec<Vec<Side>>> {
         let count = self.normals.len();
         let mut sides: Vec<Vec<Side>> = vec![Vec::new(); count];
-        let mut spans = Vec::new();
+        let mut line = Line::default();
         for first in 0..count {
             for second in first + 1..count {
-                let (n, m) = (self.normals[first], self.normals[second]);
-                let cosine = dot(&n, &m);
-                let square = 1.0 - cosine * cosine;
-                if square < PARALLEL {
+                if !self.line([first, second], &mut line) {
                     continue;
                 }
-                let [a, b] = [first, second].map(|plane| self.heights[plane]);
-                let shares = [(a - cosine * b) / square, (b - cosine * a) / square];
-                let from: Point = std::array::from_fn(|axis| shares[0] * n[axis] + shares[1] * m[axis]);
-                let way = unit(&cross(&n, &m));
-                self.spans([first, second], &from, &way, &mut spans);
-                for &([low, high], is_ridge) in &spans {
-                    let ends = [(low, -1.0), (high, 1.0)];
-                    let mut made = [End::Point(0); 2];
-                    for (end, (at, sign)) in made.iter_mut().zip(ends) {
-                        *end = if at.is_finite() {
-                            End::Point(self.point(std::array::from_fn(|axis| from[axis] + at * way[axis])))
-                        } else {
-                            End::Out(self.ways.iter().position(|own| sign * dot(own, &way) > 1.0 - PARALLEL)?)
-                        };
+                self.spans(&mut line)?;
+                for &Span { ends: [low, high], facets: [left, right] } in &line.spans {
+                    let end = |at: f64, sign: f64, points: &mut Vec<Point>| {
+                        if at.is_finite() {
+                            let at: Point = std::array::from_fn(|axis| line.from[axis] + at * line.way[axis]);
+                            return Some(End::Point(number(points, at, ONE * self.tiny)));
+                        }
+                        self.ways.iter().position(|own| is_same(own, &line.way.map(|part| sign * part))).map(End::Out)
+                    };
+                    let ends = [end(low, -1.0, &mut self.points)?, end(high, 1.0, &mut self.points)?];
+                    if ends[0] != ends[1] || matches!(ends[0], End::Out(_)) {
+                        sides[left].push(Side { across: right, ends });
+                        sides[right].push(Side { across: left, ends: [ends[1], ends[0]] });
                     }
-                    // The first facet is to the left of the line, seen from outside, where that is below the second along a ridge.
-                    let is_left = is_ridge;
-                    let [low, high] = made;
-                    let (along, against) = ([low, high], [high, low]);
-                    sides[first].push(Side { across: second, ends: if is_left { along } else { against } });
-                    sides[second].push(Side { across: first, ends: if is_left { against } else { along } });
                 }
             }
         }
         Some(sides)
     }
 
-    /// The number of a point.
-    fn point(&mut self, at: Point) -> u32 {
-        let is_same = |own: &Point| (0..3).all(|axis| (own[axis] - at[axis]).abs() < 16.0 * self.tiny);
-        self.points.iter().position(is_same).unwrap_or_else(|| {
-            self.points.push(at);
-            self.points.len() - 1
-        }) as u32
+    /// The line on two planes; false where there is none, or it was looked at as another two planes' line.
+    fn line(&self, [first, second]: [usize; 2], line: &mut Line) -> bool {
+        let (n, m) = (&self.normals[first], &self.normals[second]);
+        let (across, cosine) = (cross(n, m), dot(n, m));
+        let square = dot(&across, &across);
+        if square < LEAST_SINE * LEAST_SINE {
+            return false;
+        }
+        let [a, b] = [first, second].map(|plane| self.heights[plane]);
+        let shares = [(a - cosine * b) / square, (b - cosine * a) / square];
+        line.from = std::array::from_fn(|axis| shares[0] * n[axis] + shares[1] * m[axis]);
+        line.way = unit(&across);
+        let (from, way) = (&line.from, &line.way);
+        line.left.clear();
+        line.left.extend(self.normals.iter().zip(&self.heights).map(|(normal, height)| height - dot(normal, from)));
+        line.slopes.clear();
+        line.slopes.extend(self.normals.iter().map(|normal| dot(normal, way)));
+        let ahead = cross(way, n);
+        line.own.clear();
+        for plane in 0..self.normals.len() {
+            if line.slopes[plane].abs() < SAME && line.left[plane].abs() < self.tiny {
+                if line.own.len() == 1 && plane < second || line.own.is_empty() && plane < first {
+                    return false;
+                }
+                let normal = &self.normals[plane];
+                line.own.push((plane, dot(normal, &ahead).atan2(dot(normal, n))));
+            }
+        }
+        true
     }
 
-    /// Where a line on two planes is an edge of the union, and whether that is a ridge, rather than a valley.
-    ///
-    /// It is nowhere inside of a body. Bodies with it on one plane each make a valley, and one with it on both makes a ridge, unless there is one with it on one plane only: then that goes on.
-    fn spans(&self, planes: [usize; 2], from: &Point, way: &Point, spans: &mut Vec<([f64; 2], bool)>) {
+    /// The parts of a line that are edges of the union: there no body is all around, and what bodies have across it, together, ends at two planes. None where it ends at more.
+    fn spans(&self, line: &mut Line) -> Option<()> {
+        let Line { left, slopes, own, parts, stops, spans, .. } = line;
         spans.clear();
-        let mut parts: Vec<([f64; 2], Kind)> = Vec::new();
-        let mut has_edge = [false; 3];
+        parts.clear();
         for body in &self.bodies {
-            let has = planes.map(|plane| body.binary_search(&plane).is_ok());
-            let kind = match has {
-                [false, false] => Kind::Inside,
-                [true, false] => Kind::First,
-                [false, true] => Kind::Second,
-                [true, true] => Kind::Both,
-            };
             let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-            for &plane in body.iter().filter(|plane| !planes.contains(plane)) {
-                let normal = &self.normals[plane];
-                let (left, slope) = (self.heights[plane] - dot(normal, from), dot(normal, way));
-                if slope.abs() < PARALLEL {
-                    if left < self.tiny {
-                        high = f64::NEG_INFINITY;
-                        break;
+            // The least and the largest angle of its planes that the line is on: those between do not matter.
+            let mut ends: Option<[(usize, f64); 2]> = None;
+            for &plane in body {
+                if let Some(&(_, angle)) = own.iter().find(|(number, _)| *number == plane) {
+                    let [least, most] = ends.get_or_insert([(plane, angle); 2]);
+                    // No wedge is wider than half of all around, and none is nothing: the angles of its planes are within half, too.
+                    let angle = angle - TAU * ((angle - least.1) / TAU).round();
+                    if angle < least.1 {
+                        *least = (plane, angle);
                     }
-                } else if slope > 0.0 {
-                    high = high.min(left / slope);
+                    if angle > most.1 {
+                        *most = (plane, angle);
+                    }
+                } else if slopes[plane].abs() < SAME {
+                    if left[plane] < 0.0 {
+                        high = f64::NEG_INFINITY;
+                    }
+                } else if slopes[plane] > 0.0 {
+                    high = high.min(left[plane] / slopes[plane]);
                 } else {
-                    low = low.max(left / slope);
+                    low = low.max(left[plane] / slopes[plane]);
                 }
                 if high - low < self.tiny {
                     break;
                 }
             }
             if high - low >= self.tiny {
-                match kind {
-                    Kind::Inside => {}
-                    Kind::First => has_edge[0] = true,
-                    Kind::Second => has_edge[1] = true,
-                    Kind::Both => has_edge[2] = true,
-                }
-                parts.push(([low, high], kind));
+                let wedge = ends.map(|[least, most]| Wedge { angles: [most.1 + QUARTER, least.1 + 3.0 * QUARTER], planes: [most.0, least.0] });
+                parts.push(([low, high], wedge));
             }
         }
-        if !has_edge[2] && !(has_edge[0] && has_edge[1]) {
-            return;
+        if !parts.iter().any(|(_, wedge)| wedge.is_some()) {
+            return Some(());
         }
-        let mut stops: Vec<f64> = parts.iter().flat_map(|(ends, _)| *ends).chain([f64::NEG_INFINITY, f64::INFINITY]).collect();
+        stops.clear();
+        stops.extend(parts.iter().flat_map(|(ends, _)| *ends).chain([f64::NEG_INFINITY, f64::INFINITY]));
         stops.sort_unstable_by(f64::total_cmp);
         for pair in stops.windows(2) {
             let [low, high] = [pair[0], pair[1]];
-            if high - low < self.tiny || low == high {
+            if low == high || high - low < self.tiny {
                 continue;
             }
             let middle = match (low.is_finite(), high.is_finite()) {
                 (true, true) => 0.5 * (low + high),
-                (true, false) => low + 1.0,
-                (false, true) => high - 1.0,
+                (true, false) => low + self.tiny,
+                (false, true) => high - self.tiny,
                 (false, false) => 0.0,
             };
-            let mut has = [false; 4];
-            parts.iter().filter(|([low, high], _)| *low < middle && middle < *high).for_each(|(_, kind)| has[*kind as usize] = true);
-            let is_valley = has[Kind::First as usize] && has[Kind::Second as usize];
-            let is_ridge = has[Kind::Both as usize] && !has[Kind::First as usize] && !has[Kind::Second as usize];
-            if has[Kind::Inside as usize] || !(is_valley || is_ridge) {
+            let here = || parts.iter().filter(|([low, high], _)| *low < middle && middle < *high).map(|(_, wedge)| wedge);
+            if here().any(Option::is_none) {
+                continue;
+            }
+            let wedges = || here().flatten();
+            let is_left_open = |side: usize, wedge: &&Wedge| {
+                let at = wedge.angles[side];
+                !wedges().any(|other| {
+                    let from = (at - other.angles[0]).rem_euclid(TAU);
+                    let wide = other.angles[1] - other.angles[0];
+                    if side == 0 { SAME < from && from < wide + SAME } else { from < wide - SAME || from > TAU - SAME }
+                })
+            };
+            let mut facets = [usize::MAX; 2];
+            for (side, facet) in facets.iter_mut().enumerate() {
+                let mut all = wedges().filter(|wedge| is_left_open(side, wedge)).map(|wedge| wedge.planes[side]);
+                let Some(found) = all.next() else { continue };
+                *facet = found;
+                all.all(|other| other == found).then_some(())?;
+            }
+            let [right, left] = facets;
+            if right == left {
                 continue;
             }
             match spans.last_mut() {
-                Some((last, was_ridge)) if *was_ridge == is_ridge && low - last[1] < self.tiny => last[1] = high,
-                _ => spans.push(([low, high], is_ridge)),
+                Some(last) if last.facets == [left, right] && low - last.ends[1] < self.tiny => last.ends[1] = high,
+                _ => spans.push(Span { ends: [low, high], facets: [left, right] }),
             }
         }
+        Some(())
     }
+}
+
+/// The number of a point among others.
+fn number(points: &mut Vec<Point>, at: Point, tiny: f64) -> u32 {
+    let is_one = |own: &Point| (0..3).all(|axis| (own[axis] - at[axis]).abs() < tiny);
+    points.iter().position(is_one).unwrap_or_else(|| {
+        points.push(at);
+        points.len() - 1
+    }) as u32
 }

@@ -1,12 +1,21 @@
 //! Triangles with what is around their vertices: arcs, which are triangles with a common vertex that lie beside each other in a plane.
 
-use super::corner::{Arc, PARALLEL};
+use super::ball::{SAME, is_same};
+use super::corner::{Arc, Patch};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
+use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Triangles at a vertex at most.
 const MOST_AROUND: usize = 64;
+/// Kinds of vertices at most, and so many vertices are alike at least, but for a few: others are no cheaper than polytopes.
+const MOST_KINDS: usize = 1_024;
+const LEAST_ALIKE: usize = 4;
+const FEW_KINDS: usize = 48;
+/// Vertices that are looked at before a stop is noticed.
+const IN_A_ROW: u32 = 1_024;
 /// A direction from which planes are seen that no model is likely to have.
 const VIEW: Point = [0.533_1, 0.341_7, 0.773_9];
 
@@ -74,18 +83,12 @@ impl Net {
         Some(Self { places, triangles, normals, first, around })
     }
 
-    pub(super) fn vertices(&self) -> u32 {
-        self.places.len() as u32
-    }
-
+    /// The unit normal of a triangle.
     pub(super) fn normal(&self, triangle: u32) -> &Point {
         &self.normals[triangle as usize]
     }
 
-    pub(super) fn normals(&self) -> &[Point] {
-        &self.normals
-    }
-
+    /// What a triangle is to one of its corners.
     fn sector(&self, vertex: u32, triangle: u32) -> Sector {
         let corners = self.triangles[triangle as usize];
         let k = corners.iter().position(|&corner| corner == vertex).unwrap_or_default();
@@ -100,8 +103,8 @@ impl Net {
         Sector { triangle, ends, ways, normal }
     }
 
-    /// What is around a vertex, with triangles that are joined in arcs as groups; none where that is too much.
-    pub(super) fn fan(&self, vertex: u32, fan: &mut Fan, groups: &mut Groups) -> Option<()> {
+    /// What is around a vertex, whose triangles are joined to faces where they lie in one plane; none where that is too much.
+    fn fan(&self, vertex: u32, fan: &mut Fan, faces: &mut Groups) -> Option<()> {
         let list = &self.around[self.first[vertex as usize] as usize..self.first[vertex as usize + 1] as usize];
         (list.len() <= MOST_AROUND).then_some(())?;
         let sectors: Vec<Sector> = list.iter().map(|&triangle| self.sector(vertex, triangle)).collect();
@@ -116,11 +119,11 @@ impl Net {
             let mut beside = sectors.iter().enumerate().filter(|(other, theirs)| *other != k && theirs.ends.contains(&sector.ends[1]));
             if let (Some((other, theirs)), None) = (beside.next(), beside.next())
                 && theirs.ends[0] == sector.ends[1]
-                && dot(&sector.normal, &theirs.normal) > 1.0 - PARALLEL
+                && is_same(&sector.normal, &theirs.normal)
             {
                 after[k] = Some(other);
                 has_before[other] = true;
-                groups.join(sector.triangle as usize, theirs.triangle as usize);
+                faces.join(sector.triangle as usize, theirs.triangle as usize);
             }
         }
         let mut is_used = vec![false; sectors.len()];
@@ -150,11 +153,74 @@ impl Net {
         }
         // What lies in one plane is one face, at all vertices.
         for k in 1..fan.arcs.len() {
-            if let Some(same) = (0..k).find(|&same| dot(&fan.arcs[same].normal, &fan.arcs[k].normal) > 1.0 - PARALLEL) {
-                groups.join(fan.triangles[same] as usize, fan.triangles[k] as usize);
+            if let Some(same) = (0..k).find(|&same| is_same(&fan.arcs[same].normal, &fan.arcs[k].normal)) {
+                faces.join(fan.triangles[same] as usize, fan.triangles[k] as usize);
             }
         }
         Some(())
+    }
+}
+
+/// A vertex that is not flat.
+#[derive(Debug)]
+pub(super) struct Vertex {
+    pub(super) kind: u32,
+    /// See [`Fan`].
+    pub(super) ends: Vec<u32>,
+    pub(super) triangles: Vec<u32>,
+}
+
+/// The vertices of a net by what is around them.
+pub(super) struct Kinds {
+    /// What differs in where it is alone is of one kind.
+    pub(super) fans: Vec<Fan>,
+    /// None where all is flat.
+    pub(super) vertices: Vec<Option<Vertex>>,
+    /// The triangles that hang together in a plane, or have a vertex in common there.
+    pub(super) faces: Groups,
+}
+
+impl Kinds {
+    /// Those of a net; none where few vertices are alike, or there is too much around one.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of(net: &Net, budget: &Budget) -> Result<Option<Self>, Stopped> {
+        let count = net.places.len();
+        let most = MOST_KINDS.min(FEW_KINDS + count / LEAST_ALIKE);
+        let (mut fans, mut vertices, mut faces) = (Vec::<Fan>::new(), Vec::with_capacity(count), Groups::new(net.triangles.len()));
+        let mut known: NameMap<[u64; 2], Vec<u32>> = NameMap::default();
+        let mut fan = Fan::default();
+        for vertex in 0..count as u32 {
+            if vertex % IN_A_ROW == 0 {
+                budget.cancel.check()?;
+            }
+            if net.fan(vertex, &mut fan, &mut faces).is_none() {
+                return Ok(None);
+            }
+            if fan.is_flat() {
+                vertices.push(None);
+                continue;
+            }
+            fan.sort();
+            let alike = known.entry([fan.ways.len() as u64, fan.arcs.len() as u64]).or_default();
+            let new = fans.len() as u32;
+            let kind = alike.iter().copied().find(|&kind| fans[kind as usize].is_like(&fan)).unwrap_or(new);
+            vertices.push(Some(Vertex { kind, ends: fan.ends.clone(), triangles: fan.triangles.clone() }));
+            if kind == new {
+                if fans.len() == most {
+                    return Ok(None);
+                }
+                alike.push(kind);
+                fans.push(std::mem::take(&mut fan));
+            }
+        }
+        Ok(Some(Self { fans, vertices, faces }))
+    }
+
+    /// How many points there are in all.
+    pub(super) fn points(&self, patches: &[Patch]) -> f64 {
+        self.vertices.iter().flatten().map(|vertex| patches[vertex.kind as usize].points.len() as f64).sum()
     }
 }
 
@@ -168,37 +234,65 @@ impl Fan {
         })
     }
 
-    /// Puts its ways, and its arcs, in an order that is the same for all fans that differ in where they are, and gives them a name.
-    pub(super) fn name(&mut self) -> Vec<i32> {
-        // Halfway between numbers that models are likely to have.
-        let rounded = |x: f64| (x * NAMED + 0.37).floor() as i32;
-        let of = |way: &Point| way.map(rounded);
+    /// Puts its ways, and its arcs, in an order that is the same for all fans that differ in where they are alone.
+    fn sort(&mut self) {
         let mut order: Vec<usize> = (0..self.ways.len()).collect();
-        order.sort_by_key(|&way| of(&self.ways[way]));
+        order.sort_by(|&a, &b| dot(&self.ways[a], &VIEW).total_cmp(&dot(&self.ways[b], &VIEW)));
         let mut place = vec![0; order.len()];
         order.iter().enumerate().for_each(|(to, &from)| place[from] = to);
         (self.ends, self.ways) = order.iter().map(|&way| (self.ends[way], self.ways[way])).unzip();
         for arc in &mut self.arcs {
             arc.ways = arc.ways.map(|ways| ways.map(|way| place[way]));
         }
-        let key = |arc: &Arc| (arc.normal.map(rounded), of(&arc.from), rounded(arc.angle), arc.ways);
         let mut all: Vec<(Arc, u32)> = self.arcs.iter().copied().zip(self.triangles.iter().copied()).collect();
-        all.sort_by_key(|(arc, _)| key(arc));
+        let along = |arc: &Arc| dot(&arc.normal, &VIEW);
+        all.sort_by(|(a, _), (b, _)| a.ways.cmp(&b.ways).then(along(a).total_cmp(&along(b))));
         (self.arcs, self.triangles) = all.into_iter().unzip();
-        let ways = self.ways.iter().flat_map(of);
-        let arcs = self.arcs.iter().flat_map(|arc| {
-            let (normal, from, angle, ways) = key(arc);
-            let ways = ways.map_or([-1; 2], |ways| ways.map(|way| way as i32));
-            normal.into_iter().chain(from).chain([angle]).chain(ways)
-        });
-        ways.chain([i32::MAX]).chain(arcs).collect()
+    }
+
+    /// Whether two fans, sorted, differ in where they are alone.
+    fn is_like(&self, other: &Self) -> bool {
+        let are_alike = |(a, b): (&Arc, &Arc)| {
+            a.ways == b.ways && is_same(&a.normal, &b.normal) && is_same(&a.from, &b.from) && (a.angle - b.angle).abs() < SAME
+        };
+        (self.ways.len(), self.arcs.len()) == (other.ways.len(), other.arcs.len())
+            && self.ways.iter().zip(&other.ways).all(|(a, b)| is_same(a, b))
+            && self.arcs.iter().zip(&other.arcs).all(are_alike)
+    }
+
+    /// The normals of facets that go on smoothly along its ways: those of arcs, and where two arcs have more than half of all around a way between them, so many between theirs that none turns from the next by more than an angle.
+    pub(super) fn normals(&self, widest: f64) -> Vec<Point> {
+        let mut normals: Vec<Point> = self.arcs.iter().flat_map(|arc| [arc.normal, arc.normal.map(|part| -part)]).collect();
+        for (number, way) in self.ways.iter().enumerate() {
+            // The ways into arcs, across their side.
+            let mut inward: Vec<Point> = Vec::new();
+            for arc in &self.arcs {
+                let [first, last] = arc.ways.map_or([false; 2], |ways| ways.map(|way| way == number));
+                let left = cross(&arc.normal, way);
+                inward.extend(first.then_some(left));
+                inward.extend(last.then_some(left.map(|part| -part)));
+            }
+            let Some(origin) = inward.first().copied() else { continue };
+            let ahead = cross(way, &origin);
+            let mut angles: Vec<f64> = inward.iter().map(|way| dot(way, &ahead).atan2(dot(way, &origin)).rem_euclid(TAU)).collect();
+            angles.sort_by(f64::total_cmp);
+            for (k, &from) in angles.iter().enumerate() {
+                let to = angles.get(k + 1).copied().unwrap_or(angles[0] + TAU);
+                let turn = to - from - PI;
+                if turn > SAME {
+                    let steps = (turn / widest).ceil();
+                    normals.extend((1..steps as u32).map(|step| {
+                        let (sine, cosine) = (from + FRAC_PI_2 + turn * f64::from(step) / steps).sin_cos();
+                        unit(&std::array::from_fn(|axis| cosine * origin[axis] + sine * ahead[axis]))
+                    }));
+                }
+            }
+        }
+        normals
     }
 
     /// Whether all of it is flat: nothing but what is above and below it is to be seen.
-    pub(super) fn is_flat(&self) -> bool {
+    fn is_flat(&self) -> bool {
         matches!(&self.arcs[..], [Arc { ways: None, .. }])
     }
 }
-
-/// Steps of a unit that names tell apart.
-const NAMED: f64 = 1e6;
