@@ -29,16 +29,23 @@ pub(super) fn is_same(a: &Point, b: &Point) -> bool {
 }
 
 impl Ball {
-    /// One around the ball with the inner radius, and within that with the outer one, that has facets with some normals and few corners besides; none where that takes too many facets.
+    /// One around the ball with the inner radius, and within that with the outer one, that has facets with the first normals, and with the others as far as they turn from all before by an angle, and few corners besides; none where that takes too many facets.
     ///
     /// All of these touch the inner ball. Corners that are too far out are cut off, the farthest ones first, as far down as the next ones that are not, or as the inner ball: whichever leaves fewer.
-    pub(super) fn between(normals: impl IntoIterator<Item = Point>, inner: f64, outer: f64) -> Option<Self> {
+    pub(super) fn between(normals: [&[Point]; 2], least: f64, inner: f64, outer: f64) -> Option<Self> {
         let mut first = Self::default();
-        normals.into_iter().for_each(|normal| first.add(normal, inner));
+        normals[0].iter().for_each(|normal| first.add(*normal, inner));
+        for normal in normals[1] {
+            let is_apart = |own: &Point| dot(own, normal) < least.cos();
+            if first.facets.iter().all(is_apart) {
+                first.add(*normal, inner);
+            }
+        }
         let made = [true, false].map(|is_shallow| first.clone().cut(inner, outer, is_shallow));
         made.into_iter().flatten().min_by_key(|own| own.corners.len())
     }
 
+    /// The same with corners cut off until none is too far out.
     fn cut(mut self, inner: f64, outer: f64, is_shallow: bool) -> Option<Self> {
         while self.facets.len() <= MOST_FACETS {
             self.close();
@@ -149,8 +156,7 @@ mod tests {
             let frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             let normals: Vec<Point> = if round % 2 == 0 { frame.to_vec() } else { (0..3).map(|_| any()).collect() };
             let both = normals.iter().flat_map(|normal| [*normal, normal.map(|part| -part)]);
-            let ball = Ball::between(both, 1.0, outer).expect("few facets");
-            println!("{outer}: {} facets {} corners", ball.facets.len(), ball.corners.len());
+            let ball = Ball::between([&both.collect::<Vec<Point>>(), &[]], 0.1, 1.0, outer).expect("few facets");
             assert_eq!(ball.facets.len() + ball.corners.len(), ball.edges.len() + 2);
             for direction in (0..100).map(|_| any()).chain(frame) {
                 let reach = ball.reach(&direction);

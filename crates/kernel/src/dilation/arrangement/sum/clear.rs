@@ -53,7 +53,8 @@ pub(super) fn are_clear(
 fn is_apart(triangle: &[Point; 3], normal: &Point, figure: &Figure, least: f64) -> bool {
     let along = figure.polygon().map(|polygon| polygon.up);
     let both = along.iter().flat_map(|up| [*up, up.map(|part| -part)]);
-    [*normal].into_iter().chain(both).any(|direction| figure.is_parted(triangle, &direction, least)) || figure.too_near(triangle, least).is_none()
+    [*normal].into_iter().chain(both).any(|direction| figure.is_parted(triangle, &direction, least))
+        || figure.too_near(triangle, least).is_none()
 }
 
 impl Body for Figure {

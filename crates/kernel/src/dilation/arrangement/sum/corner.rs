@@ -110,7 +110,8 @@ impl Patch {
         }
         around.tiny = TINY * around.heights.iter().copied().fold(f64::INFINITY, f64::min);
         let sides = around.sides()?;
-        let arc_of = |normal: &Point| arcs.iter().position(|arc| is_same(&arc.normal, normal) || is_same(&arc.normal.map(|part| -part), normal));
+        let arc_of =
+            |normal: &Point| arcs.iter().position(|arc| is_same(&arc.normal, normal) || is_same(&arc.normal.map(|part| -part), normal));
         let mut chains = Vec::new();
         for (facet, mut sides) in sides.into_iter().enumerate() {
             let normal = around.normals[facet];
@@ -276,7 +277,8 @@ impl Around<'_> {
                 }
             }
             if high - low >= self.tiny {
-                let wedge = ends.map(|[least, most]| Wedge { angles: [most.1 + QUARTER, least.1 + 3.0 * QUARTER], planes: [most.0, least.0] });
+                let wedge =
+                    ends.map(|[least, most]| Wedge { angles: [most.1 + QUARTER, least.1 + 3.0 * QUARTER], planes: [most.0, least.0] });
                 parts.push(([low, high], wedge));
             }
         }

@@ -4,7 +4,7 @@ use super::super::plane::{self, Edge, Mesh};
 use super::super::triangulate::{Planar, triangulate};
 use super::ball::is_same;
 use super::corner::{Chain, Patch};
-use super::net::{Fan, Kinds, Net, Vertex};
+use super::net::{Kinds, Net, Vertex};
 use crate::attractor::cell::{Point, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::{BlockSurface, NameMap};
@@ -32,8 +32,7 @@ struct Loop {
 
 /// All chains, and the points on them.
 struct Chains<'a> {
-    vertices: Vec<Option<Vertex>>,
-    fans: Vec<Fan>,
+    kinds: &'a Kinds,
     patches: &'a [Patch],
     /// Where points and chains of every vertex begin.
     first: Vec<[u32; 2]>,
@@ -48,7 +47,7 @@ struct Chains<'a> {
 /// [`Stopped`].
 pub(super) fn surface(
     net: &Net,
-    kinds: Kinds,
+    kinds: &Kinds,
     patches: &[Patch],
     round: impl Fn(f64) -> f64,
     budget: &Budget,
@@ -93,8 +92,8 @@ fn cut(loops: &mut [Loop], points: &[Point], planar: &mut Planar, triangles: &mu
 }
 
 impl<'a> Chains<'a> {
-    fn new(net: &Net, kinds: Kinds, patches: &'a [Patch], round: impl Fn(f64) -> f64) -> Self {
-        let Kinds { vertices, fans, mut faces } = kinds;
+    fn new(net: &Net, kinds: &'a Kinds, patches: &'a [Patch], round: impl Fn(f64) -> f64) -> Self {
+        let Kinds { vertices, faces, .. } = kinds;
         let (mut first, mut points, mut count) = (Vec::with_capacity(vertices.len()), Vec::new(), 0);
         for (vertex, at) in vertices.iter().zip(&net.places) {
             first.push([points.len() as u32, count]);
@@ -117,17 +116,17 @@ impl<'a> Chains<'a> {
                     planes.join(*first as usize + same, own as usize);
                 }
                 if let Some(arc) = chain.arc {
-                    let face = faces.of(triangles[arc] as usize);
+                    let face = faces[triangles[arc] as usize];
                     let is_above = dot(&chain.normal, net.normal(face)) > 0.0;
                     planes.join(*sides.entry(u64::from(face) << 1 | u64::from(is_above)).or_insert(own) as usize, own as usize);
                 }
             }
         }
-        Self { vertices, fans, patches, first, points, is_used: vec![false; count as usize], planes }
+        Self { kinds, patches, first, points, is_used: vec![false; count as usize], planes }
     }
 
-    fn vertex(&self, vertex: u32) -> Option<&Vertex> {
-        self.vertices[vertex as usize].as_ref()
+    fn vertex(&self, vertex: u32) -> Option<&'a Vertex> {
+        self.kinds.vertices[vertex as usize].as_ref()
     }
 
     fn chain(&self, (vertex, number): At) -> Option<&'a Chain> {
@@ -150,7 +149,7 @@ impl<'a> Chains<'a> {
             is_same(&chain.normal, &own.normal) && chain.entry.is_some_and(is_along)
         };
         let number = self.patches[self.vertex(next)?.kind as usize].chains.iter().position(goes_on)?;
-        Some(((next, number), self.fans[*kind as usize].ways[way]))
+        Some(((next, number), self.kinds.fans[*kind as usize].ways[way]))
     }
 
     /// Joins all chains to loops; none where one does not go on, or goes back along an edge.
@@ -159,12 +158,12 @@ impl<'a> Chains<'a> {
     /// [`Stopped`].
     fn loops(&mut self, budget: &Budget) -> Result<Option<Vec<Loop>>, Stopped> {
         let mut loops = Vec::new();
-        for vertex in 0..self.vertices.len() as u32 {
-            if vertex as usize % IN_A_ROW == 0 {
+        for vertex in 0..self.first.len() as u32 {
+            if (vertex as usize).is_multiple_of(IN_A_ROW) {
                 budget.cancel.check()?;
             }
             for number in 0.. {
-                let Some(chain) = self.vertices[vertex as usize].as_ref().and_then(|_| self.chain((vertex, number))) else { break };
+                let Some(chain) = self.chain((vertex, number)) else { break };
                 if !self.is_used[self.number((vertex, number))] {
                     let Some(vertices) = self.from((vertex, number)) else { return Ok(None) };
                     loops.push(Loop { normal: chain.normal, plane: self.number((vertex, number)) as u32, vertices });
@@ -180,9 +179,8 @@ impl<'a> Chains<'a> {
         let mut vertices: Vec<u32> = Vec::new();
         // The way along which the next point has to come.
         let mut along: Option<Point> = None;
-        let comes_along = |points: &[Point], along: &Point, from: u32, to: u32| {
-            dot(&subtract(&points[to as usize], &points[from as usize]), along) > 0.0
-        };
+        let comes_along =
+            |points: &[Point], along: &Point, from: u32, to: u32| dot(&subtract(&points[to as usize], &points[from as usize]), along) > 0.0;
         loop {
             let number = self.number(at);
             if std::mem::replace(&mut self.is_used[number], true) {

@@ -39,9 +39,11 @@ use glam::DVec3;
 use net::{Kinds, Net};
 use rayon::prelude::*;
 
-/// How much narrower the band is than what may be, in units of rounding, and of what noise makes of distances.
+/// How much narrower the band is than what may be, in units of rounding, and of what directions that are taken for one make of distances: points that are taken for one are less than half of this apart.
 const ROUNDINGS: f64 = 3.0;
 const NOISES: f64 = 100.0;
+/// Facets of the ball that go on along edges turn from others by at least this share of what they may; where that does not come out, by anything.
+const LEAST_TURNS: [f64; 2] = [0.3, 0.0];
 /// Triangles for each point, about.
 const PER_POINT: f64 = 2.0;
 
@@ -64,27 +66,41 @@ pub(super) fn surface(
         return Ok(None);
     }
     let widest = 2.0 * (inner / outer).acos();
-    let Some(ball) = Ball::between(kinds.fans.iter().flat_map(|fan| fan.normals(widest)), inner, outer) else { return Ok(None) };
-    budget.cancel.check()?;
-    let patches = kinds.fans.par_iter().map(|fan| Patch::new(&fan.arcs, &fan.ways, &ball));
-    let Some(patches) = patches.collect::<Option<Vec<Patch>>>() else { return Ok(None) };
-    budget.cancel.check()?;
-    let expected = PER_POINT * kinds.points(&patches);
-    if expected > 2.0 * budget.limits.triangles as f64 {
-        return Ok(Some(Flat::Beyond(expected)));
+    let up: Vec<Point> = kinds.fans.iter().flat_map(|fan| &fan.arcs).flat_map(|arc| [arc.normal, arc.normal.map(|part| -part)]).collect();
+    let between: Vec<Point> = kinds.fans.iter().flat_map(|fan| fan.between(widest)).collect();
+    for share in LEAST_TURNS {
+        let Some(ball) = Ball::between([&up, &between], share * widest, inner, outer) else { continue };
+        budget.cancel.check()?;
+        let patches = kinds.fans.par_iter().map(|fan| Patch::new(&fan.arcs, &fan.ways, &ball));
+        let Some(patches) = patches.collect::<Option<Vec<Patch>>>() else { continue };
+        budget.cancel.check()?;
+        let expected = PER_POINT * kinds.points(&patches);
+        if expected > 2.0 * budget.limits.triangles as f64 {
+            return Ok(Some(Flat::Beyond(expected)));
+        }
+        if BYTES_PER_TRIANGLE * (expected + triangles.len() as f64) > budget.limits.memory_bytes as f64 {
+            return Ok(None);
+        }
+        let Some((surface, normals)) = loops::surface(&net, &kinds, &patches, &round, budget)? else { continue };
+        return Ok(shown(surface, &normals, figures, setting, ball.outer(), budget)?.map(|surface| Flat::Made(Box::new(surface))));
     }
-    if BYTES_PER_TRIANGLE * (expected + triangles.len() as f64) > budget.limits.memory_bytes as f64 {
-        return Ok(None);
-    }
-    let Some((mut surface, normals)) = loops::surface(&net, kinds, &patches, round, budget)? else { return Ok(None) };
+    Ok(None)
+}
+
+/// A surface, with the normals of its triangles' facets, if it is what it is meant to be, around figures and no farther from them than `outer`.
+fn shown(
+    mut surface: BlockSurface,
+    normals: &[Point],
+    figures: &[Figure],
+    setting: &Setting,
+    outer: f64,
+    budget: &Budget,
+) -> Result<Option<BlockSurface>, Stopped> {
     let is_shown = is_embedded(&mut surface, budget)?
-        && clear::are_clear(&surface, &normals, figures, setting.least + setting.slack, budget)?
-        && is_settled(figures, setting, ball.outer(), budget)?;
-    if !is_shown {
-        return Ok(None);
-    }
+        && clear::are_clear(&surface, normals, figures, setting.least + setting.slack, budget)?
+        && is_settled(figures, setting, outer, budget)?;
     surface.drop_unused();
-    Ok(Some(Flat::Made(Box::new(surface))))
+    Ok(is_shown.then_some(surface))
 }
 
 /// Whether a surface is closed, and meets itself nowhere.

@@ -176,8 +176,8 @@ pub(super) struct Kinds {
     pub(super) fans: Vec<Fan>,
     /// None where all is flat.
     pub(super) vertices: Vec<Option<Vertex>>,
-    /// The triangles that hang together in a plane, or have a vertex in common there.
-    pub(super) faces: Groups,
+    /// The face of every triangle: those that hang together in a plane, or have a vertex in common there.
+    pub(super) faces: Vec<u32>,
 }
 
 impl Kinds {
@@ -215,7 +215,7 @@ impl Kinds {
                 fans.push(std::mem::take(&mut fan));
             }
         }
-        Ok(Some(Self { fans, vertices, faces }))
+        Ok(Some(Self { fans, vertices, faces: faces.all() }))
     }
 
     /// How many points there are in all.
@@ -260,9 +260,9 @@ impl Fan {
             && self.arcs.iter().zip(&other.arcs).all(are_alike)
     }
 
-    /// The normals of facets that go on smoothly along its ways: those of arcs, and where two arcs have more than half of all around a way between them, so many between theirs that none turns from the next by more than an angle.
-    pub(super) fn normals(&self, widest: f64) -> Vec<Point> {
-        let mut normals: Vec<Point> = self.arcs.iter().flat_map(|arc| [arc.normal, arc.normal.map(|part| -part)]).collect();
+    /// Normals of facets that go on smoothly along its ways: where two arcs have more than half of all around a way between them, so many between theirs that none turns from the next by more than an angle.
+    pub(super) fn between(&self, widest: f64) -> Vec<Point> {
+        let mut normals = Vec::new();
         for (number, way) in self.ways.iter().enumerate() {
             // The ways into arcs, across their side.
             let mut inward: Vec<Point> = Vec::new();
