@@ -2,6 +2,7 @@
 
 use super::super::polytopes;
 use crate::attractor::cell::{Point, between, dot, unit};
+use std::f64::consts::TAU;
 
 /// Facets at most.
 const MOST_FACETS: usize = 192;
@@ -29,6 +30,12 @@ pub(super) fn is_same(a: &Point, b: &Point) -> bool {
 }
 
 impl Ball {
+    /// By how much facets side by side may turn that touch an inner ball and have their edge in an outer one; none where so many would go around as are too many in all.
+    pub(super) fn widest(inner: f64, outer: f64) -> Option<f64> {
+        let widest = 2.0 * (inner / outer).min(1.0).acos();
+        (widest * MOST_FACETS as f64 > TAU).then_some(widest)
+    }
+
     /// One around the ball with the inner radius, and within that with the outer one, that has facets with the first normals, and with the others as far as they turn from all before by an angle, and few corners besides; none where that takes too many facets.
     ///
     /// All of these touch the inner ball. Corners that are too far out are cut off, the farthest ones first, as far down as the next ones that are not, or as the inner ball: whichever leaves fewer.

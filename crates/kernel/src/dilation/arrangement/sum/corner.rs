@@ -18,7 +18,7 @@ const ONE: f64 = 4.0;
 const WIDE: f64 = 2.9;
 const NARROWER: f64 = 2.1;
 /// Planes at most.
-const MOST_PLANES: usize = 256;
+const MOST_PLANES: usize = 224;
 
 /// A part of a plane at a vertex, from one way along it counter-clockwise to another, or all around.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +94,7 @@ struct Side {
 }
 
 impl Patch {
-    /// The boundary around a vertex with some arcs, given unit vectors along all its ways; none where it does not come out as a surface.
+    /// The boundary around a vertex with some arcs, given unit vectors along all its ways; none where it does not come out as a surface. Cost: for each pair of planes as much as there are planes of bodies, 0.1 ms for walls along the axes.
     pub(super) fn new(arcs: &[Arc], ways: &[Point], ball: &Ball) -> Option<Self> {
         let mut around = Around { ways, normals: Vec::new(), heights: Vec::new(), bodies: Vec::new(), points: Vec::new(), tiny: 0.0 };
         for arc in arcs {
@@ -149,6 +149,7 @@ impl Patch {
     }
 }
 
+/// The bodies of a vertex's sectors.
 struct Around<'a> {
     ways: &'a [Point],
     normals: Vec<Point>,

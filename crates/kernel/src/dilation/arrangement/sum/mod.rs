@@ -36,7 +36,7 @@ use crate::solid::{Crossings, SolidError, Topology, TriMesh};
 use ball::{Ball, SAME};
 use corner::Patch;
 use glam::DVec3;
-use net::{Kinds, Net};
+use net::{Fan, Kinds, Net};
 use rayon::prelude::*;
 
 /// How much narrower the band is than what may be, in units of rounding, and of what directions that are taken for one make of distances: points that are taken for one are less than half of this apart.
@@ -62,18 +62,18 @@ pub(super) fn surface(
     let Some(kinds) = Kinds::of(&net, budget)? else { return Ok(None) };
     let spare = ROUNDINGS * setting.rounding + NOISES * SAME * setting.outer + setting.slack;
     let [inner, outer] = [setting.least + spare, setting.outer - spare];
-    if inner >= outer {
-        return Ok(None);
-    }
-    let widest = 2.0 * (inner / outer).acos();
+    let Some(widest) = Ball::widest(inner, outer) else { return Ok(None) };
     let up: Vec<Point> = kinds.fans.iter().flat_map(|fan| &fan.arcs).flat_map(|arc| [arc.normal, arc.normal.map(|part| -part)]).collect();
     let between: Vec<Point> = kinds.fans.iter().flat_map(|fan| fan.between(widest)).collect();
     for share in LEAST_TURNS {
         let Some(ball) = Ball::between([&up, &between], share * widest, inner, outer) else { continue };
         budget.cancel.check()?;
-        let patches = kinds.fans.par_iter().map(|fan| Patch::new(&fan.arcs, &fan.ways, &ball));
-        let Some(patches) = patches.collect::<Option<Vec<Patch>>>() else { continue };
-        budget.cancel.check()?;
+        let patch = |fan: &Fan| {
+            budget.cancel.check()?;
+            Ok(Patch::new(&fan.arcs, &fan.ways, &ball))
+        };
+        let patches: Vec<Option<Patch>> = kinds.fans.par_iter().map(patch).collect::<Result<_, Stopped>>()?;
+        let Some(patches) = patches.into_iter().collect::<Option<Vec<Patch>>>() else { continue };
         let expected = PER_POINT * kinds.points(&patches);
         if expected > 2.0 * budget.limits.triangles as f64 {
             return Ok(Some(Flat::Beyond(expected)));

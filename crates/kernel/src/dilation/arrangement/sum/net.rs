@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Triangles at a vertex at most.
 const MOST_AROUND: usize = 64;
 /// Kinds of vertices at most, and so many vertices are alike at least, but for a few: others are no cheaper than polytopes.
-const MOST_KINDS: usize = 1_024;
+const MOST_KINDS: usize = 320;
 const LEAST_ALIKE: usize = 4;
 const FEW_KINDS: usize = 48;
 /// Vertices that are looked at before a stop is noticed.
