@@ -30,18 +30,23 @@ pub(super) fn is_same(a: &Point, b: &Point) -> bool {
 }
 
 impl Ball {
+    /// How many corners it has.
+    pub(super) fn corners(&self) -> usize {
+        self.corners.len()
+    }
+
     /// By how much facets side by side may turn that touch an inner ball and have their edge in an outer one; none where so many would go around as are too many in all.
     pub(super) fn widest(inner: f64, outer: f64) -> Option<f64> {
         let widest = 2.0 * (inner / outer).min(1.0).acos();
         (widest * MOST_FACETS as f64 > TAU).then_some(widest)
     }
 
-    /// One around the ball with the inner radius, and within that with the outer one, that has facets with the first normals, and with the others as far as they turn from all before by an angle, and few corners besides; none where that takes too many facets.
+    /// One around the ball with the inner radius, and within that with the outer one, that has facets with the first normals as far out as `middle`, with the others as far as they turn from all before by an angle, and few corners besides; none where that takes too many facets.
     ///
-    /// All of these touch the inner ball. Corners that are too far out are cut off, the farthest ones first, as far down as the next ones that are not, or as the inner ball: whichever leaves fewer.
-    pub(super) fn between(normals: [&[Point]; 2], least: f64, inner: f64, outer: f64) -> Option<Self> {
+    /// All but the first touch the inner ball. Corners that are too far out are cut off, the farthest ones first, as far down as the next ones that are not, or as the inner ball: whichever leaves fewer.
+    pub(super) fn between(normals: [&[Point]; 2], least: f64, [inner, middle, outer]: [f64; 3]) -> Option<Self> {
         let mut first = Self::default();
-        normals[0].iter().for_each(|normal| first.add(*normal, inner));
+        normals[0].iter().for_each(|normal| first.add(*normal, middle));
         for normal in normals[1] {
             let is_apart = |own: &Point| dot(own, normal) < least.cos();
             if first.facets.iter().all(is_apart) {
@@ -163,7 +168,8 @@ mod tests {
             let frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             let normals: Vec<Point> = if round % 2 == 0 { frame.to_vec() } else { (0..3).map(|_| any()).collect() };
             let both = normals.iter().flat_map(|normal| [*normal, normal.map(|part| -part)]);
-            let ball = Ball::between([&both.collect::<Vec<Point>>(), &[]], 0.1, 1.0, outer).expect("few facets");
+            let ball =
+                Ball::between([&both.collect::<Vec<Point>>(), &[]], 0.1, [1.0, 1.0 + 0.3 * (outer - 1.0), outer]).expect("few facets");
             assert_eq!(ball.facets.len() + ball.corners.len(), ball.edges.len() + 2);
             for direction in (0..100).map(|_| any()).chain(frame) {
                 let reach = ball.reach(&direction);

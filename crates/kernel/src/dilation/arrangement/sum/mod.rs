@@ -28,12 +28,14 @@ use super::figure::Figure;
 use super::nerve::Sets;
 use super::polytopes::{Polytope, Polytopes};
 use super::{BYTES_PER_TRIANGLE, Flat};
-use crate::attractor::cell::Point;
+use crate::attractor::cell::{Point, distance_squared};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex;
 use crate::dilation::plan::Setting;
 use crate::dilation::surface::BlockSurface;
+use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::{Crossings, SolidError, Topology, TriMesh};
-use ball::{Ball, SAME};
+use ball::SAME;
 use corner::Patch;
 use glam::DVec3;
 use net::{Fan, Kinds, Net};
@@ -44,6 +46,9 @@ const ROUNDINGS: f64 = 3.0;
 const NOISES: f64 = 100.0;
 /// Facets of the ball that go on along edges turn from others by at least this share of what they may; where that does not come out, by anything.
 const LEAST_TURNS: [f64; 2] = [0.3, 0.0];
+/// Figures that are asked how far others are, at most, and what is no distance, in units of what is asked for.
+const SAMPLE: usize = 64;
+const TOUCHING: f64 = 1e-3;
 /// Triangles for each point, about.
 const PER_POINT: f64 = 2.0;
 
@@ -62,29 +67,58 @@ pub(super) fn surface(
     let Some(kinds) = Kinds::of(&net, budget)? else { return Ok(None) };
     let spare = ROUNDINGS * setting.rounding + NOISES * SAME * setting.outer + setting.slack;
     let [inner, outer] = [setting.least + spare, setting.outer - spare];
-    let Some(widest) = Ball::widest(inner, outer) else { return Ok(None) };
-    let up: Vec<Point> = kinds.fans.iter().flat_map(|fan| &fan.arcs).flat_map(|arc| [arc.normal, arc.normal.map(|part| -part)]).collect();
-    let between: Vec<Point> = kinds.fans.iter().flat_map(|fan| fan.between(widest)).collect();
-    for share in LEAST_TURNS {
-        let Some(ball) = Ball::between([&up, &between], share * widest, inner, outer) else { continue };
-        budget.cancel.check()?;
-        let patch = |fan: &Fan| {
-            budget.cancel.check()?;
-            Ok(Patch::new(&fan.arcs, &fan.ways, &ball))
-        };
-        let patches: Vec<Option<Patch>> = kinds.fans.par_iter().map(patch).collect::<Result<_, Stopped>>()?;
-        let Some(patches) = patches.into_iter().collect::<Option<Vec<Patch>>>() else { continue };
-        let expected = PER_POINT * kinds.points(&patches);
-        if expected > 2.0 * budget.limits.triangles as f64 {
-            return Ok(Some(Flat::Beyond(expected)));
+    // Faces as far out as they are meant to be, or all as near as may be, where other faces are about two radii away.
+    for middle in [setting.reach, inner] {
+        for share in LEAST_TURNS {
+            let Some(ball) = kinds.ball([inner, middle, outer], share) else { continue };
+            if middle > inner && are_close(figures, 2.0 * ball.outer()) {
+                break;
+            }
+            let patch = |fan: &Fan| {
+                budget.cancel.check()?;
+                Ok(Patch::new(&fan.arcs, &fan.ways, &ball))
+            };
+            let patches: Vec<Option<Patch>> = kinds.fans.par_iter().map(patch).collect::<Result<_, Stopped>>()?;
+            let Some(patches) = patches.into_iter().collect::<Option<Vec<Patch>>>() else { continue };
+            let expected = PER_POINT * kinds.points(&patches);
+            if expected > 2.0 * budget.limits.triangles as f64 {
+                return Ok(Some(Flat::Beyond(expected)));
+            }
+            if BYTES_PER_TRIANGLE * (expected + triangles.len() as f64) > budget.limits.memory_bytes as f64 {
+                return Ok(None);
+            }
+            let Some((surface, normals)) = loops::surface(&net, &kinds, &patches, &round, budget)? else { continue };
+            if let Some(surface) = shown(surface, &normals, figures, setting, ball.outer(), budget)? {
+                return Ok(Some(Flat::Made(Box::new(surface))));
+            }
+            break;
         }
-        if BYTES_PER_TRIANGLE * (expected + triangles.len() as f64) > budget.limits.memory_bytes as f64 {
-            return Ok(None);
-        }
-        let Some((surface, normals)) = loops::surface(&net, &kinds, &patches, &round, budget)? else { continue };
-        return Ok(shown(surface, &normals, figures, setting, ball.outer(), budget)?.map(|surface| Flat::Made(Box::new(surface))));
     }
     Ok(None)
+}
+
+/// Whether some of a sample of figures are no farther than a distance from others that they have no corner on, nor these on them, as far as corners tell.
+fn are_close(figures: &[Figure], distance: f64) -> bool {
+    let boxes: Vec<Box32> = figures.iter().map(|figure| figure.box_within(0.5 * distance)).collect();
+    let mut tree = BoxTree::default();
+    tree.build(boxes.len(), |index| Some(boxes[index as usize]), true);
+    (0..figures.len()).step_by(figures.len().div_ceil(SAMPLE).max(1)).any(|own| {
+        let is_close = |other: usize| {
+            let of = |one: &Figure, other: &Figure| {
+                let square = |corner: &Point| distance_squared(corner, &one.closest(corner));
+                other.corners().iter().map(square).fold(f64::INFINITY, f64::min)
+            };
+            let square = of(&figures[own], &figures[other]).min(of(&figures[other], &figures[own]));
+            (TOUCHING * distance).powi(2) < square && square < distance * distance
+        };
+        let mut is_found = false;
+        tree.query(&boxes[own], 0, |leaf| {
+            let near = tree.items(leaf).iter().zip(tree.boxes(leaf)).filter(|(_, other)| boxes[own].meets(other));
+            is_found |= near.map(|(&item, _)| item as usize).any(|other| other != own && is_close(other));
+            !is_found
+        });
+        is_found
+    })
 }
 
 /// A surface, with the normals of its triangles' facets, if it is what it is meant to be, around figures and no farther from them than `outer`.

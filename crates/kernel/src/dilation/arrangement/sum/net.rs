@@ -1,6 +1,6 @@
 //! Triangles with what is around their vertices: arcs, which are triangles with a common vertex that lie beside each other in a plane.
 
-use super::ball::{SAME, is_same};
+use super::ball::{Ball, SAME, is_same};
 use super::corner::{Arc, Patch};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
@@ -14,6 +14,8 @@ const MOST_AROUND: usize = 64;
 const MOST_KINDS: usize = 320;
 const LEAST_ALIKE: usize = 4;
 const FEW_KINDS: usize = 48;
+/// Distances between that of the inner ball and that of faces that facets along edges are tried at.
+const STEPS: u32 = 4;
 /// Vertices that are looked at before a stop is noticed.
 const IN_A_ROW: u32 = 1_024;
 /// A direction from which planes are seen that no model is likely to have.
@@ -218,6 +220,20 @@ impl Kinds {
         Ok(Some(Self { fans, vertices, faces: faces.all() }))
     }
 
+    /// A ball between the first and the last distance whose facets go on smoothly along faces, at the middle one, and along edges: with the fewest corners of some that the facets along edges touch different distances for. These turn from others by a share of what they may at least.
+    pub(super) fn ball(&self, [inner, middle, outer]: [f64; 3], share: f64) -> Option<Ball> {
+        let up: Vec<Point> =
+            self.fans.iter().flat_map(|fan| &fan.arcs).flat_map(|arc| [arc.normal, arc.normal.map(|part| -part)]).collect();
+        let steps = if middle > inner { STEPS } else { 1 };
+        let balls = (0..steps).filter_map(|step| {
+            let low = inner + f64::from(step) / f64::from(STEPS) * (middle - inner);
+            let widest = Ball::widest(low, outer)?;
+            let between: Vec<Point> = self.fans.iter().flat_map(|fan| fan.between(widest)).collect();
+            Ball::between([&up, &between], share * widest, [low, middle, outer])
+        });
+        balls.min_by_key(Ball::corners)
+    }
+
     /// How many points there are in all.
     pub(super) fn points(&self, patches: &[Patch]) -> f64 {
         self.vertices.iter().flatten().map(|vertex| patches[vertex.kind as usize].points.len() as f64).sum()
@@ -261,7 +277,7 @@ impl Fan {
     }
 
     /// Normals of facets that go on smoothly along its ways: where two arcs have more than half of all around a way between them, so many between theirs that none turns from the next by more than an angle.
-    pub(super) fn between(&self, widest: f64) -> Vec<Point> {
+    fn between(&self, widest: f64) -> Vec<Point> {
         let mut normals = Vec::new();
         for (number, way) in self.ways.iter().enumerate() {
             // The ways into arcs, across their side.

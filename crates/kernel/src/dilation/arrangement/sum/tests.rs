@@ -210,6 +210,15 @@ fn walls_that_come_close_are_left_to_others() {
     }
 }
 
+/// Faces are as far out as they are meant to be.
+#[test]
+fn walls_are_as_thick_as_they_are_meant_to_be() {
+    let walls = Walls::around(3, menger, &mut Random(107));
+    let dilation = arranged(&walls.lowered(), 2.0, 0.2);
+    let on_planes = dilation.solid.mesh().vertices.iter().filter(|x| x.to_array().iter().any(|x| [-2.0, 32.0].contains(x)));
+    assert!(on_planes.count() > 32);
+}
+
 /// The faces of a solid are thickened outwards only.
 #[test]
 fn solids_have_no_surface_inside() {
@@ -232,7 +241,7 @@ fn solids_have_no_surface_inside() {
 #[test]
 fn patches_are_where_bodies_end() {
     let mut random = Random(101);
-    let ball = Ball::between([&[[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]], &[[0.0, 0.0, 1.0]]], 0.1, 1.0, 1.2).expect("few facets");
+    let ball = Ball::between([&[[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]], &[[0.0, 0.0, 1.0]]], 0.1, [1.0, 1.05, 1.2]).expect("few facets");
     let mut made = 0;
     for _ in 0..60 {
         let count = 1 + random.next() as usize % 3;
