@@ -35,7 +35,7 @@ use crate::dilation::plan::Setting;
 use crate::dilation::surface::BlockSurface;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::{Crossings, SolidError, Topology, TriMesh};
-use ball::SAME;
+use ball::{Ball, SAME};
 use corner::Patch;
 use glam::DVec3;
 use net::{Fan, Kinds, Net};
@@ -49,6 +49,8 @@ const LEAST_TURNS: [f64; 2] = [0.3, 0.0];
 /// Figures that are asked how far others are, at most, and what is no distance, in units of what is asked for.
 const SAMPLE: usize = 64;
 const TOUCHING: f64 = 1e-3;
+/// Faces are as far out as they are meant to be where the ball then has so many times the corners at most that it has with faces as near as may be, and no other faces are about two radii away.
+const MORE_CORNERS: f64 = 1.25;
 /// Triangles for each point, about.
 const PER_POINT: f64 = 2.0;
 
@@ -67,13 +69,15 @@ pub(super) fn surface(
     let Some(kinds) = Kinds::of(&net, budget)? else { return Ok(None) };
     let spare = ROUNDINGS * setting.rounding + NOISES * SAME * setting.outer + setting.slack;
     let [inner, outer] = [setting.least + spare, setting.outer - spare];
-    // Faces as far out as they are meant to be, or all as near as may be, where other faces are about two radii away.
-    for middle in [setting.reach, inner] {
-        for share in LEAST_TURNS {
-            let Some(ball) = kinds.ball([inner, middle, outer], share) else { continue };
-            if middle > inner && are_close(figures, 2.0 * ball.outer()) {
-                break;
-            }
+    for share in LEAST_TURNS {
+        let thin = kinds.ball([inner, inner, outer], share);
+        let is_good = |ball: &Ball| {
+            let most = thin.as_ref().map_or(f64::INFINITY, |thin| MORE_CORNERS * thin.corners() as f64);
+            ball.corners() as f64 <= most && !are_close(figures, 2.0 * ball.outer())
+        };
+        let thick = kinds.ball([inner, setting.reach, outer], share).filter(is_good);
+        let mut is_made = false;
+        for ball in [thick, thin].into_iter().flatten() {
             let patch = |fan: &Fan| {
                 budget.cancel.check()?;
                 Ok(Patch::new(&fan.arcs, &fan.ways, &ball))
@@ -91,6 +95,9 @@ pub(super) fn surface(
             if let Some(surface) = shown(surface, &normals, figures, setting, ball.outer(), budget)? {
                 return Ok(Some(Flat::Made(Box::new(surface))));
             }
+            is_made = true;
+        }
+        if is_made {
             break;
         }
     }
