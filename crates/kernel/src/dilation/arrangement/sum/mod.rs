@@ -75,7 +75,7 @@ pub(super) fn surface(
             let most = thin.as_ref().map_or(f64::INFINITY, |thin| MORE_CORNERS * thin.corners() as f64);
             ball.corners() as f64 <= most && !are_close(figures, 2.0 * ball.outer())
         };
-        let thick = kinds.ball([inner, setting.reach, outer], share).filter(is_good);
+        let thick = kinds.ball([inner, setting.reach.max(inner), outer], share).filter(is_good);
         let mut is_made = false;
         for ball in [thick, thin].into_iter().flatten() {
             let patch = |fan: &Fan| {
