@@ -55,7 +55,7 @@ impl Topology {
             return Err(error);
         }
         budget.report("verify", 0.0, 0);
-        let around = Around::new(mesh);
+        let around = Incidence::new(mesh.vertices.len(), &mesh.triangles);
         budget.cancel.check()?;
         let chunks = count.div_ceil(CHUNK);
         let mut topology = (0..chunks)
@@ -185,24 +185,25 @@ fn fans(link: &[(u32, u32)]) -> usize {
 }
 
 /// The triangles at each vertex.
-struct Around {
+pub(crate) struct Incidence {
     offsets: Vec<u32>,
     triangles: Vec<u32>,
 }
 
-impl Around {
-    fn new(mesh: &TriMesh) -> Self {
-        let mut offsets = vec![0_u32; mesh.vertices.len() + 1];
-        for corner in mesh.triangles.iter().flatten() {
+impl Incidence {
+    /// Those of triangles over so many vertices.
+    pub(crate) fn new(vertices: usize, all: &[[u32; 3]]) -> Self {
+        let mut offsets = vec![0_u32; vertices + 1];
+        for corner in all.iter().flatten() {
             offsets[*corner as usize + 1] += 1;
         }
         for index in 1..offsets.len() {
             offsets[index] += offsets[index - 1];
         }
-        let mut triangles = vec![0_u32; mesh.triangles.len() * 3];
+        let mut triangles = vec![0_u32; all.len() * 3];
         // Filling from the end of each list leaves the offsets at their starts.
         let mut ends = offsets[1..].to_vec();
-        for (triangle, corners) in mesh.triangles.iter().enumerate().rev() {
+        for (triangle, corners) in all.iter().enumerate().rev() {
             for &corner in corners {
                 ends[corner as usize] -= 1;
                 triangles[ends[corner as usize] as usize] = triangle as u32;
@@ -211,10 +212,14 @@ impl Around {
         Self { offsets, triangles }
     }
 
+    /// The triangles at a vertex, in their order.
+    pub(crate) fn at(&self, vertex: u32) -> &[u32] {
+        &self.triangles[self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
+    }
+
     fn link(&self, mesh: &TriMesh, vertex: u32, link: &mut Vec<(u32, u32)>) {
         link.clear();
-        let range = self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize;
-        link.extend(self.triangles[range].iter().map(|&triangle| {
+        link.extend(self.at(vertex).iter().map(|&triangle| {
             let corners = mesh.triangles[triangle as usize];
             let at = corners.iter().position(|&corner| corner == vertex).unwrap_or(0);
             (corners[(at + 1) % 3], corners[(at + 2) % 3])

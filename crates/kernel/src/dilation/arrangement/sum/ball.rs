@@ -1,4 +1,4 @@
-//! A polytope between two balls, whose facets go on smoothly along three axes at right angles.
+//! A polytope between two balls, whose facets go on smoothly along the faces and edges that it is moved along.
 
 use super::super::polytopes;
 use crate::attractor::cell::{Point, between, dot, unit};
@@ -68,9 +68,14 @@ impl Ball {
             }
             let near: Vec<Point> = self.corners.iter().filter(|corner| is_shallow && square(corner) <= outer * outer).copied().collect();
             let far: Vec<Point> = self.corners.iter().filter(|corner| square(corner) >= farthest * (1.0 - SAME)).map(unit).collect();
+            let count = self.facets.len();
             for normal in far {
                 let next = near.iter().map(|corner| dot(corner, &normal)).fold(inner, f64::max);
                 self.add(normal, next);
+            }
+            // Facets with the normals of all of these are there, and do not bring them in.
+            if self.facets.len() == count {
+                return None;
             }
         }
         None
@@ -89,14 +94,12 @@ impl Ball {
         let Self { facets, offsets, corners, edges } = self;
         corners.clear();
         edges.clear();
-        let widest = offsets.iter().copied().fold(0.0, f64::max);
-        let tiny = TINY * widest;
-        let widest = WIDE * widest;
+        let farthest = offsets.iter().copied().fold(0.0, f64::max);
+        let (tiny, far) = (TINY * farthest, WIDE * farthest);
         let is_one = |a: &Point, b: &Point| (0..3).all(|axis| (a[axis] - b[axis]).abs() < tiny);
         for (own, (normal, offset)) in facets.iter().zip(offsets.iter()).enumerate() {
             let [u, v, _] = polytopes::frame(normal);
             // Corners, each with the facet that is across the side after it.
-            let far = widest;
             let corner = |(x, y): (f64, f64)| -> Point { std::array::from_fn(|axis| offset * normal[axis] + x * u[axis] + y * v[axis]) };
             let mut outline: Vec<(Point, usize)> =
                 [(far, far), (-far, far), (-far, -far), (far, -far)].map(|at| (corner(at), own)).to_vec();

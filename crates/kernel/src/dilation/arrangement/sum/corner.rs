@@ -313,17 +313,17 @@ impl Around<'_> {
                     if side == 0 { SAME < from && from < wide + SAME } else { from < wide - SAME || from > TAU - SAME }
                 })
             };
-            let mut facets = [usize::MAX; 2];
+            let mut facets = [None; 2];
             for (side, facet) in facets.iter_mut().enumerate() {
                 let mut all = wedges().filter(|wedge| is_left_open(side, wedge)).map(|wedge| wedge.planes[side]);
-                let Some(found) = all.next() else { continue };
-                *facet = found;
-                all.all(|other| other == found).then_some(())?;
+                *facet = all.next();
+                all.all(|other| Some(other) == *facet).then_some(())?;
             }
-            let [right, left] = facets;
-            if right == left {
+            if facets[0] == facets[1] {
                 continue;
             }
+            // Rounding may leave one side open alone.
+            let [Some(right), Some(left)] = facets else { return None };
             match spans.last_mut() {
                 Some(last) if last.facets == [left, right] && low - last.ends[1] < self.tiny => last.ends[1] = high,
                 _ => spans.push(Span { ends: [low, high], facets: [left, right] }),

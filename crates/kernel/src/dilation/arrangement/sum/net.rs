@@ -6,6 +6,7 @@ use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
+use crate::solid::topology::Incidence;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Triangles at a vertex at most.
@@ -27,9 +28,7 @@ pub(super) struct Net {
     triangles: Vec<[u32; 3]>,
     /// The unit normals of triangles.
     normals: Vec<Point>,
-    /// Where the triangles of every vertex begin in the list after it.
-    first: Vec<u32>,
-    around: Vec<u32>,
+    around: Incidence,
 }
 
 /// What is around a vertex.
@@ -69,20 +68,8 @@ impl Net {
             let normal = unit(&cross(&subtract(b, a), &subtract(c, a)));
             (dot(&normal, &normal) > 0.5).then(|| normals.push(normal))?;
         }
-        let mut first = vec![0; places.len() + 1];
-        triangles.iter().flatten().for_each(|&corner| first[corner as usize + 1] += 1);
-        for place in 0..places.len() {
-            first[place + 1] += first[place];
-        }
-        let mut around = vec![0; 3 * triangles.len()];
-        let mut next = first.clone();
-        for (triangle, corners) in (0..).zip(&triangles) {
-            for &corner in corners {
-                around[next[corner as usize] as usize] = triangle;
-                next[corner as usize] += 1;
-            }
-        }
-        Some(Self { places, triangles, normals, first, around })
+        let around = Incidence::new(places.len(), &triangles);
+        Some(Self { places, triangles, normals, around })
     }
 
     /// The unit normal of a triangle.
@@ -107,7 +94,7 @@ impl Net {
 
     /// What is around a vertex, whose triangles are joined to faces where they lie in one plane; none where that is too much.
     fn fan(&self, vertex: u32, fan: &mut Fan, faces: &mut Groups) -> Option<()> {
-        let list = &self.around[self.first[vertex as usize] as usize..self.first[vertex as usize + 1] as usize];
+        let list = self.around.at(vertex);
         (list.len() <= MOST_AROUND).then_some(())?;
         let sectors: Vec<Sector> = list.iter().map(|&triangle| self.sector(vertex, triangle)).collect();
         fan.arcs.clear();
