@@ -6,7 +6,7 @@ use crate::attractor::cell::Point;
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// See the module's comment. Closed or with borders; edges have two triangles at most.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct HalfEdges {
     pub(crate) points: Vec<Point>,
     /// Where a half-edge starts; `NONE` in triangles that are gone.

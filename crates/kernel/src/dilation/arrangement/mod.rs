@@ -14,6 +14,7 @@ mod covering;
 mod cubes;
 mod ellipsoid;
 mod engine;
+mod faces;
 mod facets;
 mod figure;
 mod form;
@@ -25,6 +26,7 @@ mod index;
 mod joints;
 mod nerve;
 mod noise;
+mod offset;
 mod pieces;
 mod planar;
 mod plane;
@@ -166,7 +168,10 @@ impl Arrangement {
         let put = if copies.is_empty() { 0.0 } else { copies.moved + setting.rounding };
         let setting = setting.narrower(put, setting.slack);
         let flat = match planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
-            None => height_field::surface(&kinds.list, &setting, &|x| copies.rounded(x), budget)?,
+            None => match height_field::surface(&kinds.list, &setting, &|x| copies.rounded(x), budget)? {
+                None => offset::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)?,
+                made => made,
+            },
             made => made,
         };
         if let Some(flat) = flat {

@@ -28,7 +28,7 @@ use super::figure::{self, Figure};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
-use check::{Faces, Question};
+use super::faces::{Faces, Question};
 use ground::Ground;
 use pair::{BYTES_PER_FACE, Pair};
 
@@ -97,7 +97,7 @@ fn around(
     if BYTES_PER_FACE * ground.len() as f64 > budget.limits.memory_bytes as f64 {
         return Ok(None);
     }
-    let faces = Faces::new(ground, 1.0);
+    let faces = Faces::of(ground, 1.0);
     if faces.crowding(ground, setting.slack, limits.outer) < LEAST_NEAR {
         return Ok(None);
     }

@@ -4,7 +4,7 @@
 
 use super::super::Flat;
 use super::super::between::Memory;
-use super::check::{Faces, Fault};
+use super::super::faces::{Faces, Fault};
 use super::ground::{Ground, border, turned_left};
 use super::sheet::{Found, Sheet};
 use super::{Limits, Place};
@@ -75,7 +75,7 @@ pub(super) fn rim(corners: &[Place], limits: &Limits<'_>) -> Option<Vec<Place>> 
 impl<'a> Pair<'a> {
     /// Both sheets without places, given the faces seen from above; none where there is no room for what is known of the graph.
     pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &'a Limits<'a>) -> Option<Self> {
-        let (above, below) = rayon::join(|| Sheet::new(ground, faces, limits), || Sheet::new(ground, Faces::new(ground, -1.0), limits));
+        let (above, below) = rayon::join(|| Sheet::new(ground, faces, limits), || Sheet::new(ground, Faces::of(ground, -1.0), limits));
         Some(Self { sheets: [above?, below?], posts: Vec::new(), next: Vec::new(), limits })
     }
 

@@ -4,7 +4,7 @@
 
 use super::super::between::{Memory, middle};
 use super::super::plane::{self, Mesh, corners, handle, inside, key};
-use super::check::{Faces, Fault};
+use super::super::faces::{Faces, Fault};
 use super::field::Field;
 use super::ground::Ground;
 use super::samples::Samples;

@@ -2,7 +2,7 @@ use super::super::between::Memory;
 use super::super::testing::{
     arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, topology,
 };
-use super::check::{Faces, Fault, Question};
+use super::super::faces::{Faces, Fault, Question};
 use super::field::Field;
 use super::ground::Ground;
 use super::pair::{is_plane, rim};
@@ -160,7 +160,7 @@ fn triangles_are_held_against_their_bounds() {
     let mut random = Random(3);
     let triangles = Part::rectangle(8, &mut random).graph(height(2, &mut random));
     let ground = ground(&triangles).unwrap();
-    let faces = Faces::new(&ground, 1.0);
+    let faces = Faces::of(&ground, 1.0);
     let (inner, outer) = (1.1, 1.4);
     let field = Field::new(&ground, &faces, [inner, outer]).unwrap();
     let distance = |x: &Point| faces.all.iter().map(|face| face.distance_squared(x)).fold(f64::INFINITY, f64::min).sqrt();
@@ -205,7 +205,7 @@ fn what_is_above_a_graph_is_as_far_from_it_as_is_asked() {
         let triangles = if round < 12 { graph(round, &mut random) } else { Part::disc(400, 1).graph(height(2, &mut random)) };
         let ground = ground(&triangles).unwrap();
         for sign in [1.0, -1.0] {
-            let faces = Faces::new(&ground, sign);
+            let faces = Faces::of(&ground, sign);
             let field = Field::new(&ground, &faces, [1.2, 1.5]).unwrap();
             for _ in 0..200 {
                 let at = [13.0 * random.share() - 1.5, 13.0 * random.share() - 1.5];
@@ -231,7 +231,7 @@ fn sheets_are_known_only_where_all_triangles_are_right() {
     let mut random = Random(37);
     let triangles = Part::rectangle(10, &mut random).graph(height(0, &mut random));
     let (ground, limits) = (ground(&triangles).unwrap(), Limits { inner: 1.1, outer: 1.4, rounding: 0.0, round: &|x| x });
-    let mut sheet = Sheet::new(&ground, Faces::new(&ground, 1.0), &limits).unwrap();
+    let mut sheet = Sheet::new(&ground, Faces::of(&ground, 1.0), &limits).unwrap();
     let corners = (0..40).map(|k| f64::from(k % 10) * 1.15).map(|x| x - 0.75).zip(0..);
     let border = corners.map(|(x, k)| [[x, -0.75], [10.75, x], [10.0 - x, 10.75], [-0.75, 10.0 - x]][k / 10]);
     let posts: Vec<u32> = (0..).zip(border).map(|(k, at)| sheet.raise_post(at, k, &limits).unwrap()).collect();

@@ -2,6 +2,7 @@
 
 use super::ball::{Ball, SAME, is_same};
 use super::corner::{Arc, Patch};
+use crate::dilation::arrangement::faces::numbered;
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
@@ -53,16 +54,7 @@ struct Sector {
 impl Net {
     /// The net of some triangles; none where one has no area.
     pub(super) fn new(faces: &[[Point; 3]]) -> Option<Self> {
-        let mut numbers: NameMap<[u64; 3], u32> = NameMap::default();
-        numbers.reserve(faces.len());
-        let mut places = Vec::new();
-        let mut number = |at: &Point| {
-            *numbers.entry(at.map(f64::to_bits)).or_insert_with(|| {
-                places.push(*at);
-                places.len() as u32 - 1
-            })
-        };
-        let triangles: Vec<[u32; 3]> = faces.iter().map(|face| face.each_ref().map(&mut number)).collect();
+        let (places, triangles) = numbered(faces);
         let mut normals = Vec::with_capacity(faces.len());
         for [a, b, c] in faces {
             let normal = unit(&cross(&subtract(b, a), &subtract(c, a)));

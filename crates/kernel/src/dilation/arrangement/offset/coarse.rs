@@ -1,0 +1,313 @@
+//! Fewer triangles for a surface: such that both sheets, as far out as the radius, follow it.
+
+use super::skin::Skin;
+use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
+use crate::budget::{Budget, Stopped};
+use crate::solid::half_edges::{HalfEdges, NONE, kept};
+use crate::solid::mend::{MOST_AROUND, Mender};
+
+/// How far off a sheet places may be that it goes by, in units of what may be, pass by pass.
+const PASSES: [f64; 4] = [0.05, 0.2, 0.5, 1.0];
+/// The least cosine of the angle between a triangle and its corners' normals, or its sheets.
+const LEAST_COSINE: f64 = 0.8;
+/// The least height of a triangle, as a share of its longest side.
+const LEAST_HEIGHT: f64 = 0.02;
+/// Vertices that are looked at before a stop is noticed.
+const IN_A_ROW: u32 = 256;
+
+/// Which vertices are left of a surface.
+pub(super) struct Coarse<'a> {
+    skin: &'a Skin,
+    /// How far out the sheets are, and the cosine of the angle by which the border turns at most at vertices that may go.
+    radius: f64,
+    turn: f64,
+    mesh: HalfEdges,
+    mender: Mender,
+    /// The first vertex that is gone and that a triangle stands for, and the next one of each.
+    first: Vec<u32>,
+    next: Vec<u32>,
+    /// The same of a star, and which new triangle will stand for each.
+    gone: Vec<u32>,
+    owners: Vec<usize>,
+    fresh: Vec<Fresh>,
+    /// The normals of the star's triangles.
+    normals: Vec<Point>,
+    lengths: Vec<(f64, usize)>,
+}
+
+/// What may come to be: a triangle, or a side of the border.
+enum Fresh {
+    Triangle(Triangle),
+    Side(Side),
+}
+
+impl Fresh {
+    fn new(skin: &Skin, radius: f64, corners: [u32; 3]) -> Option<Self> {
+        match corners.iter().position(|&corner| corner == skin.beyond()) {
+            None => Triangle::new(skin, radius, corners).map(Self::Triangle),
+            Some(k) => Side::new(skin, radius, [corners[(k + 2) % 3], corners[(k + 1) % 3]]).map(Self::Side),
+        }
+    }
+
+    /// How well it stands for a vertex that is gone: for those of the border that is a side.
+    fn depth(&self, skin: &Skin, vertex: u32) -> f64 {
+        match self {
+            Self::Triangle(_) if skin.is_border(vertex) => f64::NEG_INFINITY,
+            Self::Triangle(own) => own.depth(&skin.places[vertex as usize]),
+            Self::Side(_) if skin.is_border(vertex) => f64::INFINITY,
+            Self::Side(_) => f64::NEG_INFINITY,
+        }
+    }
+
+    fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
+        match self {
+            Self::Triangle(own) => own.error(skin, radius, vertex),
+            Self::Side(own) => own.error(skin, radius, vertex),
+        }
+    }
+
+    fn sag(&self) -> f64 {
+        match self {
+            Self::Triangle(own) => own.sag,
+            Self::Side(own) => own.sag,
+        }
+    }
+}
+
+/// A side of the border: its ends, with the normal and the way out there, and how far it is off a strip that turns evenly.
+struct Side {
+    ends: [Point; 2],
+    ways: [[Point; 2]; 2],
+    along: Point,
+    sag: f64,
+}
+
+impl Side {
+    /// None where both ends are hardly alike.
+    fn new(skin: &Skin, radius: f64, ends: [u32; 2]) -> Option<Self> {
+        let places = ends.map(|end| skin.places[end as usize]);
+        let mut ways = ends.map(|end| [skin.ups[end as usize], skin.outs[end as usize]]);
+        if dot(&ways[0][0], &ways[1][0]) < 0.0 {
+            ways[1][0] = ways[1][0].map(|part| -part);
+        }
+        if (0..2).any(|k| dot(&ways[0][k], &ways[1][k]) < LEAST_COSINE) {
+            return None;
+        }
+        let way = subtract(&places[1], &places[0]);
+        let bend = |k: usize, side: f64| {
+            let turned = subtract(&ways[1][k], &ways[0][k]);
+            dot(&lifted(&way, &turned, side), &turned).abs() / 8.0
+        };
+        let sag = bend(0, radius).max(bend(0, -radius)).max(bend(1, radius));
+        Some(Self { ends: places, ways, along: unit(&way), sag })
+    }
+
+    /// How far a vertex is off the side, as far out as the radius along the normals and the way out.
+    fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
+        let x = &skin.places[vertex as usize];
+        let way = subtract(&self.ends[1], &self.ends[0]);
+        let share = dot(&subtract(x, &self.ends[0]), &self.along) / dot(&way, &self.along);
+        let off = subtract(x, &between(&self.ends[0], &self.ends[1], share));
+        let own = [skin.ups[vertex as usize], skin.outs[vertex as usize]];
+        let turned = |k: usize| {
+            let mean = between(&self.ways[0][k], &self.ways[1][k], share);
+            let sign = if dot(&mean, &own[k]) < 0.0 { -1.0 } else { 1.0 };
+            std::array::from_fn(|axis| sign * own[k][axis] - mean[axis])
+        };
+        let across = |by: &Point, side: f64| {
+            let all = lifted(&off, by, side);
+            (dot(&all, &all) - dot(&all, &self.along).powi(2)).max(0.0).sqrt()
+        };
+        let [up, out] = [turned(0), turned(1)];
+        across(&up, radius).max(across(&up, -radius)).max(across(&out, radius))
+    }
+}
+
+/// A triangle: its corners as places on it and as far out on both sides, with the normals there, and how far sides are off sheets that turn evenly.
+struct Triangle {
+    corners: [Point; 3],
+    normal: Point,
+    sheets: [(Point, Point); 2],
+    sag: f64,
+}
+
+impl Triangle {
+    /// None where it is a sliver, or is not along both sheets.
+    fn new(skin: &Skin, radius: f64, corners: [u32; 3]) -> Option<Self> {
+        let places = corners.map(|corner| skin.places[corner as usize]);
+        let across = |[a, b, c]: &[Point; 3]| cross(&subtract(b, a), &subtract(c, a));
+        let raw = across(&places);
+        let longest = (0..3).map(|k| distance_squared(&places[k], &places[(k + 1) % 3])).fold(0.0, f64::max);
+        let double = dot(&raw, &raw).sqrt();
+        if double <= LEAST_HEIGHT * longest {
+            return None;
+        }
+        let normal = raw.map(|part| part / double);
+        let cosines = corners.map(|corner| dot(&normal, &skin.ups[corner as usize]));
+        if cosines.iter().any(|cosine| cosine.abs() < LEAST_COSINE) {
+            return None;
+        }
+        let mut sheets = [([0.0; 3], [0.0; 3]); 2];
+        let mut sag = 0.0_f64;
+        let ups: [Point; 3] = std::array::from_fn(|k| skin.ups[corners[k] as usize].map(|part| part * cosines[k].signum()));
+        for (sheet, side) in sheets.iter_mut().zip([radius, -radius]) {
+            let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side));
+            let own = unit(&across(&out));
+            if dot(&own, &normal) < LEAST_COSINE {
+                return None;
+            }
+            *sheet = (out[0], own);
+            // Of a curve with these normals at its ends.
+            for k in 0..3 {
+                let next = (k + 1) % 3;
+                sag = sag.max(dot(&subtract(&out[next], &out[k]), &subtract(&ups[next], &ups[k])).abs() / 8.0);
+            }
+        }
+        Some(Self { corners: places, normal, sheets, sag })
+    }
+
+    /// How far inside a place is, seen along the normal: the least of its shares in the corners.
+    fn depth(&self, x: &Point) -> f64 {
+        let side = |k: usize| {
+            let (a, b) = (&self.corners[k], &self.corners[(k + 1) % 3]);
+            dot(&self.normal, &cross(&subtract(b, a), &subtract(x, a)))
+        };
+        let all: Point = std::array::from_fn(side);
+        all.iter().fold(f64::INFINITY, |least, &own| least.min(own)) / all.iter().sum::<f64>()
+    }
+
+    /// How far a vertex is off the sheets on both sides.
+    fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
+        let (x, up) = (&skin.places[vertex as usize], &skin.ups[vertex as usize]);
+        let own = radius.copysign(dot(&self.normal, up));
+        let off = |(at, normal): &(Point, Point), side: f64| dot(normal, &subtract(&lifted(x, up, side * own), at)).abs();
+        off(&self.sheets[0], 1.0).max(off(&self.sheets[1], -1.0))
+    }
+}
+
+/// A place moved along a unit vector.
+pub(super) fn lifted(x: &Point, up: &Point, by: f64) -> Point {
+    std::array::from_fn(|axis| x[axis] + by * up[axis])
+}
+
+impl<'a> Coarse<'a> {
+    pub(super) fn new(skin: &'a Skin, radius: f64, turn: f64) -> Self {
+        let mesh = skin.mesh.clone();
+        let mut mender = Mender::default();
+        mender.start(&mesh);
+        let (first, next) = (vec![NONE; mesh.triangles() as usize], vec![NONE; skin.places.len()]);
+        let (gone, owners, fresh, normals, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { skin, radius, turn, mesh, mender, first, next, gone, owners, fresh, normals, lengths }
+    }
+
+    /// Removes vertices as long as no vertex that is gone is farther off a sheet than it may be.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn run(&mut self, most: &[f64], budget: &Budget) -> Result<(), Stopped> {
+        for share in PASSES {
+            for vertex in 0..self.skin.beyond() {
+                if vertex.is_multiple_of(IN_A_ROW) {
+                    budget.cancel.check()?;
+                }
+                if self.skin.turns[vertex as usize] >= self.turn && self.mesh.star(vertex, MOST_AROUND, &mut self.mender.star) {
+                    self.remove(vertex, share, most);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves a vertex, whose star is known, to the nearest neighbour that serves.
+    fn remove(&mut self, vertex: u32, share: f64, most: &[f64]) {
+        let Self { mesh, mender, first, next, gone, normals, lengths, .. } = self;
+        let ring = &mender.star.ring;
+        gone.clear();
+        gone.push(vertex);
+        for &half in &mender.star.halves {
+            let mut own = first[(half / 3) as usize];
+            while own != NONE {
+                gone.push(own);
+                own = next[own as usize];
+            }
+        }
+        let at = |corner: u32| &mesh.points[corner as usize];
+        let count = ring.len();
+        normals.clear();
+        normals.extend((0..count).map(|k| {
+            let (a, b) = (at(ring[k]), at(ring[(k + 1) % count]));
+            cross(&subtract(a, at(vertex)), &subtract(b, at(vertex)))
+        }));
+        lengths.clear();
+        // What is on the border goes along it.
+        let beyond = ring.iter().position(|&other| other == self.skin.beyond());
+        let may_go = |m: usize| beyond.is_none_or(|beyond| (m + 1) % count == beyond || (beyond + 1) % count == m);
+        let all = ring.iter().enumerate().filter(|&(m, _)| may_go(m));
+        lengths.extend(all.map(|(m, &other)| (distance_squared(at(vertex), at(other)), m)));
+        lengths.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for index in 0..self.lengths.len() {
+            let m = self.lengths[index].1;
+            if self.serves(m, share, most) && self.mender.keeps_manifold(&self.mesh, m) {
+                self.collapse(vertex, m);
+                return;
+            }
+        }
+    }
+
+    /// Whether the star's vertex may move to ring m.
+    fn serves(&mut self, m: usize, share: f64, most: &[f64]) -> bool {
+        let Self { skin, radius, mender, gone, owners, fresh, normals, .. } = self;
+        let ring = &mender.star.ring;
+        let count = ring.len();
+        fresh.clear();
+        for k in kept(Some(m), count) {
+            let corners = [ring[m], ring[k], ring[(k + 1) % count]];
+            let Some(own) = Fresh::new(skin, *radius, corners) else { return false };
+            if matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0) {
+                return false;
+            }
+            if corners.iter().any(|&corner| corner != skin.beyond() && own.sag() > share * most[corner as usize]) {
+                return false;
+            }
+            fresh.push(own);
+        }
+        owners.clear();
+        gone.iter().all(|&vertex| {
+            let depths = fresh.iter().map(|own| own.depth(skin, vertex)).enumerate();
+            let Some((owner, _)) = depths.max_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
+            owners.push(owner);
+            fresh[owner].error(skin, *radius, vertex) <= share * most[vertex as usize]
+        })
+    }
+
+    fn collapse(&mut self, vertex: u32, m: usize) {
+        let Self { mesh, mender, first, next, gone, owners, .. } = self;
+        mesh.collapse(vertex, &mender.star, m);
+        let halves = &mender.star.halves;
+        halves.iter().for_each(|half| first[(half / 3) as usize] = NONE);
+        let fresh: Vec<usize> = kept(Some(m), halves.len()).map(|k| (halves[k] / 3) as usize).collect();
+        for (&own, &owner) in gone.iter().zip(&*owners) {
+            let first = &mut first[fresh[owner]];
+            next[own as usize] = *first;
+            *first = own;
+        }
+    }
+
+    /// The triangles that are left, with what they are called.
+    pub(super) fn triangles(&self) -> (Vec<u32>, Vec<[u32; 3]>) {
+        let all = (0..self.mesh.triangles()).filter_map(|name| Some((name, self.mesh.triangle(name)?)));
+        all.filter(|(_, corners)| !corners.contains(&self.skin.beyond())).unzip()
+    }
+
+    /// Halves what may be off at the corners of a triangle and the vertices that it stands for.
+    pub(super) fn halve(&self, name: u32, most: &mut [f64]) {
+        for corner in self.mesh.triangle(name).into_iter().flatten() {
+            most[corner as usize] *= 0.5;
+        }
+        let mut own = self.first[name as usize];
+        while own != NONE {
+            most[own as usize] *= 0.5;
+            own = self.next[own as usize];
+        }
+    }
+}

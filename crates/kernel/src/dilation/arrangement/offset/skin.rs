@@ -1,0 +1,147 @@
+//! The surface that is dilated: triangles with common corners, of which little turns from one to the next.
+
+use crate::attractor::cell::{Point, cross, dot, subtract, unit};
+use crate::dilation::arrangement::faces::numbered;
+use crate::solid::half_edges::{HalfEdges, NONE};
+use crate::solid::topology::Incidence;
+
+/// Sides that a way to a place crosses at most.
+const MOST_STEPS: usize = 64;
+
+/// A surface of triangles with its normals.
+pub(super) struct Skin {
+    pub(super) places: Vec<Point>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// The same, joined where neighbours have a side in opposite directions, and behind them one for each side of the border, with a corner that all of these have and no other: so that nearly all that is around a vertex is closed.
+    pub(super) mesh: HalfEdges,
+    /// Unit normals of the triangles, and of the corners: up on one side, which may be another for another corner.
+    pub(super) normals: Vec<Point>,
+    pub(super) ups: Vec<Point>,
+    pub(super) around: Incidence,
+    /// The sides that one triangle alone has, as it has them, and which it is.
+    pub(super) borders: Vec<([u32; 2], u32)>,
+    /// Unit vectors that lead away from the surface at ends of these, and 0 elsewhere; and the cosine of the angle by which the border turns there.
+    pub(super) outs: Vec<Point>,
+    pub(super) turns: Vec<f64>,
+}
+
+impl Skin {
+    /// The surface of some triangles; none where the normal of one turns from that of a corner by more than `turn` tells, its cosine, where a side has more than two of them, or where most sides are flat, by no more than `flatness`:
+    /// then there are few faces. Cost: some tenths of a microsecond for each.
+    pub(super) fn new(faces: &[[Point; 3]], turn: f64, flatness: f64) -> Option<Self> {
+        let (places, triangles) = numbered(faces);
+        let mut normals = Vec::with_capacity(faces.len());
+        let mut ups = vec![[0.0; 3]; places.len()];
+        for (face, corners) in faces.iter().zip(&triangles) {
+            let normal = unit(&cross(&subtract(&face[1], &face[0]), &subtract(&face[2], &face[0])));
+            (dot(&normal, &normal) > 0.5).then(|| normals.push(normal))?;
+            for (k, &corner) in corners.iter().enumerate() {
+                let [a, b] = [1, 2].map(|step| subtract(&face[(k + step) % 3], &face[k]));
+                let angle = dot(&cross(&a, &b), &normal).atan2(dot(&a, &b));
+                let up = &mut ups[corner as usize];
+                let share = if dot(up, &normal) < 0.0 { -angle } else { angle };
+                *up = std::array::from_fn(|axis| up[axis] + share * normal[axis]);
+            }
+        }
+        ups.iter_mut().for_each(|up| *up = unit(up));
+        let leans = |(normal, corners): (&Point, &[u32; 3])| corners.iter().any(|&corner| dot(normal, &ups[corner as usize]).abs() < turn);
+        if normals.iter().zip(&triangles).any(leans) {
+            return None;
+        }
+        let (mut borders, mut flat, mut sides) = (Vec::new(), 0, 0);
+        let (mut outs, mut turns) = (vec![[0.0; 3]; places.len()], vec![1.0; places.len()]);
+        for edge in edges(&triangles).chunk_by(|a, b| a.ends == b.ends) {
+            sides += 1;
+            match edge {
+                [own] => {
+                    let [a, b] = own.of(&triangles);
+                    let out = unit(&cross(&subtract(&places[b as usize], &places[a as usize]), &normals[own.triangle as usize]));
+                    for end in [a, b] {
+                        let sum = &mut outs[end as usize];
+                        turns[end as usize] = if *sum == [0.0; 3] { -1.0 } else { dot(sum, &out) };
+                        *sum = std::array::from_fn(|axis| sum[axis] + out[axis]);
+                    }
+                    borders.push(([a, b], own.triangle));
+                }
+                [own, other] => {
+                    let corner = &places[triangles[other.triangle as usize][(other.side as usize + 2) % 3] as usize];
+                    let beside = subtract(corner, &places[own.ends[0] as usize]);
+                    flat += usize::from(dot(&normals[own.triangle as usize], &beside).abs() <= flatness);
+                }
+                _ => return None,
+            }
+        }
+        let around = Incidence::new(places.len(), &triangles);
+        outs.iter_mut().for_each(|out| *out = unit(out));
+        let beyond = places.len() as u32;
+        let more: Vec<[u32; 3]> = borders.iter().map(|&([a, b], _)| [b, a, beyond]).collect();
+        let mesh = HalfEdges::new([places.as_slice(), &[[0.0; 3]]].concat(), &[triangles.as_slice(), &more].concat());
+        (2 * flat <= sides).then_some(Self { places, triangles, mesh, normals, ups, around, borders, outs, turns })
+    }
+
+    /// The corner that none of its triangles has.
+    pub(super) fn beyond(&self) -> u32 {
+        self.places.len() as u32
+    }
+
+    /// Whether a vertex is on the border.
+    pub(super) fn is_border(&self, vertex: u32) -> bool {
+        self.outs[vertex as usize] != [0.0; 3]
+    }
+
+    /// A face that is about closest to a place, from another on: the way leads across sides that the place is beyond.
+    pub(super) fn near(&self, from: u32, x: &Point) -> u32 {
+        let mut face = from;
+        for _ in 0..MOST_STEPS {
+            let corners = self.triangles[face as usize].map(|corner| &self.places[corner as usize]);
+            let beyond = |k: usize| {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                let out = cross(&subtract(b, a), &self.normals[face as usize]);
+                dot(&out, &subtract(x, a)) / dot(&out, &out).sqrt()
+            };
+            let all: [f64; 3] = std::array::from_fn(beyond);
+            let k = (1..3).fold(0, |best, k| if all[k] > all[best] { k } else { best });
+            let twin = self.mesh.twin(3 * face + k as u32);
+            if all[k] <= 0.0 || twin == NONE || (twin / 3) as usize >= self.triangles.len() {
+                break;
+            }
+            face = twin / 3;
+        }
+        face
+    }
+
+    /// Where the corners of its triangles are.
+    pub(super) fn faces(&self) -> impl Iterator<Item = [Point; 3]> {
+        self.triangles.iter().map(|corners| corners.map(|corner| self.places[corner as usize]))
+    }
+}
+
+/// A side of a triangle.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Edge {
+    /// The lesser end first.
+    pub(super) ends: [u32; 2],
+    pub(super) triangle: u32,
+    pub(super) side: u32,
+}
+
+impl Edge {
+    /// Its ends as the triangle has them.
+    pub(super) fn of(&self, triangles: &[[u32; 3]]) -> [u32; 2] {
+        let corners = &triangles[self.triangle as usize];
+        [0, 1].map(|step| corners[(self.side as usize + step) % 3])
+    }
+}
+
+/// The sides of triangles, those with the same ends together.
+pub(super) fn edges(triangles: &[[u32; 3]]) -> Vec<Edge> {
+    let sides = triangles.iter().zip(0..).flat_map(|(corners, triangle)| {
+        [0, 1, 2].map(|side| {
+            let [a, b] = [corners[side], corners[(side + 1) % 3]];
+            Edge { ends: [a.min(b), a.max(b)], triangle, side: side as u32 }
+        })
+    });
+    let mut all: Vec<Edge> = sides.collect();
+    all.sort_unstable();
+    all
+}
