@@ -10,6 +10,8 @@ const DEPTH: u32 = 24;
 const MOST_PARTS: u32 = 1 << 18;
 const WIDE: f64 = 4.0;
 const MOST_CORNERS: usize = 16;
+/// How many times the most that is left of a squared distance the longest side's square is at least where a triangle is halved unasked: one body is near to little of it.
+const ASKED: f64 = 10.0;
 /// What rounding adds to a radius at most, as a share of it.
 const ROUNDED: f64 = 1e-12;
 
@@ -61,9 +63,11 @@ pub(super) fn radius(triangle: &[Point; 3], centre: &Point) -> f64 {
     triangle.iter().map(|corner| distance_squared(corner, centre)).fold(0.0, f64::max).sqrt() * (1.0 + ROUNDED)
 }
 
-/// A place of a triangle that may be farther than a distance from all bodies: those of a list, and those that are offered as what may be closest to a place. Cost: about a tenth of a microsecond for each body and part that is looked at.
+/// A place of a triangle that may be farther than a distance from all bodies: those of a list, and those that are offered as what may be closest to a place. Squared distances are what `square` says, which has to be convex on the triangle for each body, and
+/// no less than the body's own. Cost: about a tenth of a microsecond for each body and part that is looked at.
 pub(super) fn too_far<B: Body>(
     bodies: &[B],
+    square: impl Fn(u32, &Point) -> f64,
     listed: impl IntoIterator<Item = u32>,
     offer: impl Fn(&Point) -> Option<u32>,
     triangle: &[Point; 3],
@@ -75,9 +79,9 @@ pub(super) fn too_far<B: Body>(
     memory.seen.clear();
     memory.squares.clear();
     let near = listed.into_iter().filter(|&item| bodies[item as usize].may_reach(&centre, most + wide));
-    let all = near.map(|item| Seen::new(item, &bodies[item as usize], triangle));
+    let all = near.map(|item| Seen::new(item, &square, triangle));
     memory.seen.extend(all.filter(|seen| seen.squares[0] <= (most + 2.0 * wide).powi(2)));
-    Cover { bodies, offer, most, parts: MOST_PARTS, memory }.far(0, triangle, DEPTH)
+    Cover { bodies, square, offer, most, parts: MOST_PARTS, memory }.far(0, triangle, DEPTH)
 }
 
 /// A body, and its squared distances from the corners of a triangle.
@@ -88,8 +92,8 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(item: u32, body: &impl Body, triangle: &[Point; 3]) -> Self {
-        Self { item, squares: triangle.each_ref().map(|corner| body.distance_squared(corner)) }
+    fn new(item: u32, square: &impl Fn(u32, &Point) -> f64, triangle: &[Point; 3]) -> Self {
+        Self { item, squares: triangle.each_ref().map(|corner| square(item, corner)) }
     }
 }
 
@@ -102,8 +106,9 @@ pub(super) struct Memory {
 }
 
 /// Whether bodies are near to all of a triangle.
-struct Cover<'a, B, F> {
+struct Cover<'a, B, S, F> {
     bodies: &'a [B],
+    square: S,
     offer: F,
     most: f64,
     /// Parts that may be looked at.
@@ -118,7 +123,7 @@ enum Known {
     Nothing,
 }
 
-impl<B: Body, F: Fn(&Point) -> Option<u32>> Cover<'_, B, F> {
+impl<B: Body, S: Fn(u32, &Point) -> f64, F: Fn(&Point) -> Option<u32>> Cover<'_, B, S, F> {
     /// A place of a triangle that may be farther from all of the last bodies, given the first of these, and all that are offered.
     fn far(&mut self, first: usize, triangle: &[Point; 3], depth: u32) -> Option<Point> {
         let most = self.most;
@@ -129,7 +134,8 @@ impl<B: Body, F: Fn(&Point) -> Option<u32>> Cover<'_, B, F> {
         let long = |k: usize| distance_squared(&triangle[k], &triangle[(k + 1) % 3]);
         let k = (1..3).fold(0, |best, k| if long(k) >= long(best) { k } else { best });
         // Nothing much is near to all of what is much wider than the reach.
-        if long(k) < (WIDE * most).powi(2) {
+        let close = self.memory.seen[first..].iter().flat_map(|seen| seen.squares).fold(most * most, f64::min);
+        if long(k) < (WIDE * most).powi(2) && (long(k) < ASKED * (most * most - close) || close == most * most) {
             match self.look(first, triangle) {
                 Known::Near => return None,
                 Known::Far(place) => return Some(place),
@@ -145,7 +151,7 @@ impl<B: Body, F: Fn(&Point) -> Option<u32>> Cover<'_, B, F> {
         let (end, from) = (seen.len(), squares.len());
         squares.extend(seen[first..].iter().map(|seen| {
             let body = &self.bodies[seen.item as usize];
-            if body.may_reach(&half, reach) { body.distance_squared(&half) } else { f64::INFINITY }
+            if body.may_reach(&half, reach) { (self.square)(seen.item, &half) } else { f64::INFINITY }
         }));
         let found = [[a, half, c], [half, b, c]].iter().zip([1, 0]).find_map(|(part, new)| {
             let Memory { seen, squares } = &mut *self.memory;
@@ -170,12 +176,12 @@ impl<B: Body, F: Fn(&Point) -> Option<u32>> Cover<'_, B, F> {
             return Known::Near;
         }
         let mut place = rest.middle(triangle);
-        let is_near = |item: u32, place: &Point| self.bodies[item as usize].distance_squared(place) <= most;
+        let is_near = |item: u32, place: &Point| (self.square)(item, place) <= most;
         while let Some(item) = (self.offer)(&place)
             && seen[first..].iter().all(|seen| seen.item != item)
             && is_near(item, &place)
         {
-            let new = Seen::new(item, &self.bodies[item as usize], triangle);
+            let new = Seen::new(item, &self.square, triangle);
             if rest.is_gone_with(&new.squares, most) {
                 return Known::Near;
             }
@@ -204,7 +210,10 @@ impl Rest {
     /// The squared distance from a convex set is convex, so at most what it would be if it were affine: where that is small enough is a half-plane. Squares are at most some 100 times `most`, as bodies are near to some place of a triangle that is not wide, so that
     /// rounding moves its border, and with it what is left, by some 100 roundings of the distance: less than the slack of all bounds.
     fn is_gone_with(&mut self, squares: &[f64; 3], most: f64) -> bool {
-        let beyond = self.corners.map(|shares| dot(&shares, squares) - most);
+        let mut beyond = [0.0; MOST_CORNERS];
+        for (beyond, shares) in beyond.iter_mut().zip(&self.corners[..self.count]) {
+            *beyond = dot(shares, squares) - most;
+        }
         let (own, beyond) = (&self.corners[..self.count], &beyond[..self.count]);
         let is_kept = |k: usize| beyond[k % beyond.len()] > 0.0;
         let kept = (0..self.count).filter(|&k| is_kept(k)).count();
@@ -290,10 +299,11 @@ mod tests {
                 all.clone().min_by(|a, b| square(a).total_cmp(&square(b)))
             };
             let any = |x: &Point| Some((x[0].to_bits() >> 8) as u32 % dots.len() as u32);
+            let square = |item: u32, x: &Point| dots[item as usize].distance_squared(x);
             let found = [
-                too_far(&dots, all.clone(), |_| None, &triangle, most, &mut memory),
-                too_far(&dots, [], nearest, &triangle, most, &mut memory),
-                too_far(&dots, [0], any, &triangle, most, &mut memory),
+                too_far(&dots, square, all.clone(), |_| None, &triangle, most, &mut memory),
+                too_far(&dots, square, [], nearest, &triangle, most, &mut memory),
+                too_far(&dots, square, [0], any, &triangle, most, &mut memory),
             ];
             for (way, (found, count)) in found.iter().zip(&mut counts).enumerate() {
                 match found {

@@ -20,9 +20,11 @@ pub(super) enum Fault {
     Far(Point),
 }
 
-/// A triangle to look at, the triangles of the graph that are closest to its corners, where they are known, and the distances that it has to be between.
+/// A triangle to look at, the faces that are closest to its corners, where they are known, and the distances that it has to be between.
 pub(super) struct Question {
     pub(super) triangle: [Point; 3],
+    /// Places that its corners are out from: if there are such, what is between a place of the triangle and the one with the same shares in these has to be no farther than the greater distance, too.
+    pub(super) feet: Option<[Point; 3]>,
     pub(super) owners: [u32; 3],
     pub(super) inner: f64,
     pub(super) outer: f64,
@@ -111,25 +113,6 @@ impl Faces {
         (0..self.tree.leaves()).map(|leaf| self.tree.items(leaf)).filter(|items| !items.is_empty()).collect()
     }
 
-    /// The face that is closest to a place, if it is as near as a distance.
-    pub(super) fn nearest(&self, place: &Point, distance: f64) -> Option<u32> {
-        let (mut least, mut nearest) = (distance * distance, None);
-        let entry = |around: &Box32| {
-            let gap = |axis: usize| (f64::from(around.low[axis]) - place[axis]).max(place[axis] - f64::from(around.high[axis])).max(0.0);
-            Some((0..3).map(|axis| gap(axis).powi(2)).sum())
-        };
-        self.tree.nearest(least, entry, |leaf| {
-            for &item in self.tree.items(leaf) {
-                let square = self.all[item as usize].distance_squared(place);
-                if square < least {
-                    (least, nearest) = (square, Some(item));
-                }
-            }
-            least
-        });
-        nearest
-    }
-
     /// Whether something is so of all faces whose boxes are within a distance of that of some points.
     pub(super) fn within(&self, points: &[Point], distance: f64, mut is_so: impl FnMut(u32) -> bool) -> bool {
         let mut all = true;
@@ -152,7 +135,7 @@ impl Faces {
 
     /// Where a triangle is nearer or farther than it has to be, given what may be closest to a place. Cost: about a tenth of a microsecond for each face near to it.
     pub(super) fn fault_with(&self, offer: impl Fn(&Point) -> Option<u32>, question: &Question, memory: &mut Memory) -> Option<Fault> {
-        let Question { triangle, owners, inner, outer } = question;
+        let Question { triangle, feet, owners, inner, outer } = question;
         let normal = unit(&cross(&subtract(&triangle[1], &triangle[0]), &subtract(&triangle[2], &triangle[0])));
         let highest = lowest(triangle, &normal) - inner;
         let centre = middle(triangle);
@@ -174,13 +157,46 @@ impl Faces {
         }
         // Faces that are closest to the corners, and those that are offered for what these leave, mostly show that nothing is too far; where they do not, all are asked.
         let owners = (0..3).map(|k| owners[k]).enumerate().filter(|&(k, owner)| owner != NONE && !owners[..k].contains(&owner));
-        too_far(&self.all, owners.map(|(_, owner)| owner), offer, triangle, *outer, memory)?;
+        let foot = feet.as_ref().map(|feet| Foot::new(triangle, feet));
+        // The distance from a face is convex: where it is near to both ends, it is so to all that is between.
+        let square = |item: u32, x: &Point| {
+            let face = &self.all[item as usize];
+            let own = face.distance_squared(x);
+            foot.as_ref().map_or(own, |foot| own.max(face.distance_squared(&foot.of(x))))
+        };
+        too_far(&self.all, square, owners.map(|(_, owner)| owner), offer, triangle, *outer, memory)?;
         let mut near = Vec::new();
         self.around(triangle, *outer, |item| {
             near.push(item);
             true
         });
-        too_far(&self.all, near, |_| None, triangle, *outer, memory).map(Fault::Far)
+        too_far(&self.all, square, near, |_| None, triangle, *outer, memory).map(Fault::Far)
+    }
+}
+
+/// The map from a triangle to another, corner by corner.
+struct Foot {
+    origin: Point,
+    first: Point,
+    /// Vectors that tell how much of two sides a way has, and where these lead.
+    shares: [Point; 2],
+    ways: [Point; 2],
+}
+
+impl Foot {
+    fn new(triangle: &[Point; 3], feet: &[Point; 3]) -> Self {
+        let [p, q] = [1, 2].map(|k| subtract(&triangle[k], &triangle[0]));
+        let [pp, pq, qq] = [dot(&p, &p), dot(&p, &q), dot(&q, &q)];
+        let double = pp * qq - pq * pq;
+        let dual = |own: &Point, other: &Point, square: f64| std::array::from_fn(|axis| (square * own[axis] - pq * other[axis]) / double);
+        let ways = [1, 2].map(|k| subtract(&feet[k], &feet[0]));
+        Self { origin: triangle[0], first: feet[0], shares: [dual(&p, &q, qq), dual(&q, &p, pp)], ways }
+    }
+
+    fn of(&self, x: &Point) -> Point {
+        let way = subtract(x, &self.origin);
+        let [a, b] = self.shares.map(|share| dot(&way, &share));
+        std::array::from_fn(|axis| self.first[axis] + a * self.ways[0][axis] + b * self.ways[1][axis])
     }
 }
 

@@ -53,7 +53,7 @@ impl Limits<'_> {
     }
 
     fn question(&self, triangle: [Point; 3], owners: [u32; 3]) -> Question {
-        Question { triangle, owners, inner: self.inner, outer: self.outer }
+        Question { triangle, feet: None, owners, inner: self.inner, outer: self.outer }
     }
 }
 

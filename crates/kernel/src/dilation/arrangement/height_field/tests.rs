@@ -178,7 +178,7 @@ fn triangles_are_held_against_their_bounds() {
             found = [found[0].min(distance), found[1].max(distance)];
         }
         let close = 0.06 * wide + 1e-9;
-        let question = Question { triangle, owners: [top.owner; 3], inner, outer };
+        let question = Question { triangle, feet: None, owners: [top.owner; 3], inner, outer };
         match faces.fault(&field, &question, &mut memory) {
             None => {
                 assert!(found[0] >= inner - 1e-9 && found[1] <= outer + 1e-9, "{triangle:?}: {found:?}");

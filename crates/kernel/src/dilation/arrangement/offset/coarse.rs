@@ -10,6 +10,8 @@ use crate::solid::mend::{MOST_AROUND, Mender};
 const PASSES: [f64; 4] = [0.05, 0.2, 0.5, 1.0];
 /// The least cosine of the angle between a triangle and its corners' normals, or its sheets.
 const LEAST_COSINE: f64 = 0.8;
+/// What strips may be off, as a share of what sheets may: they are flat from row to row, too.
+const STRIP: f64 = 0.6;
 /// The least height of a triangle, as a share of its longest side.
 const LEAST_HEIGHT: f64 = 0.02;
 /// Vertices that are looked at before a stop is noticed.
@@ -98,7 +100,7 @@ impl Side {
             let turned = subtract(&ways[1][k], &ways[0][k]);
             dot(&lifted(&way, &turned, side), &turned).abs() / 8.0
         };
-        let sag = bend(0, radius).max(bend(0, -radius)).max(bend(1, radius));
+        let sag = bend(0, radius).max(bend(0, -radius)).max(bend(1, radius)) / STRIP;
         Some(Self { ends: places, ways, along: unit(&way), sag })
     }
 
@@ -119,7 +121,7 @@ impl Side {
             (dot(&all, &all) - dot(&all, &self.along).powi(2)).max(0.0).sqrt()
         };
         let [up, out] = [turned(0), turned(1)];
-        across(&up, radius).max(across(&up, -radius)).max(across(&out, radius))
+        across(&up, radius).max(across(&up, -radius)).max(across(&out, radius)) / STRIP
     }
 }
 

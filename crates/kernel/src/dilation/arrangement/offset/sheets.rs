@@ -6,6 +6,9 @@ use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::solid::half_edges::NONE;
 use std::f64::consts::PI;
 
+/// The bits of where a triangle's corners are.
+pub(super) type Name = [[u64; 3]; 3];
+
 /// A surface around triangles.
 #[derive(Default)]
 pub(super) struct Sheets {
@@ -111,8 +114,8 @@ impl Sheets {
     }
 
     /// What a triangle is called: where its corners are.
-    pub(super) fn name(&self, triangle: usize) -> [[u64; 3]; 3] {
-        self.triangles[triangle].map(|corner| self.vertices[corner as usize].map(f64::to_bits))
+    pub(super) fn name(&self, triangle: u32) -> Name {
+        self.triangles[triangle as usize].map(|corner| self.vertices[corner as usize].map(f64::to_bits))
     }
 
     fn add(&mut self, skin: &Skin, foot: u32, way: Point, distance: f64, round: impl Fn(f64) -> f64) -> u32 {

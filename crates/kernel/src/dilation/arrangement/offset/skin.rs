@@ -55,7 +55,7 @@ impl Skin {
             match edge {
                 [own] => {
                     let [a, b] = own.of(&triangles);
-                    let out = unit(&cross(&subtract(&places[b as usize], &places[a as usize]), &normals[own.triangle as usize]));
+                    let out = own.inward(&places, &triangles, &normals).map(|part| -part);
                     for end in [a, b] {
                         let sum = &mut outs[end as usize];
                         turns[end as usize] = if *sum == [0.0; 3] { -1.0 } else { dot(sum, &out) };
@@ -64,6 +64,11 @@ impl Skin {
                     borders.push(([a, b], own.triangle));
                 }
                 [own, other] => {
+                    let [inward, other_inward] = [own, other].map(|edge| edge.inward(&places, &triangles, &normals));
+                    // One that is folded back has normals that are alike, too.
+                    if dot(&inward, &other_inward) > -turn {
+                        return None;
+                    }
                     let corner = &places[triangles[other.triangle as usize][(other.side as usize + 2) % 3] as usize];
                     let beside = subtract(corner, &places[own.ends[0] as usize]);
                     flat += usize::from(dot(&normals[own.triangle as usize], &beside).abs() <= flatness);
@@ -130,6 +135,14 @@ impl Edge {
     pub(super) fn of(&self, triangles: &[[u32; 3]]) -> [u32; 2] {
         let corners = &triangles[self.triangle as usize];
         [0, 1].map(|step| corners[(self.side as usize + step) % 3])
+    }
+}
+
+impl Edge {
+    /// The unit vector across the side that leads over its triangle.
+    fn inward(&self, places: &[Point], triangles: &[[u32; 3]], normals: &[Point]) -> Point {
+        let [a, b] = self.of(triangles).map(|end| &places[end as usize]);
+        unit(&cross(&normals[self.triangle as usize], &subtract(b, a)))
     }
 }
 

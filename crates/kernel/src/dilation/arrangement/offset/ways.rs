@@ -22,10 +22,10 @@ const IN_A_ROW: usize = 64;
 
 /// A surface, and the distances from it between which the ways are asked for.
 pub(super) struct Ways<'a> {
-    pub(super) skin: &'a Skin,
-    pub(super) faces: &'a Faces,
-    pub(super) inner: f64,
-    pub(super) outer: f64,
+    skin: &'a Skin,
+    faces: &'a Faces,
+    inner: f64,
+    outer: f64,
 }
 
 /// A direction, and the cosine and sine of the angle by which others differ from it that it stands for.
@@ -35,7 +35,11 @@ struct Cone {
     sine: f64,
 }
 
-impl Ways<'_> {
+impl<'a> Ways<'a> {
+    pub(super) fn new(skin: &'a Skin, faces: &'a Faces, [inner, outer]: [f64; 2]) -> Self {
+        Self { skin, faces, inner, outer }
+    }
+
     /// Whether all faces that are as near to some place of the hull of some points as the outer distance are left behind along a direction: lower than a height.
     fn leaves(&self, points: &[Point], along: &Point, height: f64) -> bool {
         let count = points.len() as f64;
@@ -63,21 +67,17 @@ impl Ways<'_> {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn lead_out(&self, budget: &Budget) -> Result<bool, Stopped> {
-        let leaves = self.faces.groups();
-        let cones = cones();
-        let around = |vertex: &u32| -> Vec<Point> {
-            let from = &self.skin.places[*vertex as usize];
-            let others = self.skin.around.at(*vertex).iter().flat_map(|&triangle| self.skin.triangles[triangle as usize]);
-            others.filter(|other| other != vertex).map(|other| unit(&subtract(&self.skin.places[other as usize], from))).collect()
+        let Self { skin, faces, .. } = self;
+        let (groups, cones) = (faces.groups(), cones());
+        let at = |vertex: u32| skin.places[vertex as usize];
+        let rays = |vertex: u32| -> Vec<Point> {
+            let others = skin.around.at(vertex).iter().flat_map(|&triangle| skin.triangles[triangle as usize]);
+            others.filter(|&other| other != vertex).map(|other| unit(&subtract(&at(other), &at(vertex)))).collect()
         };
-        let is_plain = |group: &[u32]| self.lead_from(group) || group.iter().all(|&face| self.lead_from(&[face]));
-        let corners: Vec<u32> = (0..self.skin.beyond()).filter(|&vertex| self.skin.is_border(vertex)).collect();
-        let at = |vertex: u32| self.skin.places[vertex as usize];
-        Ok(all(&leaves, budget, |group| is_plain(group))?
-            && all(&corners, budget, |vertex| {
-                self.lead_around(&[at(*vertex)], &around(vertex), &cones)
-            })?
-            && all(&self.skin.borders, budget, |(ends, triangle)| self.lead_beyond(&ends.map(at), &self.skin.normals[*triangle as usize]))?)
+        let borders: Vec<u32> = (0..skin.beyond()).filter(|&vertex| skin.is_border(vertex)).collect();
+        Ok(all(&groups, budget, |group| self.lead_from(group) || group.iter().all(|&face| self.lead_from(&[face])))?
+            && all(&skin.borders, budget, |(ends, triangle)| self.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
+            && all(&borders, budget, |&vertex| self.lead_around(&at(vertex), &rays(vertex), &cones))?)
     }
 
     /// Whether it is so on both sides of some faces, for the directions away from the inside of these and around corners within.
@@ -110,11 +110,11 @@ impl Ways<'_> {
         Ways { outer: self.outer + beside, ..*self }.leaves(&points, axis, height)
     }
 
-    /// Likewise of a place, or all between two, from which the surface goes on along some rays, in all directions.
-    fn lead_around(&self, places: &[Point], rays: &[Point], cones: &[Cone]) -> bool {
+    /// Likewise of a place from which the surface goes on along some rays, in all directions.
+    fn lead_around(&self, place: &Point, rays: &[Point], cones: &[Cone]) -> bool {
         // No place out along such a direction has this one closest: going along a ray leads closer.
         let is_beside = |cone: &Cone| rays.iter().any(|ray| dot(ray, &cone.axis) > cone.sine + NOISE);
-        cones.iter().all(|cone| is_beside(cone) || self.lead_along(places, cone))
+        cones.iter().all(|cone| is_beside(cone) || self.lead_along(&[*place], cone))
     }
 
     /// Likewise of the inside of a side of the border, given the normal of its triangle: in all directions across the side that do not lead over the triangle.

@@ -366,7 +366,8 @@ fn fault(wires: &Wires, triangle: &[Point; 3], [inner, outer]: [f64; 2]) -> Opti
         return found;
     }
     let offer = |x: &Point| wires.closest([x[0], x[1]]).map(|(item, _)| item);
-    too_far(&wires.bodies, [], offer, triangle, outer, &mut Memory::default()).map(Fault::Far)
+    let square = |item: u32, x: &Point| wires.bodies[item as usize].distance_squared(x);
+    too_far(&wires.bodies, square, [], offer, triangle, outer, &mut Memory::default()).map(Fault::Far)
 }
 
 #[cfg(test)]

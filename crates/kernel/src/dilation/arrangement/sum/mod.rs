@@ -154,8 +154,6 @@ pub(super) fn is_embedded(surface: &mut BlockSurface, budget: &Budget) -> Result
         Err(SolidError::Stopped(stopped)) => return Err(stopped),
         Err(_) => false,
     };
-    if std::env::var_os("TELL").is_some() { let c = Crossings::of(&mesh, budget)?; eprintln!("closed {is_closed} {:?} crossings {}", Topology::of(&mesh, budget), c.count);
-      for [a, b] in c.first.iter().take(3) { for t in [a, b] { eprintln!("  {t} {:?} {:?}", mesh.triangles[*t as usize], mesh.points_of(*t)); } } }
     let is_embedded = is_closed && Crossings::of(&mesh, budget)?.count == 0;
     surface.triangles = mesh.triangles;
     Ok(is_embedded)
