@@ -35,6 +35,12 @@ impl Box32 {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
+    /// The largest value along a direction, up to rounding.
+    #[inline]
+    pub(crate) fn highest(&self, along: &Point) -> f64 {
+        (0..3).map(|axis| (along[axis] * f64::from(self.low[axis])).max(along[axis] * f64::from(self.high[axis]))).sum()
+    }
+
     #[inline]
     pub(crate) fn meets(&self, other: &Self) -> bool {
         (self.low.cmple(other.high) & other.low.cmple(self.high)).all()
@@ -208,6 +214,28 @@ impl BoxTree {
             stack[height] = 2 * node as u32 + 1;
             stack[height + 1] = 2 * node as u32;
             height += 2;
+        }
+    }
+
+    /// Calls `visit` with the leaves whose boxes are wanted, as those of all that is above them are, until it answers false.
+    pub(crate) fn query_wanted(&self, is_wanted: impl Fn(&Box32) -> bool, mut visit: impl FnMut(usize) -> bool) {
+        // Depth-first: at most one node waits at every level.
+        let mut stack = [0_u32; 33];
+        let mut height = 1;
+        stack[0] = 1;
+        while height > 0 {
+            height -= 1;
+            let node = stack[height] as usize;
+            if !is_wanted(&self.nodes[node]) {
+                continue;
+            }
+            if node < self.leaves {
+                stack[height] = 2 * node as u32 + 1;
+                stack[height + 1] = 2 * node as u32;
+                height += 2;
+            } else if !visit(node - self.leaves) {
+                return;
+            }
         }
     }
 

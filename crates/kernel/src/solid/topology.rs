@@ -212,6 +212,11 @@ impl Incidence {
         Self { offsets, triangles }
     }
 
+    /// How many triangles are at a vertex at most.
+    pub(crate) fn most(&self) -> usize {
+        self.offsets.windows(2).map(|pair| (pair[1] - pair[0]) as usize).max().unwrap_or(0)
+    }
+
     /// The triangles at a vertex, in their order.
     pub(crate) fn at(&self, vertex: u32) -> &[u32] {
         &self.triangles[self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]

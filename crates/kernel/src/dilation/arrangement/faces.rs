@@ -15,7 +15,7 @@ const STEPS: usize = 2;
 /// A place where a triangle may not be as it is.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Fault {
-    /// The place, and what of the graph is close to it.
+    /// The place, and what of the faces is close to it.
     Near(Point, Point),
     Far(Point),
 }
@@ -30,13 +30,13 @@ pub(super) struct Question {
     pub(super) outer: f64,
 }
 
-/// The triangles of a graph, or of the same upside down, for searches.
+/// Triangles for searches.
 pub(super) struct Faces {
     pub(super) all: Vec<Face>,
     tree: BoxTree,
 }
 
-/// A triangle of the graph with its normal up, and the ball around its middle that holds it.
+/// A triangle with its normal, and the ball around its middle that holds it.
 pub(super) struct Face {
     pub(super) corners: [Point; 3],
     pub(super) normal: Point,
@@ -113,20 +113,22 @@ impl Faces {
         (0..self.tree.leaves()).map(|leaf| self.tree.items(leaf)).filter(|items| !items.is_empty()).collect()
     }
 
-    /// Whether something is so of all faces whose boxes are within a distance of that of some points.
-    pub(super) fn within(&self, points: &[Point], distance: f64, mut is_so: impl FnMut(u32) -> bool) -> bool {
-        let mut all = true;
-        self.around(points, distance, |item| {
-            all = is_so(item);
-            all
+    /// Whether something is so of all faces whose boxes are within a distance of that of some points, and are not all lower than a height along a direction.
+    pub(super) fn hold(&self, points: &[Point], distance: f64, along: &Point, height: f64, is_so: impl Fn(&Face) -> bool) -> bool {
+        let within = grown(points, distance);
+        let is_wanted = |own: &Box32| within.meets(own) && own.highest(along) >= height;
+        let mut hold = true;
+        self.tree.query_wanted(is_wanted, |leaf| {
+            let own = self.tree.items(leaf).iter().zip(self.tree.boxes(leaf));
+            hold = own.filter(|(_, theirs)| is_wanted(theirs)).all(|(&item, _)| is_so(&self.all[item as usize]));
+            hold
         });
-        all
+        hold
     }
 
     /// Calls `visit` with the faces whose boxes are within a distance of that of some points, until it answers false.
     pub(super) fn around(&self, points: &[Point], distance: f64, mut visit: impl FnMut(u32) -> bool) {
-        let [low, high] = figure::box_of(points);
-        let within = Box32::of(&[low.map(|x| x - distance), high.map(|x| x + distance)]);
+        let within = grown(points, distance);
         self.tree.query(&within, 0, |leaf| {
             let mut own = self.tree.items(leaf).iter().zip(self.tree.boxes(leaf));
             own.all(|(&item, theirs)| !within.meets(theirs) || visit(item))
@@ -157,7 +159,10 @@ impl Faces {
         }
         // Faces that are closest to the corners, and those that are offered for what these leave, mostly show that nothing is too far; where they do not, all are asked.
         let owners = (0..3).map(|k| owners[k]).enumerate().filter(|&(k, owner)| owner != NONE && !owners[..k].contains(&owner));
-        let foot = feet.as_ref().map(|feet| Foot::new(triangle, feet));
+        let foot = match feet.as_ref().map(|feet| Foot::new(triangle, feet)) {
+            Some(None) => return Some(Fault::Far(triangle[0])),
+            foot => foot.flatten(),
+        };
         // The distance from a face is convex: where it is near to both ends, it is so to all that is between.
         let square = |item: u32, x: &Point| {
             let face = &self.all[item as usize];
@@ -174,6 +179,12 @@ impl Faces {
     }
 }
 
+/// A box around all that is no farther from that of some points than a distance.
+fn grown(points: &[Point], distance: f64) -> Box32 {
+    let [low, high] = figure::box_of(points);
+    Box32::of(&[low.map(|x| x - distance), high.map(|x| x + distance)])
+}
+
 /// The map from a triangle to another, corner by corner.
 struct Foot {
     origin: Point,
@@ -184,13 +195,14 @@ struct Foot {
 }
 
 impl Foot {
-    fn new(triangle: &[Point; 3], feet: &[Point; 3]) -> Self {
+    /// None for a triangle without area.
+    fn new(triangle: &[Point; 3], feet: &[Point; 3]) -> Option<Self> {
         let [p, q] = [1, 2].map(|k| subtract(&triangle[k], &triangle[0]));
         let [pp, pq, qq] = [dot(&p, &p), dot(&p, &q), dot(&q, &q)];
         let double = pp * qq - pq * pq;
         let dual = |own: &Point, other: &Point, square: f64| std::array::from_fn(|axis| (square * own[axis] - pq * other[axis]) / double);
         let ways = [1, 2].map(|k| subtract(&feet[k], &feet[0]));
-        Self { origin: triangle[0], first: feet[0], shares: [dual(&p, &q, qq), dual(&q, &p, pp)], ways }
+        (double > 0.0).then(|| Self { origin: triangle[0], first: feet[0], shares: [dual(&p, &q, qq), dual(&q, &p, pp)], ways })
     }
 
     fn of(&self, x: &Point) -> Point {

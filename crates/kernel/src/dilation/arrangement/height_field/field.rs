@@ -1,7 +1,7 @@
 //! How high the dilation of a graph is over a place.
 
-use super::Place;
 use super::super::faces::Faces;
+use super::Place;
 use super::ground::Ground;
 use super::parts::{Part, Top, parts};
 use super::squares::Squares;

@@ -24,11 +24,11 @@ mod squares;
 mod tests;
 
 use super::Flat;
+use super::faces::{Faces, Question};
 use super::figure::{self, Figure};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::plan::Setting;
-use super::faces::{Faces, Question};
 use ground::Ground;
 use pair::{BYTES_PER_FACE, Pair};
 

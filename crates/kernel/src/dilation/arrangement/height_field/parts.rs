@@ -1,7 +1,7 @@
 //! The parts of a graph that are closest to some place above it: triangles, ridges and tips.
 
-use super::Place;
 use super::super::faces::{Face, Faces};
+use super::Place;
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::solid::half_edges::{HalfEdges, NONE, Star, next, previous};
 

@@ -3,8 +3,8 @@
 //! Places are added where samples are far off the sheet (Garland, Heckbert, "Fast polygonal approximation of terrains and height fields", 1995), on creases as on all else, and then where triangles are nearer to the graph or farther from it than they may be, each held against all of it.
 
 use super::super::between::{Memory, middle};
-use super::super::plane::{self, Mesh, corners, handle, inside, key};
 use super::super::faces::{Faces, Fault};
+use super::super::plane::{self, Mesh, corners, handle, inside, key};
 use super::field::Field;
 use super::ground::Ground;
 use super::samples::Samples;

@@ -1,8 +1,8 @@
 use super::super::between::Memory;
+use super::super::faces::{Faces, Fault, Question};
 use super::super::testing::{
     arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, topology,
 };
-use super::super::faces::{Faces, Fault, Question};
 use super::field::Field;
 use super::ground::Ground;
 use super::pair::{is_plane, rim};

@@ -3,7 +3,7 @@
 //! Let S be the union of faces of which no two turn by much where they have a side in common, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
 //! are moved in all directions away from S, too (`sheets`). What comes out bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
-//! * All of its triangles have s <= d <= t, and so has each way from a place of one of these to the place with the same shares in the feet of its corners d <= t (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of M: where no cell is, it winds around nothing. So M is in D_t(S).
+//! * All of its triangles have s <= d <= t, and so has each way from a place of one of these to the place with the same shares in the feet of its corners d <= t (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of M: where no cell is, the boundary winds around nothing. So M is in D_t(S).
 //! * It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
 //! * Wherever s <= d(x) <= t there is a direction w with w . (x - c) > 0 for all places c of S that are closest to x; and at places of the boundary of M there is one that leaves it through all facets there, too (`ways`).
 //!
@@ -37,9 +37,10 @@ use std::cell::Cell;
 use std::collections::HashSet;
 use ways::Ways;
 
-/// Shares of half the band: by which sheets may be nearer where the surface turns at corners, and how far off them places may be that they go by.
-const TURNED: f64 = 0.3;
+/// Shares of half the band: by which sheets may be nearer where the surface turns at corners, how far off them places may be that they go by, and both together.
+const TURNED: f64 = 0.75;
 const OFF: f64 = 0.75;
+const BOTH: f64 = 0.95;
 /// How far out strips around borders are, their sides across these, and their triangles around corners, beyond the radius in units of half the band.
 const RIM: f64 = 0.4;
 const SIDE: f64 = -0.3;
@@ -75,7 +76,7 @@ pub(super) fn surface(
     }
     let at = |share: f64| radius + share * half;
     let [row, column] = [[SIDE, RIM], [FACET, SIDE]].map(|[near, far]| 2.0 * (at(near) / at(far)).acos());
-    let mut most = vec![OFF * half; skin.places.len()];
+    let mut most: Vec<f64> = skin.cosines.iter().map(|cosine| (BOTH * half - radius * (1.0 - cosine)).min(OFF * half)).collect();
     let mut good = HashSet::new();
     for round_number in 0..ROUNDS {
         let mut coarse = Coarse::new(&skin, radius, column.cos());
@@ -83,6 +84,13 @@ pub(super) fn surface(
         let (names, left) = coarse.triangles();
         let share = 1.0 + FINER * f64::from(round_number);
         let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share };
+        let expected = shape.triangles(&skin, &left);
+        if expected > 2.0 * budget.limits.triangles as f64 {
+            return Ok(Some(Flat::Beyond(expected)));
+        }
+        if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
+            return Ok(None);
+        }
         let Some(sheets) = Sheets::new(&skin, &left, &shape, &round) else { return Ok(None) };
         let faults = around.faults(&sheets, &good, budget)?;
         if faults.is_empty() {
@@ -149,6 +157,6 @@ fn holds(surface: &BlockSurface, skin: &Skin) -> bool {
     let inside = Inside::new(&mesh);
     let groups = Groups::of_triangles(skin.places.len(), &skin.triangles).all();
     // A group is called by the least of its vertices.
-    let firsts = (0..).zip(&groups).filter(|&(vertex, &group)| vertex == group).map(|(vertex, _)| vertex as usize);
-    firsts.into_iter().all(|first| inside.winding(DVec3::from_array(skin.places[first])) == 1)
+    let mut firsts = (0..).zip(&groups).filter(|&(vertex, &group)| vertex == group).map(|(vertex, _)| vertex as usize);
+    firsts.all(|first| inside.winding(DVec3::from_array(skin.places[first])) == 1)
 }

@@ -6,8 +6,8 @@ use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::solid::half_edges::NONE;
 use std::f64::consts::PI;
 
-/// The bits of where a triangle's corners are.
-pub(super) type Name = [[u64; 3]; 3];
+/// The bits of where a triangle's corners are, and their feet.
+pub(super) type Name = [([u64; 3], u32); 3];
 
 /// A surface around triangles.
 #[derive(Default)]
@@ -39,11 +39,26 @@ struct Outward {
     goes: Option<Point>,
 }
 
+impl Shape {
+    /// Rows of triangles along a strip.
+    fn rows(&self) -> usize {
+        (PI / self.row).ceil().max(2.0) as usize
+    }
+
+    /// About how many triangles sheets will have.
+    pub(super) fn triangles(&self, skin: &Skin, triangles: &[[u32; 3]]) -> f64 {
+        let mut borders: Vec<u32> = triangles.iter().flatten().copied().filter(|&corner| skin.is_border(corner)).collect();
+        borders.sort_unstable();
+        borders.dedup();
+        let columns = borders.iter().map(|&corner| 1.0 + skin.turns[corner as usize].clamp(-1.0, 1.0).acos() / self.column);
+        2.0 * (triangles.len() as f64 + self.rows() as f64 * columns.sum::<f64>())
+    }
+}
+
 impl Sheets {
     /// The sheets along triangles of a surface; none where its border turns inward at a corner, or meets itself.
     pub(super) fn new(skin: &Skin, triangles: &[[u32; 3]], shape: &Shape, round: impl Fn(f64) -> f64) -> Option<Self> {
         let mut sheets = Self::default();
-        let rows = (PI / shape.row).ceil().max(2.0) as usize;
         let mut numbers = vec![[NONE; 2]; skin.places.len()];
         let mut vertex = |sheets: &mut Self, foot: u32, is_up: bool| {
             let number = &mut numbers[foot as usize][usize::from(is_up)];
@@ -96,7 +111,7 @@ impl Sheets {
                 continue;
             };
             let ends = [true, false].map(|is_up| vertex(&mut sheets, foot, is_up));
-            columns.push(sheets.columns(skin, foot, [comes, goes], shape, rows, ends, &round)?);
+            columns.push(sheets.columns(skin, foot, [comes, goes], shape, ends, &round)?);
         }
         for ([a, b], is_up) in &borders {
             let column = |end: u32, is_up: bool, is_first: bool| {
@@ -113,9 +128,9 @@ impl Sheets {
         Some(sheets)
     }
 
-    /// What a triangle is called: where its corners are.
+    /// What a triangle is called.
     pub(super) fn name(&self, triangle: u32) -> Name {
-        self.triangles[triangle as usize].map(|corner| self.vertices[corner as usize].map(f64::to_bits))
+        self.triangles[triangle as usize].map(|corner| (self.vertices[corner as usize].map(f64::to_bits), self.feet[corner as usize]))
     }
 
     fn add(&mut self, skin: &Skin, foot: u32, way: Point, distance: f64, round: impl Fn(f64) -> f64) -> u32 {
@@ -132,11 +147,10 @@ impl Sheets {
         foot: u32,
         [comes, goes]: [&Point; 2],
         shape: &Shape,
-        rows: usize,
         [first, last]: [u32; 2],
         round: impl Fn(f64) -> f64,
     ) -> Option<Columns> {
-        let up = &skin.ups[foot as usize];
+        let (up, rows) = (&skin.ups[foot as usize], shape.rows());
         let turn = dot(&cross(comes, goes), up).atan2(dot(comes, goes));
         let steps = if turn.abs() < shape.column { 0 } else { (turn / shape.column).ceil() as i32 };
         // Where it turns inward strips would cross each other.

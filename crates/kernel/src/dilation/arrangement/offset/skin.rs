@@ -7,6 +7,12 @@ use crate::solid::topology::Incidence;
 
 /// Sides that a way to a place crosses at most.
 const MOST_STEPS: usize = 64;
+/// Triangles at a corner at most.
+const MOST_AROUND: usize = 1_000;
+/// Twice the area of a triangle over the square of its longest side at least.
+const SLIVER: f64 = 1e-6;
+/// The cosine of the angle between triangles at a common side at most.
+const FOLDED: f64 = -0.5;
 
 /// A surface of triangles with its normals.
 pub(super) struct Skin {
@@ -17,6 +23,8 @@ pub(super) struct Skin {
     /// Unit normals of the triangles, and of the corners: up on one side, which may be another for another corner.
     pub(super) normals: Vec<Point>,
     pub(super) ups: Vec<Point>,
+    /// The least cosine of the angles between a corner's normal and those of its triangles.
+    pub(super) cosines: Vec<f64>,
     pub(super) around: Incidence,
     /// The sides that one triangle alone has, as it has them, and which it is.
     pub(super) borders: Vec<([u32; 2], u32)>,
@@ -26,15 +34,15 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    /// The surface of some triangles; none where the normal of one turns from that of a corner by more than `turn` tells, its cosine, where a side has more than two of them, or where most sides are flat, by no more than `flatness`:
+    /// The surface of some triangles; none where the normal of one turns from that of a corner by more than `turn` tells, its cosine, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, or where most inner sides are flat, by no more than `flatness`:
     /// then there are few faces. Cost: some tenths of a microsecond for each.
     pub(super) fn new(faces: &[[Point; 3]], turn: f64, flatness: f64) -> Option<Self> {
         let (places, triangles) = numbered(faces);
         let mut normals = Vec::with_capacity(faces.len());
         let mut ups = vec![[0.0; 3]; places.len()];
         for (face, corners) in faces.iter().zip(&triangles) {
-            let normal = unit(&cross(&subtract(&face[1], &face[0]), &subtract(&face[2], &face[0])));
-            (dot(&normal, &normal) > 0.5).then(|| normals.push(normal))?;
+            let normal = upright(face)?;
+            normals.push(normal);
             for (k, &corner) in corners.iter().enumerate() {
                 let [a, b] = [1, 2].map(|step| subtract(&face[(k + step) % 3], &face[k]));
                 let angle = dot(&cross(&a, &b), &normal).atan2(dot(&a, &b));
@@ -44,14 +52,19 @@ impl Skin {
             }
         }
         ups.iter_mut().for_each(|up| *up = unit(up));
-        let leans = |(normal, corners): (&Point, &[u32; 3])| corners.iter().any(|&corner| dot(normal, &ups[corner as usize]).abs() < turn);
-        if normals.iter().zip(&triangles).any(leans) {
+        let mut cosines = vec![1.0_f64; places.len()];
+        for (normal, corners) in normals.iter().zip(&triangles) {
+            for &corner in corners {
+                let least = &mut cosines[corner as usize];
+                *least = least.min(dot(normal, &ups[corner as usize]).abs());
+            }
+        }
+        if cosines.iter().any(|&cosine| cosine < turn) {
             return None;
         }
-        let (mut borders, mut flat, mut sides) = (Vec::new(), 0, 0);
+        let (mut borders, mut flat, mut inner) = (Vec::new(), 0, 0);
         let (mut outs, mut turns) = (vec![[0.0; 3]; places.len()], vec![1.0; places.len()]);
         for edge in edges(&triangles).chunk_by(|a, b| a.ends == b.ends) {
-            sides += 1;
             match edge {
                 [own] => {
                     let [a, b] = own.of(&triangles);
@@ -64,9 +77,10 @@ impl Skin {
                     borders.push(([a, b], own.triangle));
                 }
                 [own, other] => {
+                    inner += 1;
                     let [inward, other_inward] = [own, other].map(|edge| edge.inward(&places, &triangles, &normals));
-                    // One that is folded back has normals that are alike, too.
-                    if dot(&inward, &other_inward) > -turn {
+                    // Folded back, normals are alike, too.
+                    if dot(&inward, &other_inward) > FOLDED {
                         return None;
                     }
                     let corner = &places[triangles[other.triangle as usize][(other.side as usize + 2) % 3] as usize];
@@ -81,7 +95,10 @@ impl Skin {
         let beyond = places.len() as u32;
         let more: Vec<[u32; 3]> = borders.iter().map(|&([a, b], _)| [b, a, beyond]).collect();
         let mesh = HalfEdges::new([places.as_slice(), &[[0.0; 3]]].concat(), &[triangles.as_slice(), &more].concat());
-        (2 * flat <= sides).then_some(Self { places, triangles, mesh, normals, ups, around, borders, outs, turns })
+        if around.most() > MOST_AROUND {
+            return None;
+        }
+        (2 * flat < inner).then_some(Self { places, triangles, mesh, normals, ups, cosines, around, borders, outs, turns })
     }
 
     /// The corner that none of its triangles has.
@@ -121,6 +138,15 @@ impl Skin {
     }
 }
 
+/// The unit normal of a triangle; none of a sliver, of which rounding would tell.
+pub(super) fn upright([a, b, c]: &[Point; 3]) -> Option<Point> {
+    let [p, q, r] = [subtract(b, a), subtract(c, b), subtract(a, c)];
+    let normal = cross(&p, &q);
+    let longest = dot(&p, &p).max(dot(&q, &q)).max(dot(&r, &r));
+    let length = dot(&normal, &normal).sqrt();
+    (length > SLIVER * longest && length >= f64::MIN_POSITIVE.sqrt()).then(|| normal.map(|part| part / length))
+}
+
 /// A side of a triangle.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Edge {
@@ -136,9 +162,7 @@ impl Edge {
         let corners = &triangles[self.triangle as usize];
         [0, 1].map(|step| corners[(self.side as usize + step) % 3])
     }
-}
 
-impl Edge {
     /// The unit vector across the side that leads over its triangle.
     fn inward(&self, places: &[Point], triangles: &[[u32; 3]], normals: &[Point]) -> Point {
         let [a, b] = self.of(triangles).map(|end| &places[end as usize]);

@@ -1,0 +1,300 @@
+use super::super::testing::{
+    arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, lowered_as,
+    on_lattice, place, plan, topology,
+};
+use super::skin::Skin;
+use super::surface;
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Point, Site, dot, subtract, unit};
+use crate::budget::Budget;
+use crate::dilation::arrangement::figure::Figure;
+use crate::dilation::tree::Weighted;
+use crate::measure::triangle::closest_on_triangle;
+use crate::model::Interior;
+use crate::solid::Inside;
+use crate::split_mix::Random;
+use glam::{DMat3, DVec3};
+use std::collections::HashMap;
+use std::f64::consts::{PI, TAU};
+
+/// Vertices and triangles.
+#[derive(Clone, Default)]
+struct Mesh {
+    vertices: Vec<DVec3>,
+    faces: Vec<Vec<u32>>,
+}
+
+impl Mesh {
+    /// A grid of squares halved over the unit square, whose corners at one place are one.
+    fn of(along: usize, across: usize, at: impl Fn(f64, f64) -> DVec3) -> Self {
+        let (mut mesh, mut numbers) = (Self::default(), HashMap::new());
+        let mut number = |i: usize, j: usize| {
+            let x = at(i as f64 / along as f64, j as f64 / across as f64);
+            *numbers.entry(x.to_array().map(|x| (x * 1e7).round() as i64)).or_insert_with(|| {
+                mesh.vertices.push(x);
+                mesh.vertices.len() as u32 - 1
+            })
+        };
+        for (i, j) in (0..along).flat_map(|i| (0..across).map(move |j| (i, j))) {
+            let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+            // The halves of squares at a pole may be lines.
+            let halves = [[a, b, c], [a, c, d]].into_iter().filter(|[p, q, r]| p != q && q != r && r != p);
+            mesh.faces.extend(halves.map(|half| half.to_vec()));
+        }
+        mesh
+    }
+
+    fn torus(around: usize, across: usize, radii: [f64; 2]) -> Self {
+        Self::of(around, across, |u, v| {
+            let (ring, height) = (radii[0] + radii[1] * (TAU * v).cos(), radii[1] * (TAU * v).sin());
+            DVec3::new(ring * (TAU * u).cos(), ring * (TAU * u).sin(), height)
+        })
+    }
+
+    /// A ball with bumps as high as a share of its radius.
+    fn ball(around: usize, across: usize, radius: f64, bumps: f64) -> Self {
+        Self::of(around, across, |u, v| {
+            let (u, v) = (TAU * u, PI * v);
+            let own = radius * (1.0 + bumps * (3.0 * u).sin() * v.sin().powi(3) * (2.0 * v).cos());
+            own * DVec3::new(v.sin() * u.cos(), v.sin() * u.sin(), v.cos())
+        })
+    }
+
+    /// A strip that comes back to its beginning after some half turns.
+    fn strip(along: usize, across: usize, radius: f64, wide: f64, turns: f64) -> Self {
+        Self::of(along, across, |u, v| {
+            let (out, up) = ((PI * turns * u).cos(), (PI * turns * u).sin());
+            let own = wide * (v - 0.5);
+            DVec3::new((radius + own * out) * (TAU * u).cos(), (radius + own * out) * (TAU * u).sin(), own * up)
+        })
+    }
+
+    /// A quarter of a pipe, with corners.
+    fn vault(along: usize, across: usize, radius: f64, long: f64) -> Self {
+        Self::of(along, across, |u, v| {
+            let angle = PI * (0.25 + 0.5 * v);
+            DVec3::new(long * u, radius * angle.cos(), radius * angle.sin() + 0.3 * (3.0 * u).sin())
+        })
+    }
+
+    fn and(mut self, other: Self) -> Self {
+        let first = self.vertices.len() as u32;
+        self.vertices.extend(other.vertices);
+        self.faces.extend(other.faces.into_iter().map(|face| face.into_iter().map(|corner| corner + first).collect()));
+        self
+    }
+
+    fn moved(mut self, by: DVec3) -> Self {
+        self.vertices.iter_mut().for_each(|x| *x += by);
+        self
+    }
+
+    fn turned(mut self, random: &mut Random) -> Self {
+        let axis = (place(random, 2.0) - DVec3::ONE).normalize();
+        let turn = DMat3::from_axis_angle(axis, TAU * random.share());
+        let by = place(random, 50.0);
+        self.vertices.iter_mut().for_each(|x| *x = turn * *x + by);
+        self
+    }
+
+    fn lowered(&self) -> Attractor {
+        lowered(&self.vertices, self.faces.clone())
+    }
+
+    fn corners(&self) -> Vec<[Point; 3]> {
+        self.faces.iter().map(|face| [0, 1, 2].map(|k| self.vertices[face[k] as usize].to_array())).collect()
+    }
+
+    /// Whether sheets are made around it.
+    fn is_made(&self, radius: f64, tolerance: f64) -> bool {
+        let (shape, budget) = (self.lowered(), Budget::default());
+        let plan = plan(&shape, radius, tolerance);
+        let setting = plan.setting(plan.pitch(), &budget);
+        let figures: Vec<Figure> =
+            self.corners().into_iter().map(|corners| Weighted { site: Site::Triangle(corners), deficit: 0.0 }.into()).collect();
+        surface(&figures, &setting, |x| f64::from(x as f32), &budget).unwrap().is_some()
+    }
+
+    fn distance(&self, x: DVec3) -> f64 {
+        distance_of_triangles(x, &self.vertices, &self.faces)
+    }
+
+    /// A place about as far from it as a radius.
+    fn near(&self, radius: f64, random: &mut Random) -> DVec3 {
+        let face = &self.faces[random.next() as usize % self.faces.len()];
+        let on = self.vertices[face[0] as usize].lerp(self.vertices[face[1] as usize], random.share());
+        let on = on.lerp(self.vertices[face[2] as usize], random.share());
+        on + radius * (0.7 + 0.6 * random.share()) * (place(random, 2.0) - DVec3::ONE).normalize_or_zero()
+    }
+}
+
+/// A shape, with the components, the cavities and the Euler number of its dilation.
+fn shape(case: usize, random: &mut Random) -> (Mesh, (u64, u64, i64)) {
+    match case % 7 {
+        0 => (Mesh::torus(40, 24, [15.0, 6.0]), (1, 1, 0)),
+        1 => (Mesh::ball(36, 18, 12.0, 0.05 * random.share()), (1, 1, 4)),
+        2 => (Mesh::strip(60, 4, 15.0, 6.0, 1.0), (1, 0, 0)),
+        3 => (Mesh::strip(90, 6, 15.0, 6.0, 2.0), (1, 0, 0)),
+        4 => (Mesh::vault(20, 16, 12.0, 20.0), (1, 0, 2)),
+        5 => (Mesh::ball(36, 18, 12.0, 0.0).and(Mesh::ball(36, 18, 7.5, 0.0)), (2, 2, 8)),
+        _ => (Mesh::torus(60, 32, [15.0, 4.0]).and(Mesh::torus(60, 32, [15.0, 4.0]).moved(DVec3::new(45.0, 0.0, 3.0))), (2, 2, 0)),
+    }
+}
+
+/// What is made keeps its bounds everywhere, and has the topology that is known of the surface.
+#[test]
+fn sheets_keep_their_bounds_and_have_the_surface_s_topology() {
+    let mut random = Random(113);
+    for case in 0..14 {
+        let (mesh, expected) = shape(case, &mut random);
+        let mesh = mesh.turned(&mut random);
+        let (radius, share) = ([1.0, 0.6, 1.4][case % 3], [0.1, 0.2][case % 2]);
+        let (attractor, tolerance) = (mesh.lowered(), share * radius);
+        assert!(mesh.is_made(radius, tolerance) && is_flat(&attractor, radius, tolerance), "{case}");
+        let dilation = arranged(&attractor, radius, tolerance);
+        assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
+        assert_eq!(topology(&dilation), expected, "{case}");
+        assert!(holds_everywhere(&dilation, radius, |x| mesh.distance(x), &mut random), "{case}");
+        let inside = Inside::new(dilation.solid.mesh());
+        for _ in 0..300 {
+            let x = mesh.near(radius, &mut random);
+            assert_bounds(case, &inside, &dilation, radius, x, mesh.distance(x));
+        }
+    }
+}
+
+/// Random sheets, strips around which turn more or less: those that are made have the topology that a lattice has, which tells sites apart.
+#[test]
+fn sheets_agree_with_the_lattice() {
+    let mut random = Random(127);
+    let mut made = 0;
+    for case in 0..16 {
+        let waves: [f64; 4] = std::array::from_fn(|_| random.share());
+        let mesh = Mesh::of(24, 12, |u, v| {
+            let height = 1.5 * waves[0] * (4.0 * u + 3.0 * waves[1]).sin() + waves[2] * (5.0 * v + 2.0 * u).cos();
+            DVec3::new(20.0 * u, 10.0 * v + 2.0 * waves[3] * (3.0 * u).sin(), 2.0 * height)
+        });
+        let mesh = if case % 2 == 0 { mesh.clone().and(mesh.moved(DVec3::new(0.0, 0.0, 1.5 + 3.0 * random.share()))) } else { mesh };
+        let mesh = mesh.turned(&mut random);
+        let (radius, tolerance) = (0.8, 0.1);
+        if !mesh.is_made(radius, tolerance) {
+            continue;
+        }
+        made += 1;
+        let dilation = arranged(&mesh.lowered(), radius, tolerance);
+        let lattice = on_lattice(&mesh.lowered(), radius, tolerance);
+        assert!(dilation.topology_exact && lattice.topology_exact, "{case}");
+        assert_eq!(topology(&dilation), topology(&lattice), "{case}");
+        assert!(holds_everywhere(&dilation, radius, |x| mesh.distance(x), &mut random), "{case}");
+    }
+    assert!((8..16).contains(&made), "{made}");
+}
+
+/// Sheets that come so near to each other that their dilations touch within the band, or meet, are left to others; so is what is filled at the radius.
+#[test]
+fn sheets_that_come_close_are_left_to_others() {
+    let mut random = Random(131);
+    for (gap, is_made) in [(3.0, true), (2.45, true), (2.15, false), (2.0, false), (1.85, false), (1.0, false), (0.0, false)] {
+        let sheet = Mesh::vault(20, 16, 12.0, 20.0);
+        let mesh = sheet.clone().and(sheet.moved(DVec3::new(0.0, 0.0, 2.0_f64.sqrt() * gap))).turned(&mut random);
+        assert_eq!(mesh.is_made(1.0, 0.1), is_made, "{gap}");
+    }
+    // Pipes that are as wide as the ball, or less.
+    for (wide, is_made) in [(2.0, true), (1.05, false), (0.95, false), (0.7, false)] {
+        let mesh = Mesh::torus(80, 48, [15.0, wide]).turned(&mut random);
+        assert_eq!(mesh.is_made(1.0, 0.1), is_made, "{wide}");
+    }
+}
+
+/// What turns too much, or hangs together otherwise than a surface does, is left to others.
+#[test]
+fn what_is_no_smooth_surface_is_left_to_others() {
+    let vault = Mesh::vault(20, 16, 12.0, 20.0);
+    assert!(vault.is_made(1.0, 0.1));
+    // The same a second time, in other directions, with a third sheet along its border, with a corner that turns inward, and folded.
+    let twice = Mesh {
+        faces: vault.faces.iter().cloned().chain(vault.faces.iter().map(|face| face.iter().rev().copied().collect())).collect(),
+        ..vault.clone()
+    };
+    let mut winged = vault.clone();
+    let (a, b) = (winged.faces[100][0], winged.faces[100][1]);
+    winged.vertices.push(0.5 * (winged.vertices[a as usize] + winged.vertices[b as usize]) + DVec3::new(0.0, 0.0, 9.0));
+    winged.faces.push(vec![a, b, winged.vertices.len() as u32 - 1]);
+    let mut notched = vault.clone();
+    notched.faces.drain(..40);
+    notched.faces.drain(..20);
+    let folded = Mesh::of(20, 8, |u, v| DVec3::new(20.0 * (2.0 * u - 1.0).abs(), 10.0 * v, 4.0 * (u - 0.5).powi(2)));
+    let roof = Mesh::of(20, 20, |u, v| DVec3::new(20.0 * u, 10.0 * v, 6.0 * (u - 0.5).abs()));
+    let crossed = Mesh::vault(20, 16, 12.0, 20.0).and(Mesh::vault(20, 16, 12.0, 20.0).moved(DVec3::new(0.0, 5.0, 0.0)));
+    for (case, mesh) in [twice, winged, notched, folded, roof, crossed].iter().enumerate() {
+        assert!(!mesh.is_made(1.0, 0.1), "{case}");
+    }
+    // Directions of faces do not matter.
+    let mut random = Random(137);
+    let mut mixed = vault;
+    mixed.faces.iter_mut().filter(|_| random.share() < 0.5).for_each(|face| face.reverse());
+    assert!(mixed.is_made(1.0, 0.1));
+    let dilation = arranged(&mixed.lowered(), 1.0, 0.1);
+    assert!(dilation.topology_exact && topology(&dilation) == (1, 0, 2));
+    assert!(holds_everywhere(&dilation, 1.0, |x| mixed.distance(x), &mut random));
+}
+
+/// A solid's surface is thickened outwards only.
+#[test]
+fn solids_have_no_sheet_inside() {
+    let mesh = Mesh::torus(40, 24, [15.0, 6.0]);
+    let solid = lowered_as(Interior::Solid, &mesh.vertices, mesh.faces).unwrap();
+    assert!(is_flat(&solid, 1.0, 0.1));
+    let dilation = arranged(&solid, 1.0, 0.1);
+    assert_eq!(topology(&dilation), (1, 0, 0));
+    // Pappus: 2 pi^2 R (a + r)^2, but for the band and for what is between the mesh and the torus.
+    let volume = 2.0 * PI * PI * 15.0 * 7.0_f64.powi(2);
+    let mesh = dilation.solid.mesh();
+    let corners = mesh.triangles.iter().map(|triangle| triangle.map(|corner| mesh.vertices[corner as usize]));
+    let own = corners.map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0;
+    assert!((own / volume - 1.0).abs() < 0.05, "{own} {volume}");
+}
+
+/// Few triangles are left of a fine mesh: as many as the tolerance asks for.
+#[test]
+fn fine_meshes_become_few_triangles() {
+    let count = |around: usize, tolerance: f64| {
+        let mesh = Mesh::torus(2 * around, around, [15.0, 6.0]);
+        (mesh.faces.len(), arranged(&mesh.lowered(), 1.0, tolerance).solid.mesh().triangles.len())
+    };
+    let [(_, coarse), (fine, few), (_, more)] = [count(32, 0.2), count(64, 0.2), count(64, 0.05)];
+    assert!(few < fine / 2 && few < 3 * coarse / 2 && more > 2 * few, "{coarse} {few} {more} {fine}");
+}
+
+/// The way to a face across sides ends at the closest one, where the surface turns little.
+#[test]
+fn faces_below_places_are_found() {
+    let mut random = Random(139);
+    let mesh = Mesh::torus(40, 24, [15.0, 6.0]);
+    let corners = mesh.corners();
+    let skin = Skin::new(&corners, 0.97, 1e-9).unwrap();
+    let mut found = 0;
+    for _ in 0..300 {
+        let from = random.next() as u32 % corners.len() as u32;
+        let face = &corners[random.next() as usize % corners.len()];
+        let up = unit(&std::array::from_fn(|axis| skin.normals[from as usize][axis] + random.share() - 0.5));
+        let x: Point = std::array::from_fn(|axis| face[0][axis] + up[axis]);
+        let square = |face: &[Point; 3]| {
+            let way = subtract(&x, &closest_on_triangle(&x, &face[0], &face[1], &face[2]));
+            dot(&way, &way)
+        };
+        let least = corners.iter().map(square).fold(f64::INFINITY, f64::min);
+        found += u32::from(square(&corners[skin.near(from, &x) as usize]) < 1.02 * least + 1e-9);
+    }
+    assert!(found > 200, "{found}");
+}
+
+#[test]
+fn sheets_do_not_depend_on_threads_and_can_be_stopped() {
+    assert_steady(&Mesh::strip(60, 4, 15.0, 6.0, 1.0).lowered(), 1.0, 0.1);
+}
+
+#[test]
+fn limits_hold_for_sheets() {
+    assert_limited(&Mesh::torus(40, 24, [15.0, 6.0]).lowered(), 1.0, 0.1);
+}

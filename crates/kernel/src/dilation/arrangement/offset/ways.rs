@@ -1,20 +1,23 @@
 //! Ways along which the distance from a surface grows.
 
 use super::sheets::Sheets;
-use super::skin::Skin;
-use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
+use super::skin::{Skin, upright};
+use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::{Body, lowest, middle};
-use crate::dilation::arrangement::faces::Faces;
+use crate::dilation::arrangement::faces::{Face, Faces};
 use crate::dilation::convex::Convex;
+use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::topology::Incidence;
 use rayon::prelude::*;
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, PI};
 
 /// Directions along each side of each face of a cube: all directions are near to one of these.
-const ALONG_SIDE: usize = 4;
+const ALONG_SIDE: usize = 6;
 /// Directions around a side of the border, from one side of the surface to the other.
 const AROUND_SIDE: usize = 8;
+/// Sides longer than this, as a share of the distance, are halved where nothing is shown of all of one.
+const SHORT: f64 = 0.2;
 /// What is left for rounding, as a share of the distance.
 const NOISE: f64 = 1e-9;
 /// Parts that are looked at one after the other.
@@ -47,18 +50,16 @@ impl<'a> Ways<'a> {
         let wide = points.iter().map(|point| distance_squared(point, &centre)).fold(0.0, f64::max).sqrt();
         let least = (self.outer + wide) * (1.0 + NOISE);
         let limit = height - NOISE * self.outer;
-        self.faces.within(points, self.outer, |item| {
-            let face = &self.faces.all[item as usize];
-            face.highest(along) < limit || face.distance_squared(&centre) > least * least
+        self.faces.hold(points, self.outer, along, limit, |face| {
+            face.highest(along) < limit || face.distance_squared(&centre) > least * least || is_below(face, along, limit, &centre, least)
         })
     }
 
     /// Whether all faces that are as near to some place of a triangle are left behind along a direction.
     fn leaves_all(&self, triangle: &[Point; 3], along: &Point) -> bool {
-        let (centre, limit) = (middle(triangle), lowest(triangle, along) - NOISE * self.outer);
-        self.faces.within(triangle, self.outer, |item| {
-            let face = &self.faces.all[item as usize];
-            face.highest(along) < limit || face.is_apart(triangle, &centre, self.outer) || face.too_near(triangle, self.outer).is_none()
+        let (centre, limit, most) = (middle(triangle), lowest(triangle, along) - NOISE * self.outer, self.outer * (1.0 + NOISE));
+        self.faces.hold(triangle, most, along, limit, |face| {
+            face.highest(along) < limit || face.is_apart(triangle, &centre, most) || face.too_near(triangle, most).is_none()
         })
     }
 
@@ -74,7 +75,9 @@ impl<'a> Ways<'a> {
             let others = skin.around.at(vertex).iter().flat_map(|&triangle| skin.triangles[triangle as usize]);
             others.filter(|&other| other != vertex).map(|other| unit(&subtract(&at(other), &at(vertex)))).collect()
         };
-        let borders: Vec<u32> = (0..skin.beyond()).filter(|&vertex| skin.is_border(vertex)).collect();
+        let mut borders: Vec<u32> = skin.borders.iter().flat_map(|(ends, _)| *ends).collect();
+        borders.sort_unstable();
+        borders.dedup();
         Ok(all(&groups, budget, |group| self.lead_from(group) || group.iter().all(|&face| self.lead_from(&[face])))?
             && all(&skin.borders, budget, |(ends, triangle)| self.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
             && all(&borders, budget, |&vertex| self.lead_around(&at(vertex), &rays(vertex), &cones))?)
@@ -89,15 +92,38 @@ impl<'a> Ways<'a> {
         let up = unit(&sum.fold([0.0; 3], |sum: Point, normal| std::array::from_fn(|axis| sum[axis] + normal[axis])));
         let corners = group.iter().flat_map(|&face| triangles[face as usize]);
         let normals = corners.clone().flat_map(|corner| around.at(corner)).map(|&face| &normals[face as usize]);
-        let cosine = normals.map(|normal| dot(normal, &up).abs()).fold(1.0, f64::min);
+        let cosine = normals.map(|normal| dot(normal, &up).abs()).fold(1.0, f64::min) - NOISE;
+        // Where faces lean more, directions between the normals of two may be in neither cone.
+        if cosine < FRAC_1_SQRT_2 {
+            return false;
+        }
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let places: Vec<Point> = corners.map(|corner| self.skin.places[corner as usize]).collect();
         let cone = Cone { axis: up, cosine, sine };
         [cone.axis, up.map(|part| -part)].into_iter().all(|axis| self.lead_along(&places, &Cone { axis, ..cone }))
     }
 
-    /// Whether it is so of the places that some of a surface is closest to, in the directions of a cone.
+    /// Whether it is so of the places that what is between some of a surface is closest to, in the directions of a cone: of all together, or of the parts of a side or a triangle.
     fn lead_along(&self, places: &[Point], cone: &Cone) -> bool {
+        self.lead_at_once(places, cone) || self.halves(places).is_some_and(|halves| halves.iter().all(|half| self.lead_along(half, cone)))
+    }
+
+    /// The halves of a side, or of a triangle across its longest side; none where that is short, and of others.
+    fn halves(&self, places: &[Point]) -> Option<[Vec<Point>; 2]> {
+        let count = places.len();
+        let long = |k: usize| distance_squared(&places[k], &places[(k + 1) % count]);
+        let k = (0..count).max_by(|&p, &q| long(p).total_cmp(&long(q)))?;
+        (count <= 3 && long(k) > (SHORT * self.outer).powi(2)).then(|| {
+            let half = between(&places[k], &places[(k + 1) % count], 0.5);
+            [k, (k + 1) % count].map(|replaced| {
+                let mut part = places.to_vec();
+                part[replaced] = half;
+                part
+            })
+        })
+    }
+
+    fn lead_at_once(&self, places: &[Point], cone: &Cone) -> bool {
         let Cone { axis, cosine, sine } = cone;
         let height = places.iter().map(|place| dot(place, axis)).fold(f64::INFINITY, f64::min) + cosine * self.inner;
         // The places are within this hull but for what the cone is wide.
@@ -128,34 +154,66 @@ impl<'a> Ways<'a> {
         })
     }
 
-    /// Whether there are such directions that leave the sheets everywhere, too.
+    /// Whether there are such directions that leave the sheets everywhere, too: those of corners, normals of triangles, or means of two of these at their common side.
     ///
     /// # Errors
     /// [`Stopped`].
     pub(super) fn leave(&self, sheets: &Sheets, budget: &Budget) -> Result<bool, Stopped> {
-        let normal = |[a, b, c]: [Point; 3]| unit(&cross(&subtract(&b, &a), &subtract(&c, &a)));
-        let corners = |triangle: u32| sheets.triangles[triangle as usize].map(|corner| sheets.vertices[corner as usize]);
+        let mesh = HalfEdges::new(sheets.vertices.clone(), &sheets.triangles);
         let around = Incidence::new(sheets.vertices.len(), &sheets.triangles);
+        let at = |corner: u32| sheets.vertices[corner as usize];
+        let way = |corner: u32| &sheets.ways[corner as usize];
         let numbers: Vec<u32> = (0..sheets.triangles.len() as u32).collect();
-        let normals: Vec<Point> = numbers.iter().map(|&triangle| normal(corners(triangle))).collect();
+        let corners = |triangle: u32| sheets.triangles[triangle as usize];
+        let Some(normals) = numbers.iter().map(|&triangle| upright(&corners(triangle).map(at))).collect::<Option<Vec<Point>>>() else {
+            return Ok(false);
+        };
+        let leads = |way: &Point, triangle: u32| dot(way, &normals[triangle as usize]) > NOISE;
+        let leads_all = |vertex: u32| around.at(vertex).iter().all(|&other| leads(way(vertex), other));
+        if !(0..sheets.vertices.len() as u32).all(leads_all) {
+            return Ok(false);
+        }
         all(&numbers, budget, |&triangle| {
-            let places = corners(triangle);
-            sheets.triangles[triangle as usize].iter().all(|&corner| {
-                let way = &sheets.ways[corner as usize];
-                let leads = |&other: &u32| dot(way, &normals[other as usize]) > NOISE;
-                around.at(corner).iter().all(leads) && self.leaves_all(&places, way)
-            })
+            let (own, places, up) = (corners(triangle), corners(triangle).map(at), &normals[triangle as usize]);
+            // Corners whose ways serve all of the triangle.
+            let serves = own.map(|corner| self.leaves_all(&places, way(corner)));
+            let is_side_left = |k: usize| {
+                let twin = mesh.twin(3 * triangle + k as u32);
+                let ends = [k, (k + 1) % 3];
+                twin != NONE
+                    && (ends.iter().any(|&end| serves[end]) || {
+                        let mean = unit(&std::array::from_fn(|axis| up[axis] + normals[(twin / 3) as usize][axis]));
+                        leads(&mean, triangle) && leads(&mean, twin / 3) && self.leaves_between(&ends.map(|end| places[end]), &mean)
+                    })
+            };
+            let is_corner_left = |k: usize| serves[k] || self.leaves_between(&[places[k]], way(own[k]));
+            (serves.contains(&true) || self.leaves_between(&places, up)) && (0..3).all(is_side_left) && (0..3).all(is_corner_left)
         })
     }
+
+    /// Whether all faces that are as near to some place of a corner, a side or a triangle are left behind along a direction, which may be told of parts.
+    fn leaves_between(&self, places: &[Point], along: &Point) -> bool {
+        let lowest = places.iter().map(|place| dot(place, along)).fold(f64::INFINITY, f64::min);
+        self.leaves(places, along, lowest)
+            || self.halves(places).is_some_and(|halves| halves.iter().all(|half| self.leaves_between(half, along)))
+    }
+}
+
+/// Whether what a face has in a ball is lower than a height along a direction: it is in a disc of its plane.
+fn is_below(face: &Face, along: &Point, height: f64, centre: &Point, radius: f64) -> bool {
+    let above = dot(&face.normal, &subtract(centre, &face.corners[0]));
+    let square = radius * radius - above * above;
+    let lean = dot(along, &face.normal);
+    square < 0.0 || dot(along, centre) - above * lean + (square * (1.0 - lean * lean).max(0.0)).sqrt() < height
 }
 
 /// Whether something is so of all, side by side.
 fn all<T: Sync>(list: &[T], budget: &Budget, is_so: impl Fn(&T) -> bool + Sync) -> Result<bool, Stopped> {
-    let row = |row: &[T]| {
+    let own = |one: &T| {
         budget.cancel.check()?;
-        Ok(row.iter().all(&is_so))
+        Ok(is_so(one))
     };
-    let found = list.par_chunks(IN_A_ROW).map(row).find_any(|row| !matches!(row, Ok(true)));
+    let found = list.par_iter().with_min_len(IN_A_ROW).map(own).find_any(|own| !matches!(own, Ok(true)));
     found.unwrap_or(Ok(true))
 }
 

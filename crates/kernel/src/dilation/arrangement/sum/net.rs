@@ -2,9 +2,9 @@
 
 use super::ball::{Ball, SAME, is_same};
 use super::corner::{Arc, Patch};
-use crate::dilation::arrangement::faces::numbered;
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::arrangement::faces::numbered;
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
 use crate::solid::topology::Incidence;
