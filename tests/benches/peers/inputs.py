@@ -241,6 +241,56 @@ def teapot(n):
     return weld(points, np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3))
 
 
+def patch(place, n, m):
+    """A surface over the unit square, n x m squares halved; corners at one place are one."""
+    u, v = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1), indexing="ij")
+    corner = (np.arange(n)[:, None] * (m + 1) + np.arange(m)).ravel()
+    a, b, c, d = corner, corner + m + 1, corner + m + 2, corner + 1
+    return weld(np.stack(place(u, v), axis=-1).reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3))
+
+
+def torus(n, m, ring=1.0, tube=0.4):
+    """A torus, n steps along the ring and m around the tube."""
+
+    def place(u, v):
+        out = ring + tube * np.cos(2 * np.pi * v)
+        return out * np.cos(2 * np.pi * u), out * np.sin(2 * np.pi * u), tube * np.sin(2 * np.pi * v)
+
+    return patch(place, n, m)
+
+
+def mobius(n, m, wide=0.6):
+    """Moebius's strip."""
+
+    def place(u, v):
+        half, across = np.pi * u, wide * (v - 0.5)
+        out = 1 + across * np.cos(half)
+        return out * np.cos(2 * half), out * np.sin(2 * half), across * np.sin(half)
+
+    return patch(place, n, m)
+
+
+def enneper(n, m, wide=2.4):
+    """Enneper's minimal surface."""
+
+    def place(u, v):
+        x, y = wide * (u - 0.5), wide * (v - 0.5)
+        return x - x**3 / 3 + x * y**2, y - y**3 / 3 + y * x**2, x**2 - y**2
+
+    return patch(place, n, m)
+
+
+def bumpy(n, m):
+    """A ball with five bumps around."""
+
+    def place(u, v):
+        turn, tilt = 2 * np.pi * u, np.pi * v
+        out = 1 + 0.15 * np.sin(5 * turn) * np.sin(tilt) ** 3 * np.cos(2 * tilt)
+        return out * np.sin(tilt) * np.cos(turn), out * np.sin(tilt) * np.sin(turn), out * np.cos(tilt)
+
+    return patch(place, n, m)
+
+
 def sierpinski_tetrahedron(depth):
     """The faces of the 4^depth tetrahedra of side 2^-depth."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0], [0.5, np.sqrt(3) / 6, np.sqrt(2 / 3)]])
@@ -332,6 +382,10 @@ SHAPES = {
     "gratingturned": lambda: turned(grating(12, 8)),
     "spring": lambda: spring(20, 64),
     "tray": lambda: turned(tray(8, 8)),
+    "torus": lambda: torus(128, 64),
+    "mobius": lambda: mobius(256, 32),
+    "enneper": lambda: enneper(128, 128),
+    "bumpy": lambda: bumpy(192, 96),
 }
 MAIN = list(SHAPES)[:8]
 
