@@ -4,7 +4,7 @@
 //! where all of them are cut across the end of a segment, or the side of a polygon, that meets others, see `joints` and `hinges`. Of solids the surfaces are sites, and what lies inside is left out at the end, see `solids`. The boundary of M consists of parts of facets, see `pieces` and `facets`. Its topology is that of D(r) where
 //! `nerve` shows it; where that is in doubt, polytopes are changed until it does, see `engine`.
 //!
-//! Points and segments in one plane need no such polytopes where many are near to each other, see `planar`, nor do triangles with one height over each place of one, see `height_field`, and polygons that are near to each other only where they hang together, see `sum`.
+//! Points and segments in one plane need no such polytopes where many are near to each other, see `planar`, nor do triangles with one height over each place of one, see `height_field`, surfaces that turn little from face to face, see `offset`, and polygons that are near to each other only where they hang together, see `sum`.
 
 mod between;
 mod bodies;
