@@ -20,7 +20,7 @@ from judge import HERE, compiled, judge, read_mesh
 
 MEMORY = 12 << 30
 # Cells in parts of the tolerance; sides of a great circle for the hulls.
-SPACINGS = (2, 1.4, 1, 0.7, 0.5, 0.35)
+SPACINGS = (16, 11, 8, 5.6, 4, 2.8, 2, 1.4, 1, 0.7, 0.5, 0.35)
 SIDES = (8, 12, 16, 20, 24, 32)
 PROGRAMS = ("lacuna", "manifold", "openvdb", "meshlib", "libigl")
 
