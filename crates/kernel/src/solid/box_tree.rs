@@ -183,42 +183,24 @@ impl BoxTree {
 
     /// As [`BoxTree::query`], without what lies below nodes of which `is_known` says that it need not be looked at.
     #[inline]
-    pub(super) fn query_unless(
-        &self,
-        wanted: &Box32,
-        first: usize,
-        is_known: impl Fn(usize) -> bool,
-        mut visit: impl FnMut(usize) -> bool,
-    ) {
-        // Depth-first: at most one node waits at every level.
-        let mut stack = [0_u32; 33];
-        let mut height = 1;
-        stack[0] = 1;
-        while height > 0 {
-            height -= 1;
-            let node = stack[height] as usize;
-            if !self.nodes[node].meets(wanted) || is_known(node) {
-                continue;
-            }
-            if node >= self.leaves {
-                if !visit(node - self.leaves) {
-                    return;
-                }
-                continue;
-            }
-            let levels = self.leaves.ilog2() - node.ilog2();
+    pub(super) fn query_unless(&self, wanted: &Box32, first: usize, is_known: impl Fn(usize) -> bool, visit: impl FnMut(usize) -> bool) {
+        let is_wanted = |node: usize| {
             // The last leaf below.
-            if ((node + 1) << levels) <= first + self.leaves {
-                continue;
-            }
-            stack[height] = 2 * node as u32 + 1;
-            stack[height + 1] = 2 * node as u32;
-            height += 2;
-        }
+            let ends_before = || ((node + 1) << (self.leaves.ilog2() - node.ilog2())) <= first + self.leaves;
+            self.nodes[node].meets(wanted) && !is_known(node) && (node >= self.leaves || !ends_before())
+        };
+        self.walk(is_wanted, visit);
     }
 
     /// Calls `visit` with the leaves whose boxes are wanted, as those of all that is above them are, until it answers false.
-    pub(crate) fn query_wanted(&self, is_wanted: impl Fn(&Box32) -> bool, mut visit: impl FnMut(usize) -> bool) {
+    #[inline]
+    pub(crate) fn query_wanted(&self, is_wanted: impl Fn(&Box32) -> bool, visit: impl FnMut(usize) -> bool) {
+        self.walk(|node| is_wanted(&self.nodes[node]), visit);
+    }
+
+    /// Calls `visit` with the leaves that are wanted, as all nodes above them are, until it answers false.
+    #[inline]
+    fn walk(&self, is_wanted: impl Fn(usize) -> bool, mut visit: impl FnMut(usize) -> bool) {
         // Depth-first: at most one node waits at every level.
         let mut stack = [0_u32; 33];
         let mut height = 1;
@@ -226,7 +208,7 @@ impl BoxTree {
         while height > 0 {
             height -= 1;
             let node = stack[height] as usize;
-            if !is_wanted(&self.nodes[node]) {
+            if !is_wanted(node) {
                 continue;
             }
             if node < self.leaves {

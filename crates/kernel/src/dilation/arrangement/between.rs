@@ -53,9 +53,9 @@ pub(super) fn middle(triangle: &[Point; 3]) -> Point {
     std::array::from_fn(|axis| (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3.0)
 }
 
-/// The least value of a triangle along a direction.
-pub(super) fn lowest(triangle: &[Point; 3], direction: &Point) -> f64 {
-    triangle.iter().map(|corner| dot(direction, corner)).fold(f64::INFINITY, f64::min)
+/// The least value of some points along a direction.
+pub(super) fn lowest(points: &[Point], direction: &Point) -> f64 {
+    points.iter().map(|corner| dot(direction, corner)).fold(f64::INFINITY, f64::min)
 }
 
 /// How far the corners of a triangle are from a place at most.

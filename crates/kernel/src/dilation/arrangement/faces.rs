@@ -115,7 +115,7 @@ impl Faces {
 
     /// Whether something is so of all faces whose boxes are within a distance of that of some points, and are not all lower than a height along a direction.
     pub(super) fn hold(&self, points: &[Point], distance: f64, along: &Point, height: f64, is_so: impl Fn(&Face) -> bool) -> bool {
-        let within = grown(points, distance);
+        let within = figure::box_around(points, distance);
         let is_wanted = |own: &Box32| within.meets(own) && own.highest(along) >= height;
         let mut hold = true;
         self.tree.query_wanted(is_wanted, |leaf| {
@@ -128,7 +128,7 @@ impl Faces {
 
     /// Calls `visit` with the faces whose boxes are within a distance of that of some points, until it answers false.
     pub(super) fn around(&self, points: &[Point], distance: f64, mut visit: impl FnMut(u32) -> bool) {
-        let within = grown(points, distance);
+        let within = figure::box_around(points, distance);
         self.tree.query(&within, 0, |leaf| {
             let mut own = self.tree.items(leaf).iter().zip(self.tree.boxes(leaf));
             own.all(|(&item, theirs)| !within.meets(theirs) || visit(item))
@@ -177,12 +177,6 @@ impl Faces {
         });
         too_far(&self.all, square, near, |_| None, triangle, *outer, memory).map(Fault::Far)
     }
-}
-
-/// A box around all that is no farther from that of some points than a distance.
-fn grown(points: &[Point], distance: f64) -> Box32 {
-    let [low, high] = figure::box_of(points);
-    Box32::of(&[low.map(|x| x - distance), high.map(|x| x + distance)])
 }
 
 /// The map from a triangle to another, corner by corner.

@@ -106,8 +106,7 @@ impl Figure {
 
     /// A box around all that is no farther from it than a distance.
     pub(super) fn box_within(&self, distance: f64) -> Box32 {
-        let [low, high] = self.bounds();
-        Box32::of(&[low.map(|x| x - distance), high.map(|x| x + distance)])
+        box_around(self.corners(), distance)
     }
 }
 
@@ -312,6 +311,12 @@ pub(super) fn box_of<'p>(places: impl IntoIterator<Item = &'p Point>) -> [Point;
     places.into_iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], at| {
         [std::array::from_fn(|axis| low[axis].min(at[axis])), std::array::from_fn(|axis| high[axis].max(at[axis]))]
     })
+}
+
+/// A box around all that is no farther from that of some places than a distance.
+pub(super) fn box_around(places: &[Point], distance: f64) -> Box32 {
+    let [low, high] = box_of(places);
+    Box32::of(&[low.map(|x| x - distance), high.map(|x| x + distance)])
 }
 
 /// The largest value of some places along a direction.

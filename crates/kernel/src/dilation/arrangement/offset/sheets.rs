@@ -152,9 +152,11 @@ impl Sheets {
     ) -> Option<Columns> {
         let (up, rows) = (&skin.ups[foot as usize], shape.rows());
         let turn = dot(&cross(comes, goes), up).atan2(dot(comes, goes));
-        let steps = if turn.abs() < shape.column { 0 } else { (turn / shape.column).ceil() as i32 };
         // Where it turns inward strips would cross each other.
-        let count = if turn > -shape.column { steps.max(0) as usize } else { return None };
+        if turn <= -shape.column {
+            return None;
+        }
+        let count = if turn < shape.column { 0 } else { (turn / shape.column).ceil() as usize };
         let beside = cross(up, comes);
         let outs = (0..=count).map(|step| {
             let angle = if count == 0 { 0.5 * turn } else { turn * step as f64 / count as f64 };

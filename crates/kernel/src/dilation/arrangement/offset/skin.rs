@@ -91,14 +91,14 @@ impl Skin {
             }
         }
         let around = Incidence::new(places.len(), &triangles);
+        if around.most() > MOST_AROUND || 2 * flat >= inner {
+            return None;
+        }
         outs.iter_mut().for_each(|out| *out = unit(out));
         let beyond = places.len() as u32;
         let more: Vec<[u32; 3]> = borders.iter().map(|&([a, b], _)| [b, a, beyond]).collect();
         let mesh = HalfEdges::new([places.as_slice(), &[[0.0; 3]]].concat(), &[triangles.as_slice(), &more].concat());
-        if around.most() > MOST_AROUND {
-            return None;
-        }
-        (2 * flat < inner).then_some(Self { places, triangles, mesh, normals, ups, cosines, around, borders, outs, turns })
+        Some(Self { places, triangles, mesh, normals, ups, cosines, around, borders, outs, turns })
     }
 
     /// The corner that none of its triangles has.

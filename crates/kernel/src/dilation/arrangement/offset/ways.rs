@@ -125,7 +125,7 @@ impl<'a> Ways<'a> {
 
     fn lead_at_once(&self, places: &[Point], cone: &Cone) -> bool {
         let Cone { axis, cosine, sine } = cone;
-        let height = places.iter().map(|place| dot(place, axis)).fold(f64::INFINITY, f64::min) + cosine * self.inner;
+        let height = lowest(places, axis) + cosine * self.inner;
         // The places are within this hull but for what the cone is wide.
         let beside = sine * self.outer;
         let [low, high] = [cosine * self.inner, self.outer];
@@ -193,8 +193,7 @@ impl<'a> Ways<'a> {
 
     /// Whether all faces that are as near to some place of a corner, a side or a triangle are left behind along a direction, which may be told of parts.
     fn leaves_between(&self, places: &[Point], along: &Point) -> bool {
-        let lowest = places.iter().map(|place| dot(place, along)).fold(f64::INFINITY, f64::min);
-        self.leaves(places, along, lowest)
+        self.leaves(places, along, lowest(places, along))
             || self.halves(places).is_some_and(|halves| halves.iter().all(|half| self.leaves_between(half, along)))
     }
 }
