@@ -569,6 +569,10 @@ fn homogeneous_error(precision: &LinearPrecision, points: &[ControlPoint], linea
         let (n, d) = size(&std::array::from_fn(|i| point[i] - linear[i]));
         (off, skew, least) = (off.max(n), skew.max(d), least.min(point[3]));
     }
+    // Descendants whose operators have negative entries may leave the hull.
+    if precision.margin > 0.0 || least <= 0.0 {
+        return f64::INFINITY;
+    }
     // Parameters may miss the domain by the residual.
     for column in &linear[1..] {
         let (n, d) = size(column);

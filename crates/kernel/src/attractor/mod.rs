@@ -243,7 +243,7 @@ impl Attractor {
         let hulls = Hulls::new(&automaton, &contraction);
         let precisions = precision::precisions(&automaton, &bounds, &hulls);
         let count = automaton.states().len();
-        let attractor = Self {
+        let mut attractor = Self {
             automaton,
             roots,
             solids,
@@ -265,6 +265,7 @@ impl Attractor {
             radii: Vec::new(),
         };
         attractor.check_roots()?;
+        attractor.precisions = precision::closer(&attractor);
         Ok(attractor)
     }
 

@@ -17,15 +17,17 @@
 //! the product's attractor consists, is mapped onto the unit square by (G_A x 1, 1 x G_B), whatever the ratios.
 //!
 //! The r_k may be those of other points H than the control points if the attractor lies in their hull: Q x = (Q H) y with
-//! y >= 0 of sum 1. Bezier points of a spline's span are closer to it than its control points.
+//! y >= 0 of sum 1. Bezier points of a spline's span are closer to it than its control points. So are those of a cell's descendants, with their margin, which
+//! serve for faces of which no such points are known: every x is T_e T_f y for one of them.
 //!
 //! G is found by elimination over all states at once. What it misses, |G_s T_e - l G_w - t_e 1^T| <= e entrywise, moves
 //! parameters by at most (1 + 2 m) e / (1 - l), which is kept and charged.
 
-use super::StateBound;
 use super::cell::MOST_MEASURED;
 use super::hull::Hulls;
+use super::{Attractor, StateBound};
 use crate::automaton::{Automaton, LeafPrimitive, Smooth, StateId, SubdivisionOperator};
+use std::cmp::Ordering;
 
 /// Parameters of a state's points.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +40,7 @@ pub struct LinearPrecision {
     pub domain: Vec<[f64; 2]>,
     /// Parameters of the attractor may be this far from D, and D from them.
     pub residual: f64,
-    /// The points that measure the deviation from an affine map: images of the control points, in whose hull the
+    /// The points that measure the deviation from an affine map: images of the control points, in whose hull, with the margin, the
     /// attractor lies; the control points themselves when absent.
     pub(super) hull: Option<SubdivisionOperator>,
     /// m for these points.
@@ -63,6 +65,62 @@ impl LinearPrecision {
         Some(())
     }
 
+    /// Whether a face's control points leave its domain, and nothing closer to it is known.
+    fn leaves_domain(&self) -> bool {
+        let is_within = |point: &[f64; 2]| {
+            (0..2).all(|k| {
+                let values = self.domain.iter().map(|corner| corner[k]);
+                let [low, high] = [values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max)];
+                (low - SAME.sqrt()..=high + SAME.sqrt()).contains(&point[k])
+            })
+        };
+        self.domain.len() > 2 && self.hull.is_none() && !self.measured.iter().all(is_within)
+    }
+
+    /// Measures at points of descendants from now on, as far as they are few: those in whose hull children are known to lie, or else control points.
+    fn measure_below(&mut self, attractor: &Attractor, index: usize) {
+        let automaton = attractor.automaton();
+        let state = StateId::new(index);
+        let mut parts = vec![(SubdivisionOperator::identity(automaton.state(state).dimension), state)];
+        for _ in 0..LEVELS_BELOW {
+            let below = |(operator, state): &(SubdivisionOperator, StateId)| {
+                let steps = automaton.state(*state).transitions.iter();
+                steps.map(|step| (operator.times(&step.operator), step.to)).collect::<Vec<_>>()
+            };
+            parts = parts.iter().flat_map(below).collect();
+            let (mut columns, mut margin, mut miss) = (Vec::new(), 0.0_f64, 0.0_f64);
+            for (operator, state) in &parts {
+                let hull = attractor.hull(*state).and_then(|hull| Some((hull.points.as_ref()?, hull.miss)));
+                let points = hull.map(|(points, off)| {
+                    let norm = |k: usize| operator.column(k).iter().map(|entry| entry.abs()).sum::<f64>();
+                    miss = miss.max(off * (0..operator.columns()).map(norm).fold(1.0, f64::max));
+                    operator.times(points)
+                });
+                if points.is_none() {
+                    margin = margin.max(attractor.bound(*state).margin());
+                }
+                let points = points.as_ref().unwrap_or(operator);
+                // No zero has a sign.
+                columns.extend((0..points.columns()).map(|k| points.column(k).iter().map(|entry| entry + 0.0).collect::<Vec<f64>>()));
+            }
+            // Each once, in an order that tells nothing of how they were found.
+            columns.sort_unstable_by(|a, b| {
+                a.iter().zip(b).map(|(x, y)| x.total_cmp(y)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+            });
+            columns.dedup();
+            let measured: Vec<[f64; 2]> = columns.iter().map(|column| evaluate(&self.parameters, column)).collect();
+            let Some(fit) = fit(&measured).filter(|_| columns.len() <= MOST_BELOW) else { return };
+            let largest = self.parameters.iter().flatten().fold(1.0_f64, |a, x| a.max(x.abs()));
+            // What leaves the hull by rounding has another parameter by as much; that its place is another, by as much of the cell's size, is below what evaluations declare as rounding.
+            self.residual += std::f64::consts::SQRT_2 * largest * miss;
+            self.hull = Some(SubdivisionOperator::exact(self.parameters.len(), columns.concat()));
+            (self.measured, self.fit, self.margin) = (measured, fit, margin);
+            if miss > 0.0 {
+                return;
+            }
+        }
+    }
+
     /// The parameter of a barycentric point.
     #[must_use]
     pub fn parameter(&self, point: &[f64]) -> [f64; 2] {
@@ -70,6 +128,10 @@ impl LinearPrecision {
     }
 }
 
+/// Levels below a cell whose control points measure it, and how many points there are at most. Of uniform cubic splines those two levels below see parabolas 2.2 times as far off as they are, those of the cell itself 8 times; Bezier points of
+/// children see them as far off as they are.
+const LEVELS_BELOW: usize = 2;
+const MOST_BELOW: usize = 64;
 /// Ratios of the parameter maps that are tried.
 const RATIOS: [f64; 4] = [0.5, 1.0 / 3.0, 0.25, 0.2];
 /// Unknowns beyond which no functionals are sought.
@@ -133,6 +195,18 @@ pub(super) fn precisions(automaton: &Automaton, bounds: &[StateBound], hulls: &H
         }
     }
     result
+}
+
+/// The same, measured closer to the surface where control points of faces leave the domain.
+pub(super) fn closer(attractor: &Attractor) -> Vec<Option<LinearPrecision>> {
+    let closer = |(index, precision): (usize, &Option<LinearPrecision>)| {
+        let mut precision = precision.clone()?;
+        if precision.leaves_domain() {
+            precision.measure_below(attractor, index);
+        }
+        Some(precision)
+    };
+    attractor.precisions.iter().enumerate().map(closer).collect()
 }
 
 /// The precision of a product of two curves, whose outline is the unit square; see the module's comment.
