@@ -19,6 +19,7 @@
 //! | `repairs` | are mesh files that are no solids refused, or repaired where that is asked for and told? |
 //! | `determinism` | the same bytes for one thread and for two? |
 //! | `contract` | is the committed OpenAPI what the service says, and does it keep its promises on paper? |
+//! | `smooth` | have dilated curves and surfaces the topology, bounds and few triangles of closed forms? |
 //! | `slices` | are plane sections the drawings that they should be? |
 //! | `splits` | do the parts of a solid add up to it? |
 //! | `thickness_maps` | are maps of thickness what closed forms and rays say, in files that others read? |
@@ -72,6 +73,7 @@ mod secure;
 mod service;
 mod session;
 mod slices;
+mod smooth;
 mod splits;
 mod surface;
 mod thickening;

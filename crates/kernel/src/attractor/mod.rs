@@ -342,6 +342,41 @@ impl Attractor {
         Ok((resolved.with_radii(radii), deviation))
     }
 
+    /// Whether all of it is surfaces with a B-rep, none of them trimmed, that bound no solids and have no radii of their own.
+    pub(crate) fn is_surface(&self) -> bool {
+        let is_face = |root: &Root| self.brep().is_some_and(|(topology, _)| topology.state(root.state).dimension == 2);
+        let are_whole = || (0..self.roots.len()).all(|root| self.has_brep(root) && self.trim_of(root).is_none());
+        self.solids.is_empty() && !self.has_own_radii() && self.roots.iter().all(is_face) && are_whole()
+    }
+
+    /// Such a surface as triangles that have their corners in common where cells have, with its Hausdorff distance from this one, at most; none where that is no attractor.
+    ///
+    /// # Errors
+    /// [`RefineError`], of drawing them.
+    pub(crate) fn drawn(&self, tolerance: Tolerance, budget: &Budget) -> Result<Option<(Self, f64)>, RefineError> {
+        let drawn = complex::refine(self, &(0..self.roots.len()).collect::<Vec<usize>>(), None, tolerance, budget)?;
+        let state = State {
+            name: "triangle".into(),
+            kind: None,
+            dimension: 3,
+            transitions: Vec::new(),
+            boundaries: Vec::new(),
+            leaf: LeafPrimitive::Simplex,
+            frame: false,
+        };
+        let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
+        let root = |corners: &[u32; 3]| Root {
+            state: StateId::new(0),
+            points: corners.iter().map(corner).collect(),
+            rational: false,
+            solid: None,
+        };
+        let deviation = drawn.deviation_mm + refine::rounding_mm(refine::largest_coordinate(&drawn.vertices));
+        let roots = drawn.triangles.iter().map(root).collect();
+        let triangles = Automaton::new(vec![state]).ok().and_then(|automaton| Self::new(automaton, roots, Vec::new(), Vec::new()).ok());
+        Ok(triangles.map(|triangles| (triangles, deviation)))
+    }
+
     /// The trimmed surface that a root belongs to.
     pub(crate) fn trim_of(&self, root: usize) -> Option<usize> {
         self.trims.get(root).copied().flatten().map(|index| index as usize)

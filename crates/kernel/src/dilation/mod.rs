@@ -16,6 +16,9 @@
 //! Points, segments and triangles of which few are near to each other, wires, panels and the faces of solids, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`) and simplified part by
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
+//! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`).
+//! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
+//!
 //! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
 //!
 //! The mesh is a closed, oriented 2-manifold by construction: see `block` and `outside`. Triangles are then saved within the same bounds (`simplify`).
@@ -27,6 +30,7 @@ mod block;
 mod certificate;
 mod convex;
 mod critical;
+mod drawn;
 mod dust;
 mod error;
 mod lattice;
@@ -48,15 +52,15 @@ mod surface;
 mod tree;
 mod wall;
 
-use crate::attractor::{Attractor, RefineError};
+use crate::attractor::Attractor;
 use crate::budget::Budget;
-use crate::measure::bounds::{AxisBox, bounding_box, dilated_box};
+use crate::measure::bounds::AxisBox;
 use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
+use drawn::{Drawn, unless_stopped};
 pub use error::DilationError;
 use plan::{Balls, Plan};
 pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
-use std::borrow::Cow;
 pub use wall::{Side, Wall, close, wall};
 
 /// A dilated shape with what is proven of it. Lengths in mm.
@@ -81,8 +85,8 @@ pub struct Dilation {
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain, as far as they were looked at: others beside them are not; without a lattice, sets of sites whose dilations may or may not
     /// have a common point. Not counted where points stand for cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
-    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`): of points, wires, polygons and solids of these, where nothing was uncertain
-    /// and no triangles cross.
+    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`): of points, wires, surfaces and solids of these, where nothing was uncertain,
+    /// no triangles cross, and what stands for curves and smooth surfaces is near enough to them (see `steady` there).
     pub topology_exact: bool,
 }
 
@@ -112,76 +116,17 @@ pub fn dilate_unsimplified(
 }
 
 fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
-    let Some(resolved) = resolve(attractor, radius, tolerance, budget)? else {
+    if simplify && let Some(smooth) = Drawn::smooth(attractor, radius, tolerance, budget)? {
+        let made = smooth.plan(simplify, budget).and_then(|(plan, budget)| plan.run_in_sheets(&budget));
+        if let Some(dilation) = unless_stopped(made)? {
+            return smooth.of_another(dilation, attractor, radius, budget);
+        }
+    }
+    let Some(drawn) = Drawn::resolved(attractor, radius, tolerance, budget)? else {
         return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.run(budget);
     };
-    let Resolved { attractor: changed, balls, deviation_mm, rest } = &resolved;
-    let dilation = Plan::new(changed, *balls, *rest, simplify, budget)?.run(&budget.beyond(*deviation_mm))?;
-    let bounds = if attractor.has_own_radii() {
-        dilated_box(changed, budget)?.widened(*deviation_mm)
-    } else {
-        bounding_box(attractor, budget)?.grown(radius.mm())
-    };
-    Ok(Dilation {
-        inner_mm: dilation.inner_mm + deviation_mm,
-        outer_mm: dilation.outer_mm + deviation_mm,
-        bounds,
-        topology_exact: dilation.topology_exact && *deviation_mm == 0.0,
-        ..dilation
-    })
-}
-
-/// Share of the tolerance that triangles which stand for trimmed surfaces may use.
-const TRIM_SHARE: f64 = 0.1;
-
-/// Share of the tolerance by which radii may be off where they vary.
-const GRADE_SHARE: f64 = 0.4;
-
-/// An attractor whose trimmed surfaces are triangles, and whose roots have one radius each.
-struct Resolved {
-    attractor: Attractor,
-    balls: Balls,
-    /// Its dilation's distance from the one asked for, at most.
-    deviation_mm: f64,
-    /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
-    /// in D(r + d), so that d adds to both bounds.
-    rest: Tolerance,
-}
-
-/// Draws trimmed surfaces to their share of the tolerance, and splits roots whose radius varies; `None` when there are none.
-fn resolve(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Option<Resolved>, DilationError> {
-    let is_trimmed = !attractor.trimmed().is_empty();
-    if !is_trimmed && !attractor.has_own_radii() {
-        return Ok(None);
-    }
-    let length = |mm: f64| Tolerance::new(mm).unwrap_or(tolerance);
-    let [least, most] = attractor.radii(radius.mm());
-    let balls = Balls { least, most };
-    let aimed = tolerance.mm().min(0.5 * balls.least);
-    let (changed, mut deviation_mm) = if is_trimmed {
-        let (resolved, deviation_mm) = attractor.resolved(length(TRIM_SHARE * aimed), budget).map_err(|error| drawn(error, TRIM_SHARE))?;
-        (Cow::Owned(resolved), deviation_mm)
-    } else {
-        (Cow::Borrowed(attractor), 0.0)
-    };
-    if attractor.has_own_radii() {
-        let graded = changed.graded(radius.mm(), GRADE_SHARE * aimed, budget).map_err(|error| drawn(error, GRADE_SHARE))?;
-        deviation_mm += graded.deviation_mm;
-        let least = graded.radii.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = graded.radii.iter().copied().fold(0.0, f64::max);
-        let rest = length(aimed - deviation_mm);
-        return Ok(Some(Resolved { attractor: graded.attractor, balls: Balls { least, most }, deviation_mm, rest }));
-    }
-    let rest = length(aimed - deviation_mm);
-    Ok(Some(Resolved { attractor: changed.into_owned(), balls, deviation_mm, rest }))
-}
-
-/// The error of a stage that draws within a share of the tolerance.
-fn drawn(error: RefineError, share: f64) -> DilationError {
-    match error {
-        RefineError::Stopped(stopped) => DilationError::Stopped(stopped),
-        error => DilationError::Drawn { error, share },
-    }
+    let (plan, beyond) = drawn.plan(simplify, budget)?;
+    drawn.of_another(plan.run(&beyond)?, attractor, radius, budget)
 }
 
 /// What a dilation is predicted to cost.
@@ -220,10 +165,15 @@ pub fn predict(
     simplify: bool,
     budget: &Budget,
 ) -> Result<Prediction, DilationError> {
-    let Some(Resolved { attractor: changed, balls, deviation_mm, rest }) = resolve(attractor, radius, tolerance, budget)? else {
+    if simplify && let Some(smooth) = Drawn::smooth(attractor, radius, tolerance, budget)? {
+        let predicted = smooth.plan(simplify, budget).and_then(|(plan, budget)| plan.predict_in_sheets(&budget));
+        if let Some(prediction) = unless_stopped(predicted)? {
+            return Ok(smooth.predicted_of_another(prediction));
+        }
+    }
+    let Some(drawn) = Drawn::resolved(attractor, radius, tolerance, budget)? else {
         return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.predict(budget);
     };
-    let prediction = Plan::new(&changed, balls, rest, simplify, budget)?.predict(budget)?;
-    // As `run` adds the deviation to both bounds.
-    Ok(Prediction { least_thickness_mm: (prediction.least_thickness_mm - 2.0 * deviation_mm).max(0.0), ..prediction })
+    let (plan, _) = drawn.plan(simplify, budget)?;
+    Ok(drawn.predicted_of_another(plan.predict(budget)?))
 }

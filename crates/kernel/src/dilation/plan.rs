@@ -1,6 +1,6 @@
 //! Pitch, thresholds and bounds of a dilation.
 
-use super::arrangement::{Arranged, Arrangement, Copies};
+use super::arrangement::{self, Arranged, Arrangement, Copies};
 use super::assemble::Assembly;
 use super::block::{self, WITNESS};
 use super::dust;
@@ -78,6 +78,8 @@ pub(crate) struct Setting {
     pub(super) clean_only: bool,
     /// What was asked, of the smallest balls.
     pub(super) tolerance: f64,
+    /// How far places of the shape that sites stand for are from these, and sites from it, at most: 0 where sites are the shape.
+    pub(super) off: f64,
     /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
     pub(super) cells: usize,
 }
@@ -150,13 +152,14 @@ impl Setting {
             close_in_space: outer - radius,
             clean_only: false,
             tolerance,
+            off: 0.0,
             cells,
         }
     }
 
     /// The same for sites no place of which is farther than `moved` from those that are meant, nor one of these from them, with more slack for rounding. Tetrahedra do not fit it.
     pub(super) fn narrower(&self, moved: f64, slack: f64) -> Self {
-        Self { least: self.least + moved, outer: self.outer - moved, slack, ..self.clone() }
+        Self { least: self.least + moved, outer: self.outer - moved, off: self.off + moved, slack, ..self.clone() }
     }
 
     /// What the surface may be off d = r at least, inwards and outwards.
@@ -284,6 +287,8 @@ pub(super) struct Plan<'a> {
     extra: f64,
     bounds: AxisBox,
     rule: SiteRule<'a>,
+    /// How far the attractor is from the one that it stands for, at most.
+    off: f64,
     clean_only: bool,
 }
 
@@ -316,7 +321,12 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, clean_only: !simplify })
+        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, off: 0.0, clean_only: !simplify })
+    }
+
+    /// The same for an attractor that stands for another one, no place of either farther from the other one than `off`: bounds remain those of the one that is given, but the topology that is told of is the other one's. Infinite where no length tells.
+    pub(super) fn standing_for_another(self, off: f64) -> Self {
+        Self { off, ..self }
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -345,7 +355,7 @@ impl<'a> Plan<'a> {
         let thinnest = self.balls.least - self.balls.inner(self.radius - least);
         let taken = self.balls.outer(self.extra) + self.balls.outer(self.rule.outer_reserve());
         let close_in_space = setting.close.max(self.aimed - taken);
-        let setting = Setting { least, thinnest, close_in_space, ..setting };
+        let setting = Setting { least, thinnest, close_in_space, off: self.off, ..setting };
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
@@ -371,22 +381,8 @@ impl<'a> Plan<'a> {
         };
         let setting = self.setting(self.pitch, &unlimited);
         let (space, grading) = (self.space(&setting), Grading::default());
-        // `run` gives bounds of at most this length.
-        let least_thickness_mm = 2.0 * (self.balls.least - self.aimed);
         if let Some(arrangement) = Arrangement::new(&setting, &self.rule, &space.candidates, budget)? {
-            let triangles = arrangement.triangles;
-            return Ok(Prediction {
-                counted_triangles: triangles,
-                triangles,
-                memory_bytes: arrangement.memory_bytes(),
-                leaf_cells: arrangement.leaves() as f64,
-                simplifying_bytes: 0.0,
-                looked_at_bytes: 0.0,
-                searched: 0.0,
-                found: 0.0,
-                least_thickness_mm,
-                pitch_mm: None,
-            });
+            return Ok(self.predicted(&arrangement));
         }
         let pass = self.pass(&setting, &grading, Task::Whole, &unlimited, space.blocks);
         let expected = pass.expected(space.blocks, &space.candidates, !self.clean_only)?;
@@ -400,9 +396,38 @@ impl<'a> Plan<'a> {
             looked_at_bytes: expected.looked_at,
             searched: expected.searched,
             found: expected.found,
-            least_thickness_mm,
+            least_thickness_mm: self.least_thickness(),
             pitch_mm: Some(self.pitch),
         })
+    }
+
+    /// The same for sheets along a surface, see [`Plan::run_in_sheets`].
+    pub(super) fn predict_in_sheets(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let arrangement = Arrangement::of_sheets(&setting, &self.rule, &self.space(&setting).candidates, budget)?;
+        Ok(arrangement.map(|arrangement| self.predicted(&arrangement)))
+    }
+
+    /// What an arrangement tells of what will be made of it.
+    fn predicted(&self, arrangement: &Arrangement) -> Prediction {
+        let triangles = arrangement.triangles;
+        Prediction {
+            counted_triangles: triangles,
+            triangles,
+            memory_bytes: arrangement.memory_bytes(),
+            leaf_cells: arrangement.leaves() as f64,
+            simplifying_bytes: 0.0,
+            looked_at_bytes: 0.0,
+            searched: 0.0,
+            found: 0.0,
+            least_thickness_mm: self.least_thickness(),
+            pitch_mm: None,
+        }
+    }
+
+    /// 2 (r - e): bounds are of at most this length.
+    fn least_thickness(&self) -> f64 {
+        2.0 * (self.balls.least - self.aimed)
     }
 
     /// The dilation.
@@ -413,6 +438,14 @@ impl<'a> Plan<'a> {
             Some(dilation) => Ok(dilation),
             None => self.on_lattice(&setting, &space, budget),
         }
+    }
+
+    /// The dilation of a surface that turns little, by a sheet on each side; none where that does not come out.
+    pub(super) fn run_in_sheets(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let space = self.space(&setting);
+        let arrangement = Arrangement::of_sheets(&setting, &self.rule, &space.candidates, budget)?;
+        self.of_arrangement(arrangement, &setting, &space, budget)
     }
 
     /// The dilation on a lattice. Where the distance may have critical points with values that it does not tell from r, it is refined until it does.
@@ -447,7 +480,10 @@ impl<'a> Plan<'a> {
         self.prove(setting, site_error, triangles, budget);
         let surface = self.assemble(setting, space, &grading, blocks, budget)?;
         let mended = self.mended(setting, space, surface, uncertain as u64, budget)?;
-        self.certify(setting, mended, Some(setting.lattice.pitch), budget)
+        let is_shape = self.off == 0.0 && site_error.is_zero();
+        let may_be_exact = !setting.dense && mended.uncertain == 0 && mended.crossings == 0;
+        let is_exact = may_be_exact && (is_shape || arrangement::is_of_sites(setting, &self.rule, &space.candidates, budget)?);
+        self.certify(setting, mended, is_exact, Some(setting.lattice.pitch), budget)
     }
 
     /// Holds all blocks against the limits.
@@ -466,9 +502,21 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
-    /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, where that serves better than a lattice.
+    /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, or by what needs none, where that serves better than a lattice.
     pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
-        let Some(mut arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
+        let arrangement = Arrangement::new(setting, &self.rule, &space.candidates, budget)?;
+        self.of_arrangement(arrangement, setting, space, budget)
+    }
+
+    /// The dilation by an arrangement, if there is one and it comes out.
+    fn of_arrangement(
+        &self,
+        arrangement: Option<Arrangement>,
+        setting: &Setting,
+        space: &Space,
+        budget: &Budget,
+    ) -> Result<Option<Dilation>, DilationError> {
+        let Some(mut arrangement) = arrangement else { return Ok(None) };
         let allowed = budget.limits.triangles;
         let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed };
         if arrangement.leaves() > budget.limits.cells {
@@ -479,17 +527,18 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         let Some(Arranged { mut surface, uncertain, is_done }) = arrangement.run(budget)? else { return Ok(None) };
-        let (index, narrower, copies) = arrangement.into_index();
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
+        let is_exact = uncertain == 0 && arrangement.is_of_another(&self.rule.attractor().surfaces(), budget)?;
+        let (index, narrower, copies) = arrangement.into_index();
         self.prove(setting, surface.site_error, surface.triangles.len() as u64, budget);
         if is_done {
             if copies.triangles(&surface) > allowed {
                 return Err(too_many());
             }
             copies.put(&mut surface);
-            return self.certify(setting, Mended { surface, uncertain, crossings: 0 }, None, budget).map(Some);
+            return self.certify(setting, Mended { surface, uncertain, crossings: 0 }, is_exact, None, budget).map(Some);
         }
         copies.round(&mut surface);
         let bounds = self.bounds.grown(2.0 * self.radius);
@@ -500,7 +549,7 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         let mended = self.put(setting, space, surface, &copies, uncertain, budget)?;
-        self.certify(setting, mended, None, budget).map(Some)
+        self.certify(setting, mended, is_exact, None, budget).map(Some)
     }
 
     /// A surface that was mended, with parts that are like others where they are.
@@ -626,8 +675,15 @@ impl<'a> Plan<'a> {
         budget.report("stitch", 0.0, triangles);
     }
 
-    /// The dilation of which a surface bounds the solid, with what is proven of it.
-    fn certify(&self, setting: &Setting, mended: Mended, pitch_mm: Option<f64>, budget: &Budget) -> Result<Dilation, DilationError> {
+    /// The dilation of which a surface bounds the solid, with what is proven of it: `is_exact` tells whether what sites stand for has the topology of theirs.
+    fn certify(
+        &self,
+        setting: &Setting,
+        mended: Mended,
+        is_exact: bool,
+        pitch_mm: Option<f64>,
+        budget: &Budget,
+    ) -> Result<Dilation, DilationError> {
         let Mended { surface, uncertain, crossings } = mended;
         let site = surface.site_error;
         let [inner_mm, outer_mm] = self.proven(setting, site);
@@ -651,7 +707,7 @@ impl<'a> Plan<'a> {
             leaf_cells,
             bounds: self.bounds.grown(self.radius),
             uncertain,
-            topology_exact: !setting.dense && uncertain == 0 && crossings == 0 && site.is_zero(),
+            topology_exact: is_exact && !setting.dense && uncertain == 0 && crossings == 0,
         })
     }
 }
@@ -810,7 +866,7 @@ mod tests {
             assert_eq!(copies.are_whole(&surface), is_congruent);
             let mended = plan.put(&setting, &space, surface, &copies, 0, &budget).unwrap();
             assert_eq!((mended.surface.triangles.len(), mended.uncertain, mended.crossings), (2 * triangles, 0, 0));
-            assert_eq!(plan.certify(&setting, mended, None, &budget).unwrap().solid.topology().components, 2);
+            assert_eq!(plan.certify(&setting, mended, true, None, &budget).unwrap().solid.topology().components, 2);
         }
     }
 

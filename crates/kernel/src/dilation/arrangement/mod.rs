@@ -84,6 +84,8 @@ const CARRIED: f64 = 1.0 / 16.0;
 /// Rounds in which bends are given up that leave no room for others; then all are.
 const ROUNDS_OF_BENDS: usize = 6;
 
+/// Sites of a lattice of which it is asked whether the topology is that of what they stand for, at most.
+const MOST_STEADY: usize = 20_000;
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: u64 = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
@@ -105,6 +107,8 @@ pub(super) struct Arrangement {
     copies: Arc<Copies>,
     /// The surface, where it needs no polytopes.
     flat: Option<BlockSurface>,
+    /// Whether its topology is shown to be that of what the sites stand for.
+    is_steady: bool,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
@@ -118,6 +122,8 @@ pub(super) struct Arrangement {
 /// What comes of figures that need no polytopes.
 enum Flat {
     Made(Box<BlockSurface>),
+    /// The same, and it is shown to have the topology of what the sites stand for, too.
+    Steady(Box<BlockSurface>),
     /// There would be far more triangles than may be: about how many.
     Beyond(f64),
 }
@@ -153,20 +159,19 @@ impl Arrangement {
         let sites = || Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget);
         let Some((mut kinds, is_of_solid)) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
-        let is_steady = |figures: &[Figure], moved: f64| {
-            let solids: Vec<Inside<'_>> = surfaces.iter().map(Inside::new).collect();
-            Steady { figures, radius: setting.reach, moved, solids: &solids }.is_shown(budget)
-        };
+        let is_steady = |figures: &[Figure], off: f64| are_steady(figures, setting, off, &surfaces, budget);
         let mut copies = Copies::default();
         if setting.rounding < CARRIED * setting.half_band() {
             copies = Copies::leave_out(&mut kinds.list, &is_of_solid, &surfaces, setting, NOISE * setting.half_band(), budget)?;
-            if copies.moved > ROUNDED * setting.slack && !is_steady(&copies.figures, copies.moved + setting.slack)? {
+            if copies.moved > ROUNDED * setting.slack && !is_steady(&copies.figures, copies.moved)? {
                 let Some((all, _)) = sites()? else { return Ok(None) };
                 (kinds, copies) = (all, Copies::default());
             }
         }
         let put = if copies.is_empty() { 0.0 } else { copies.moved + setting.rounding };
-        let setting = setting.narrower(put, setting.slack);
+        kinds.is_exact = setting.off + kinds.off() == 0.0;
+        let mut setting = setting.narrower(put, setting.slack);
+        setting.off += kinds.off();
         let flat = match planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
             None => match height_field::surface(&kinds.list, &setting, &|x| copies.rounded(x), budget)? {
                 None => offset::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)?,
@@ -181,22 +186,42 @@ impl Arrangement {
         }
         let slack = CLEARED * setting.slack;
         let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
-        let (error, leaves) = (kinds.error, kinds.leaves);
+        let Sites { error, leaves, is_exact, .. } = kinds;
         let triangles = figure::triangles(&kinds.list);
         let (plain, left) = kinds.joined(&setting, budget)?;
         let copies = Arc::new(copies);
         if let Some(Cleared { figures, moved }) = cleared {
             let narrower = setting.narrower(moved, slack);
             let triangles = figure::triangles(&figures);
-            let (clear, left) = Sites { list: figures, error, leaves }.joined(&narrower, budget)?;
+            let (clear, left) = Sites { list: figures, error, leaves, is_exact }.joined(&narrower, budget)?;
             if (clear.list.len() as f64) < WORTH * plain.list.len() as f64
                 && let Some(arrangement) = Self::of(clear, left, triangles, narrower, surfaces.clone(), copies.clone(), budget)?
-                && is_steady(&arrangement.sites.list[..arrangement.tubes.figures], moved + slack)?
+                && is_steady(arrangement.figures(), moved + slack)?
             {
                 return Ok(Some(arrangement));
             }
         }
         Self::of(plain, left, triangles, setting, surfaces, copies, budget)
+    }
+
+    /// Sheets along the sites, as those of a surface; none where they are no such surface.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of_sheets(
+        setting: &Setting,
+        rule: &SiteRule<'_>,
+        candidates: &Candidates,
+        budget: &Budget,
+    ) -> Result<Option<Self>, Stopped> {
+        // Sites are leaves here: there may be more of these than cells that were drawn.
+        let most = MOST_POLYTOPES.min(usize::try_from(budget.limits.cells).unwrap_or(usize::MAX));
+        let Some((sites, _)) = Sites::of(rule, candidates, most, budget)? else { return Ok(None) };
+        let copies = Copies::default();
+        let Some(flat) = offset::surface(&sites.list, setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
+        let mut arrangement = Self::empty(sites, setting.clone(), Vec::new(), Arc::new(copies));
+        arrangement.take(flat);
+        Ok(Some(arrangement))
     }
 
     /// The arrangement of joined sites, with the share of faces that no polyhedron has, the triangles that they were joined of, if they were, and the surfaces of solids; `None` likewise.
@@ -227,9 +252,10 @@ impl Arrangement {
     /// Takes a surface that needs no polytopes.
     fn take(&mut self, flat: Flat) {
         self.tubes = Tubes::none(self.sites.list.len());
+        self.is_steady = matches!(flat, Flat::Steady(_));
         match flat {
             Flat::Beyond(triangles) => (self.made, self.triangles) = (triangles, triangles),
-            Flat::Made(flat) => {
+            Flat::Made(flat) | Flat::Steady(flat) => {
                 self.made = flat.triangles.len() as f64;
                 self.triangles = self.copies.triangles(&flat) as f64;
                 let (leaves, site_error) = (self.sites.leaves, self.sites.error);
@@ -250,6 +276,7 @@ impl Arrangement {
             loose: Loose::new(),
             copies,
             flat: None,
+            is_steady: false,
             polytopes: Polytopes::default(),
             solids,
             inside: 0.0,
@@ -428,6 +455,27 @@ impl Arrangement {
         Ok(None)
     }
 
+    /// Whether the dilation of what its sites stand for has the topology of theirs, given the surfaces of solids. False where that is not shown.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn is_of_another(&self, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
+        if self.sites.is_exact || self.is_steady {
+            return Ok(true);
+        }
+        let Setting { least, reach, outer, off, slack, .. } = self.setting;
+        // Closed surfaces that have nothing inside farther from them than `least` were filled: nothing nearer may be in question.
+        let is_within = off + slack <= reach - least;
+        // Parts that are like others are apart by twice the outer distance: what is in question around one of them must not reach another.
+        let is_apart = self.copies.is_empty() || 2.0 * (off + slack) <= outer - reach;
+        Ok(is_within && is_apart && are_steady(self.figures(), &self.setting, off, solids, budget)?)
+    }
+
+    /// Its figures without those of bends.
+    fn figures(&self) -> &[Figure] {
+        if self.tubes.figures > 0 { &self.sites.list[..self.tubes.figures] } else { &self.sites.list }
+    }
+
     /// Its figures, for searches, its setting, and where parts were that are like others.
     pub(super) fn into_index(mut self) -> (Index, Setting, Arc<Copies>) {
         if self.tubes.figures > 0 {
@@ -435,6 +483,21 @@ impl Arrangement {
         }
         (Index::new(self.sites.list, self.setting.slack), self.setting, self.copies)
     }
+}
+
+/// Whether the dilation of what some sites stand for has the topology of theirs, if they are no more than can be asked. False where that is not shown.
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn is_of_sites(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, budget: &Budget) -> Result<bool, Stopped> {
+    let Some((sites, _)) = Sites::of(rule, candidates, MOST_STEADY, budget)? else { return Ok(false) };
+    are_steady(&sites.list, setting, setting.off + sites.off(), &rule.attractor().surfaces(), budget)
+}
+
+/// The same of figures that are off by so much, given the surfaces of solids.
+fn are_steady(figures: &[Figure], setting: &Setting, off: f64, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
+    let solids: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
+    Steady { figures, radius: setting.reach, moved: off + setting.slack, solids: &solids }.is_shown(budget)
 }
 
 /// The figures that are near to each other, given how far beyond their ends they are cut; none where a lattice serves better, as too many are.
@@ -473,9 +536,16 @@ struct Sites {
     /// The largest errors of leaves.
     error: SiteError,
     leaves: u64,
+    /// Whether they are the shape itself.
+    is_exact: bool,
 }
 
 impl Sites {
+    /// How far places of what they stand for are from these, and these from it, at most: infinite where squares alone tell.
+    fn off(&self) -> f64 {
+        if self.error.inner_square > 0.0 { f64::INFINITY } else { self.error.inner.max(self.error.outer) }
+    }
+
     /// The same, joined to polyhedra, polygons and segments as far as they are convex, with the share of faces that no polyhedron has.
     fn joined(self, setting: &Setting, budget: &Budget) -> Result<(Self, f64), Stopped> {
         let (flatness, faces) = (FLATNESS * setting.slack, self.list.len() as f64);

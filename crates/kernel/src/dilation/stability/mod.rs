@@ -13,7 +13,8 @@ mod pieces;
 mod search;
 mod spanning;
 
-use super::{DilationError, Resolved, resolve};
+use super::DilationError;
+use super::drawn::Drawn;
 use crate::attractor::Attractor;
 use crate::budget::{Budget, Stopped};
 use crate::measure::bounds::bounding_box;
@@ -104,9 +105,9 @@ pub fn stability(
     window_mm: [f64; 2],
     budget: &Budget,
 ) -> Result<Stability, DilationError> {
-    let resolved = resolve(attractor, radius, tolerance, budget)?;
+    let drawn = Drawn::resolved(attractor, radius, tolerance, budget)?;
     let (attractor, deviation) =
-        resolved.as_ref().map_or((attractor, 0.0), |Resolved { attractor, deviation_mm, .. }| (attractor, *deviation_mm));
+        drawn.as_ref().map_or((attractor, 0.0), |Drawn { attractor, deviation_mm, .. }| (attractor, *deviation_mm));
     let bounds = bounding_box(attractor, budget)?;
     let core = core(radius, tolerance);
     let resolution = RESOLUTION * (core[1] - core[0]) * 0.5;

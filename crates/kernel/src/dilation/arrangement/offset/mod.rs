@@ -7,7 +7,8 @@
 //! * It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
 //! * Wherever s <= d(x) <= t there is a direction w with w . (x - c) > 0 for all places c of S that are closest to x; and at places of the boundary of M there is one that leaves it through all facets there, too (`ways`).
 //!
-//! So M has the topology of D_r(S): see [`critical`](crate::dilation::critical) for the same of lattices. Where that does not come out, as where parts of S come so near to each other that their dilations touch, polytopes, or a lattice, do the work.
+//! So M has the topology of D_r(S): see [`critical`](crate::dilation::critical) for the same of lattices. Where the faces stand for another shape S', no place of either farther than e from the other one, and s <= r - e and r + 2 e <= t, there also is a w wherever r - e <= d(x) <= r + e such that w . (x - c) > e for
+//! all places c of S no farther from x than t: then D_r(S') has the topology of D_r(S), see `steady`. Where that does not come out, as where parts of S come so near to each other that their dilations touch, polytopes, or a lattice, do the work.
 
 mod coarse;
 mod sheets;
@@ -71,7 +72,9 @@ pub(super) fn surface(
     let around = Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer };
     budget.cancel.check()?;
     let ways = Ways::new(&skin, around.faces, [inner, outer]);
-    if !ways.lead_out(budget)? {
+    let (off, reach) = (setting.off + setting.slack, setting.reach);
+    let is_steady = setting.off > 0.0 && inner <= reach - off && reach + 2.0 * off <= outer && ways.lead_out(off, budget)?;
+    if !is_steady && !ways.lead_out(0.0, budget)? {
         return Ok(None);
     }
     let at = |share: f64| radius + share * half;
@@ -97,7 +100,7 @@ pub(super) fn surface(
             let is_left = ways.leave(&sheets, budget)?;
             let mut surface = BlockSurface { vertices: sheets.vertices, triangles: sheets.triangles, ..BlockSurface::default() };
             let is_shown = is_left && is_embedded(&mut surface, budget)? && holds(&surface, &skin);
-            return Ok(is_shown.then(|| Flat::Made(Box::new(surface))));
+            return Ok(is_shown.then(|| if is_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) }));
         }
         good = (0..sheets.triangles.len() as u32).map(|triangle| sheets.name(triangle)).collect();
         for fault in faults {

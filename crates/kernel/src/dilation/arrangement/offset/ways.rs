@@ -29,6 +29,8 @@ pub(super) struct Ways<'a> {
     faces: &'a Faces,
     inner: f64,
     outer: f64,
+    /// How much farther faces are left behind than rounding asks.
+    more: f64,
 }
 
 /// A direction, and the cosine and sine of the angle by which others differ from it that it stands for.
@@ -40,7 +42,7 @@ struct Cone {
 
 impl<'a> Ways<'a> {
     pub(super) fn new(skin: &'a Skin, faces: &'a Faces, [inner, outer]: [f64; 2]) -> Self {
-        Self { skin, faces, inner, outer }
+        Self { skin, faces, inner, outer, more: 0.0 }
     }
 
     /// Whether all faces that are as near to some place of the hull of some points as the outer distance are left behind along a direction: lower than a height.
@@ -49,7 +51,7 @@ impl<'a> Ways<'a> {
         let centre: Point = std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / count);
         let wide = points.iter().map(|point| distance_squared(point, &centre)).fold(0.0, f64::max).sqrt();
         let least = (self.outer + wide) * (1.0 + NOISE);
-        let limit = height - NOISE * self.outer;
+        let limit = height - NOISE * self.outer - self.more;
         self.faces.hold(points, self.outer, along, limit, |face| {
             face.highest(along) < limit || face.distance_squared(&centre) > least * least || is_below(face, along, limit, &centre, least)
         })
@@ -63,12 +65,13 @@ impl<'a> Ways<'a> {
         })
     }
 
-    /// Whether that is so of all places that are between both distances from the surface, each along some direction.
+    /// Whether that is so of all places that are between both distances from the surface, each along some direction, and lower by so much more.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn lead_out(&self, budget: &Budget) -> Result<bool, Stopped> {
-        let Self { skin, faces, .. } = self;
+    pub(super) fn lead_out(&self, more: f64, budget: &Budget) -> Result<bool, Stopped> {
+        let ways = Self { more, ..*self };
+        let Self { skin, faces, .. } = &ways;
         let (groups, cones) = (faces.groups(), cones());
         let at = |vertex: u32| skin.places[vertex as usize];
         let rays = |vertex: u32| -> Vec<Point> {
@@ -78,9 +81,9 @@ impl<'a> Ways<'a> {
         let mut borders: Vec<u32> = skin.borders.iter().flat_map(|(ends, _)| *ends).collect();
         borders.sort_unstable();
         borders.dedup();
-        Ok(all(&groups, budget, |group| self.lead_from(group) || group.iter().all(|&face| self.lead_from(&[face])))?
-            && all(&skin.borders, budget, |(ends, triangle)| self.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
-            && all(&borders, budget, |&vertex| self.lead_around(&at(vertex), &rays(vertex), &cones))?)
+        Ok(all(&groups, budget, |group| ways.lead_from(group) || group.iter().all(|&face| ways.lead_from(&[face])))?
+            && all(&skin.borders, budget, |(ends, triangle)| ways.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
+            && all(&borders, budget, |&vertex| ways.lead_around(&at(vertex), &rays(vertex), &cones))?)
     }
 
     /// Whether it is so on both sides of some faces, for the directions away from the inside of these and around corners within.

@@ -1,0 +1,147 @@
+//! Shapes that stand for others: triangles for trimmed and for smooth surfaces, and roots with one radius each.
+
+use super::plan::{Balls, Plan};
+use super::{Dilation, DilationError, Prediction};
+use crate::attractor::{Attractor, RefineError};
+use crate::budget::{Budget, Limits};
+use crate::measure::bounds::{AxisBox, bounding_box, dilated_box};
+use crate::tolerance::{Radius, Tolerance};
+use std::borrow::Cow;
+
+/// Share of the tolerance that triangles which stand for trimmed surfaces may use.
+const TRIM_SHARE: f64 = 0.1;
+
+/// Share of the tolerance by which radii may be off where they vary.
+const GRADE_SHARE: f64 = 0.4;
+
+/// Share of the tolerance that triangles which stand for smooth surfaces may use.
+const SMOOTH_SHARE: f64 = 0.2;
+
+/// Cells of a smooth surface at most: in any case, and for each square of the radius times the tolerance in half of the box around. With no radius of curvature below that of the ball a cell that is off by a fifth of the tolerance has about one such square; rough surfaces have more.
+const FEW_CELLS: f64 = 10_000.0;
+const CELLS_PER_SQUARE: f64 = 20.0;
+
+/// Bytes that sheets along a cell take at most.
+const BYTES_PER_CELL: u64 = 4_000;
+
+/// An attractor that stands for another one.
+pub(super) struct Drawn {
+    pub(super) attractor: Attractor,
+    balls: Balls,
+    /// Its dilation's distance from the one asked for, at most.
+    pub(super) deviation_mm: f64,
+    /// How far places of either are from the other one at most; infinite where radii differ, too.
+    off: f64,
+    /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
+    /// in D(r + d), so that d adds to both bounds.
+    rest: Tolerance,
+}
+
+impl Drawn {
+    /// Draws trimmed surfaces to their share of the tolerance, and splits roots whose radius varies; `None` when there are none.
+    pub(super) fn resolved(
+        attractor: &Attractor,
+        radius: Radius,
+        tolerance: Tolerance,
+        budget: &Budget,
+    ) -> Result<Option<Self>, DilationError> {
+        let is_trimmed = !attractor.trimmed().is_empty();
+        if !is_trimmed && !attractor.has_own_radii() {
+            return Ok(None);
+        }
+        let length = |mm: f64| Tolerance::new(mm).unwrap_or(tolerance);
+        let [least, most] = attractor.radii(radius.mm());
+        let balls = Balls { least, most };
+        let aimed = tolerance.mm().min(0.5 * balls.least);
+        let (changed, mut deviation_mm) = if is_trimmed {
+            let share = length(TRIM_SHARE * aimed);
+            let (resolved, deviation_mm) = attractor.resolved(share, budget).map_err(|error| refused(error, TRIM_SHARE))?;
+            (Cow::Owned(resolved), deviation_mm)
+        } else {
+            (Cow::Borrowed(attractor), 0.0)
+        };
+        if attractor.has_own_radii() {
+            let graded = changed.graded(radius.mm(), GRADE_SHARE * aimed, budget).map_err(|error| refused(error, GRADE_SHARE))?;
+            deviation_mm += graded.deviation_mm;
+            let least = graded.radii.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = graded.radii.iter().copied().fold(0.0, f64::max);
+            let (balls, rest) = (Balls { least, most }, length(aimed - deviation_mm));
+            let off = if deviation_mm > 0.0 { f64::INFINITY } else { 0.0 };
+            return Ok(Some(Self { attractor: graded.attractor, balls, deviation_mm, off, rest }));
+        }
+        let rest = length(aimed - deviation_mm);
+        Ok(Some(Self { attractor: changed.into_owned(), balls, deviation_mm, off: deviation_mm, rest }))
+    }
+
+    /// Draws a surface with a B-rep to its share of the tolerance; `None` where it is no such surface, or has more cells than one that is smooth for balls of this radius: another way may do with fewer.
+    pub(super) fn smooth(
+        attractor: &Attractor,
+        radius: Radius,
+        tolerance: Tolerance,
+        budget: &Budget,
+    ) -> Result<Option<Self>, DilationError> {
+        if !attractor.is_surface() {
+            return Ok(None);
+        }
+        let radius = radius.mm();
+        let aimed = tolerance.mm().min(0.5 * radius);
+        let Ok(share) = Tolerance::new(SMOOTH_SHARE * aimed) else { return Ok(None) };
+        let bounds = bounding_box(attractor, budget)?;
+        let [x, y, z] = std::array::from_fn(|axis| bounds.high[axis].high - bounds.low[axis].low);
+        let cells = (FEW_CELLS + CELLS_PER_SQUARE * (x * y + y * z + z * x) / (radius * aimed)) as u64;
+        let limits = Limits { cells: cells.min(budget.limits.memory_bytes / BYTES_PER_CELL).min(budget.limits.cells), ..budget.limits };
+        let drawn = attractor.drawn(share, &Budget { limits, ..budget.clone() }).map_err(|error| refused(error, SMOOTH_SHARE));
+        let Some((attractor, deviation_mm)) = unless_stopped(drawn)? else { return Ok(None) };
+        let Ok(rest) = Tolerance::new(aimed - deviation_mm) else { return Ok(None) };
+        Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, deviation_mm, off: deviation_mm, rest }))
+    }
+
+    /// The plan of its dilation, which stands for that of the other one; and the budget of what is done for it.
+    pub(super) fn plan(&self, simplify: bool, budget: &Budget) -> Result<(Plan<'_>, Budget), DilationError> {
+        let plan = Plan::new(&self.attractor, self.balls, self.rest, simplify, budget)?;
+        Ok((plan.standing_for_another(self.off), budget.beyond(self.deviation_mm)))
+    }
+
+    /// The dilation of this attractor as that of the other one.
+    pub(super) fn of_another(
+        &self,
+        dilation: Dilation,
+        other: &Attractor,
+        radius: Radius,
+        budget: &Budget,
+    ) -> Result<Dilation, DilationError> {
+        let bounds: AxisBox = if other.has_own_radii() {
+            dilated_box(&self.attractor, budget)?.widened(self.deviation_mm)
+        } else {
+            bounding_box(other, budget)?.grown(radius.mm())
+        };
+        let (inner_mm, outer_mm) = (dilation.inner_mm + self.deviation_mm, dilation.outer_mm + self.deviation_mm);
+        Ok(Dilation { inner_mm, outer_mm, bounds, ..dilation })
+    }
+
+    /// The same of a prediction.
+    pub(super) fn predicted_of_another(&self, prediction: Prediction) -> Prediction {
+        let least_thickness_mm = (prediction.least_thickness_mm - 2.0 * self.deviation_mm).max(0.0);
+        Prediction { least_thickness_mm, ..prediction }
+    }
+}
+
+/// What came of a way that is one of several: refusals are no reason to refuse the others.
+///
+/// # Errors
+/// A stop.
+pub(super) fn unless_stopped<T>(came: Result<Option<T>, DilationError>) -> Result<Option<T>, DilationError> {
+    match came {
+        Err(DilationError::Stopped(stopped)) => Err(DilationError::Stopped(stopped)),
+        Err(_) => Ok(None),
+        Ok(came) => Ok(came),
+    }
+}
+
+/// The error of a stage that draws within a share of the tolerance.
+fn refused(error: RefineError, share: f64) -> DilationError {
+    match error {
+        RefineError::Stopped(stopped) => DilationError::Stopped(stopped),
+        error => DilationError::Drawn { error, share },
+    }
+}
