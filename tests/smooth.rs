@@ -125,8 +125,8 @@ fn smooth_surfaces_have_few_triangles() {
     {
         let text = std::fs::read(cases::folder().join(name).join("model.json")).unwrap();
         let shape = read_model(&text, &DocumentLimits::default()).unwrap().lower().unwrap().attractor;
-        let few = made(&shape, radius, 0.1 * radius);
-        let [r, e] = [Radius::new(radius).unwrap().mm(), 0.1 * radius];
+        let [r, e] = [radius, 0.1 * radius];
+        let few = made(&shape, r, e);
         let many = dilate_unsimplified(&shape, Radius::new(r).unwrap(), Tolerance::new(e).unwrap(), &Budget::default()).unwrap();
         let [few_triangles, many_triangles] = [&few, &many].map(|made| made.solid.mesh().triangles.len());
         assert!(10 * few_triangles <= many_triangles, "{name}: {few_triangles} of {many_triangles}");

@@ -30,6 +30,7 @@ use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, St
 use crate::budget::Budget;
 use crate::error::Kind;
 use crate::solid::TriMesh;
+use crate::tessellation::Tessellation;
 use crate::tolerance::Tolerance;
 pub(crate) use address::rounding;
 pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
@@ -188,6 +189,17 @@ impl AttractorError {
     }
 }
 
+/// Roots for the triangles of what was drawn, given the state of triangles.
+fn triangles_of(drawn: &Tessellation, state: StateId) -> impl Iterator<Item = Root> {
+    let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
+    drawn.triangles.iter().map(move |corners| Root { state, points: corners.iter().map(corner).collect(), rational: false, solid: None })
+}
+
+/// How far what was drawn is from the shape, rounding included, in mm.
+fn deviation_of(drawn: &Tessellation) -> f64 {
+    drawn.deviation_mm + refine::rounding_mm(refine::largest_coordinate(&drawn.vertices))
+}
+
 /// The transitions of the contraction's cycle, by their labels in the model.
 fn labels(automaton: &Automaton, contraction: &Contraction) -> Vec<usize> {
     let mut state = contraction.cycle.0;
@@ -324,13 +336,8 @@ impl Attractor {
         let mut roots: Vec<Root> = uncut.iter().map(|&root| self.roots[root].clone()).collect();
         let triangle = |state: &State| state.leaf == LeafPrimitive::Simplex && state.dimension == 3;
         let state = self.automaton.states().iter().position(triangle).map(StateId::new);
-        let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
-        let triangles = drawn
-            .triangles
-            .iter()
-            .filter_map(|corners| Some(Root { state: state?, points: corners.iter().map(corner).collect(), rational: false, solid: None }));
-        roots.extend(triangles);
-        let deviation = drawn.deviation_mm + refine::rounding_mm(refine::largest_coordinate(&drawn.vertices));
+        roots.extend(state.into_iter().flat_map(|state| triangles_of(&drawn, state)));
+        let deviation = deviation_of(&drawn);
         let mut solids = self.solids.clone();
         for solid in &mut solids {
             solid.first_root -= (0..solid.first_root).filter(|&root| self.trim_of(root).is_some()).count();
@@ -355,26 +362,10 @@ impl Attractor {
     /// [`RefineError`], of drawing them.
     pub(crate) fn drawn(&self, tolerance: Tolerance, budget: &Budget) -> Result<Option<(Self, f64)>, RefineError> {
         let drawn = complex::refine(self, &(0..self.roots.len()).collect::<Vec<usize>>(), None, tolerance, budget)?;
-        let state = State {
-            name: "triangle".into(),
-            kind: None,
-            dimension: 3,
-            transitions: Vec::new(),
-            boundaries: Vec::new(),
-            leaf: LeafPrimitive::Simplex,
-            frame: false,
-        };
-        let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
-        let root = |corners: &[u32; 3]| Root {
-            state: StateId::new(0),
-            points: corners.iter().map(corner).collect(),
-            rational: false,
-            solid: None,
-        };
-        let deviation = drawn.deviation_mm + refine::rounding_mm(refine::largest_coordinate(&drawn.vertices));
-        let roots = drawn.triangles.iter().map(root).collect();
-        let triangles = Automaton::new(vec![state]).ok().and_then(|automaton| Self::new(automaton, roots, Vec::new(), Vec::new()).ok());
-        Ok(triangles.map(|triangles| (triangles, deviation)))
+        let roots = triangles_of(&drawn, StateId::new(0)).collect();
+        let triangles =
+            Automaton::new(vec![State::simplex(3)]).ok().and_then(|automaton| Self::new(automaton, roots, Vec::new(), Vec::new()).ok());
+        Ok(triangles.map(|triangles| (triangles, deviation_of(&drawn))))
     }
 
     /// The trimmed surface that a root belongs to.

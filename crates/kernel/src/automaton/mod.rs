@@ -111,6 +111,26 @@ pub struct State {
     pub frame: bool,
 }
 
+impl State {
+    /// The state of points, segments or triangles, by the number of their corners: they are what stands for them.
+    pub(crate) fn simplex(corners: usize) -> Self {
+        let (name, kind) = match corners {
+            1 => ("point", CellKind::Vertex),
+            2 => ("segment", CellKind::Edge),
+            _ => ("triangle", CellKind::Face),
+        };
+        Self {
+            name: name.into(),
+            kind: Some(kind),
+            dimension: corners,
+            transitions: Vec::new(),
+            boundaries: Vec::new(),
+            leaf: LeafPrimitive::Simplex,
+            frame: false,
+        }
+    }
+}
+
 /// What a model claims of the cells of a curve.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub(crate) struct Smooth {

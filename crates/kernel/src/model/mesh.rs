@@ -1,10 +1,9 @@
 //! Polygon meshes as shapes.
 
-use super::CellKind;
 use super::lower::{Draft, Finding};
 use super::polygon::{self, PolygonRun};
 use crate::attractor::{Root, SolidSurface};
-use crate::automaton::{LeafPrimitive, State, StateId};
+use crate::automaton::{State, StateId};
 use crate::measure::mass::enclosed_by;
 use crate::solid::TriMesh;
 use glam::DVec3;
@@ -224,20 +223,7 @@ fn has_no_border(triangles: &[[u32; 3]]) -> bool {
 
 /// A new state of points, segments or triangles.
 pub(super) fn simplex(draft: &mut Draft, corners: usize) -> StateId {
-    let (name, kind) = match corners {
-        1 => ("point", CellKind::Vertex),
-        2 => ("segment", CellKind::Edge),
-        _ => ("triangle", CellKind::Face),
-    };
-    draft.state(State {
-        name: name.into(),
-        kind: Some(kind),
-        dimension: corners,
-        transitions: Vec::new(),
-        boundaries: Vec::new(),
-        leaf: LeafPrimitive::Simplex,
-        frame: false,
-    })
+    draft.state(State::simplex(corners))
 }
 
 /// Computes the pseudo-normals from the corners that the roots hold.
