@@ -118,20 +118,23 @@ struct Known(Mutex<[Option<(u64, Interval)>; 2]>);
 const NODES_PER_REPORT: u64 = 1 << 16;
 
 impl Known {
-    /// Takes note of one direction, and tells of both.
+    /// Takes note of one direction, and tells of both. Whoever listens hears one direction after the other, each with all that was known before.
     fn tell(&self, direction: usize, looked: u64, distance_mm: Interval, budget: &Budget) {
         let Ok(mut both) = self.0.lock() else { return };
         both[direction] = Some((looked, distance_mm));
         if let [Some((_, first)), Some((_, second))] = *both {
             budget.prove(first.high.max(second.high) - first.low.max(second.low));
         }
-        drop(both);
-        budget.report("compare", 0.0, self.looked());
+        budget.report("compare", 0.0, looked_at(&both));
     }
 
     fn looked(&self) -> u64 {
-        self.0.lock().map_or(0, |both| both.iter().flatten().map(|(looked, _)| looked).sum())
+        self.0.lock().map_or(0, |both| looked_at(&both))
     }
+}
+
+fn looked_at(both: &[Option<(u64, Interval)>; 2]) -> u64 {
+    both.iter().flatten().map(|(looked, _)| looked).sum()
 }
 
 /// A part of the first shape.
@@ -572,4 +575,36 @@ fn middle(site: &Site) -> Point {
 /// The centres of a cube's eighths.
 fn eighths(centre: &Point, half: f64) -> [Point; 8] {
     std::array::from_fn(|code| std::array::from_fn(|axis| centre[axis] + if code >> axis & 1 == 1 { 0.5 * half } else { -0.5 * half }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::Progress;
+    use std::sync::{Arc, mpsc};
+    use std::time::Duration;
+
+    #[test]
+    fn one_direction_is_heard_before_the_other() {
+        let heard: Arc<Mutex<Vec<(u64, Option<f64>)>>> = Arc::default();
+        let (begun, other) = mpsc::channel();
+        let listener = Arc::clone(&heard);
+        // Who hears of the first direction is slow, and the second is done meanwhile.
+        let sink = move |progress: &Progress| {
+            if progress.bound_mm.is_none() {
+                begun.send(()).unwrap();
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            listener.lock().unwrap().push((progress.count, progress.bound_mm));
+        };
+        let budget = Budget { progress: Some(Arc::new(sink)), ..Budget::default() };
+        let known = Known::default();
+        let interval = Interval { low: 1.0, high: 3.0 };
+        std::thread::scope(|scope| {
+            scope.spawn(|| known.tell(0, 4, interval, &budget));
+            other.recv().unwrap();
+            known.tell(1, 5, interval, &budget);
+        });
+        assert_eq!(*heard.lock().unwrap(), [(4, None), (9, Some(2.0))]);
+    }
 }
