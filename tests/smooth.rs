@@ -92,6 +92,35 @@ fn a_dilated_circle_has_a_handle_below_its_radius() {
     assert!(claimed > 20, "{claimed}");
 }
 
+/// Beside the radius where the handle goes, too, segments tell it that are few: where those that are fewest do not, finer ones do, with as much of the tolerance left for triangles.
+#[test]
+fn few_segments_tell_the_handle_of_a_dilated_circle() {
+    for share in [0.9, 0.99, 1.01, 1.1] {
+        let (r, e) = (share, 0.1 * share);
+        let few = made(&circle(1.0), r, e);
+        assert_bounds(&few, r, |x| (x.truncate().length() - 1.0).hypot(x.z));
+        assert_eq!((topology(&few), few.topology_exact, few.pitch_mm), ((1, i64::from(r < 1.0), 0), true, None), "{r}");
+        let many = dilate_unsimplified(&circle(1.0), Radius::new(r).unwrap(), Tolerance::new(e).unwrap(), &Budget::default()).unwrap();
+        let [few, many] = [few, many].map(|made| made.solid.mesh().triangles.len());
+        assert!(10 * few <= many, "{r}: {few} of {many}");
+    }
+}
+
+/// A cylinder whose bore is a little wider than the ball, so that all of its sites are near to each other there: what that would take to tell is left in doubt, but for the bounds.
+#[test]
+fn crowded_sites_are_left_in_doubt() {
+    let all = arcs(0.0, 1.002);
+    let row = |z: f64| -> Vec<[f64; 3]> { all.iter().map(|[x, y, w]| [x / w, y / w, z]).collect() };
+    let weights: Vec<f64> = all.iter().map(|point| point[2]).collect();
+    let shape = lowered(&json!({
+        "family": "nurbs_surface", "degree": [1, 2], "knots": [[0.0, 0.0, 1.0, 1.0], KNOTS],
+        "control_points": [row(0.0), row(5.0)], "weights": [weights, weights],
+    }));
+    let made = made(&shape, 1.0, 0.1);
+    assert_bounds(&made, 1.0, |x| (x.truncate().length() - 1.002).hypot((-x.z).max(x.z - 5.0).max(0.0)));
+    assert!(!made.topology_exact || topology(&made) == (1, 1, 0));
+}
+
 /// The dilation of a torus with the radii a < R has a void if r < a, and the hole of the torus if r < R - a.
 #[test]
 fn a_dilated_torus_has_its_void_and_its_hole_as_long_as_there_is_room() {

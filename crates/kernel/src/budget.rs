@@ -133,8 +133,6 @@ pub const PHASES: [&str; 12] =
 pub struct Reached {
     /// One more than the bound's digits in binary, 0 for none: those of numbers that are not negative are in their order.
     bits: Arc<AtomicU64>,
-    /// How far what is made is from what the computation is asked for, in mm, by what was done before.
-    beyond_mm: f64,
     /// Whether what is made is no part of the result.
     is_aside: bool,
 }
@@ -145,7 +143,7 @@ impl Reached {
     }
 
     fn set(&self, bound_mm: f64) {
-        let known = Some(bound_mm + self.beyond_mm).filter(|bound| bound.is_finite() && *bound >= 0.0);
+        let known = Some(bound_mm).filter(|bound| bound.is_finite() && *bound >= 0.0);
         self.bits.store(known.map_or(0, |bound| (bound + 0.0).to_bits() + 1), Ordering::Relaxed);
     }
 }
@@ -182,13 +180,7 @@ impl Budget {
         }
     }
 
-    /// The same for a stage whose result is off by so much more, in mm, than the stage can know.
-    #[must_use]
-    pub fn beyond(&self, beyond_mm: f64) -> Self {
-        Self { reached: Reached { beyond_mm: self.reached.beyond_mm + beyond_mm, ..self.reached.clone() }, ..self.clone() }
-    }
-
-    /// The same for work whose bounds are not those of the result: it tells of its progress beside the bound that is known without it.
+    /// The same budget for work whose bounds are not those of the result: it tells of its progress beside the bound that is known without it.
     #[must_use]
     pub fn aside(&self) -> Self {
         Self { reached: Reached { is_aside: true, ..self.reached.clone() }, ..self.clone() }
@@ -215,11 +207,11 @@ mod tests {
         tell(&budget);
         budget.prove(0.0);
         tell(&budget);
-        budget.beyond(0.25).beyond(0.25).prove(0.5);
+        budget.prove(1.0);
         tell(&budget);
         budget.aside().prove(7.0);
         tell(&budget.aside());
-        budget.beyond(1.0).aside().beyond(1.0).prove(7.0);
+        budget.aside().aside().prove(7.0);
         tell(&budget);
         budget.prove(f64::INFINITY);
         tell(&budget);

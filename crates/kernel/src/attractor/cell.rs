@@ -303,6 +303,15 @@ impl Attractor {
         Cell { state: root.state, root: u32::try_from(index).expect("fewer than 2^32 roots"), ball, stretch }
     }
 
+    /// The cells of a cell's transitions, in their order, with their control points.
+    pub(crate) fn children(&self, cell: &Cell, points: &[ControlPoint]) -> impl DoubleEndedIterator<Item = (Cell, Vec<ControlPoint>)> {
+        self.state_of(cell).transitions.iter().enumerate().map(|(index, transition)| {
+            let mut child = vec![[0.0; 4]; transition.operator.columns()];
+            child_points(points, &transition.operator, &mut child);
+            (self.child_cell(cell, index, &child), child)
+        })
+    }
+
     /// The child of `cell` through transition `index`, whose control points are `points`.
     #[inline]
     pub(crate) fn child_cell(&self, cell: &Cell, index: usize, points: &[ControlPoint]) -> Cell {

@@ -1,6 +1,6 @@
 //! What stands for cells in a dilation: for every state the kind of site that allows the largest cells.
 
-use super::cell::{Cell, ControlPoint, Point, Site, child_points, dot, frame_columns, subtract, times};
+use super::cell::{Cell, ControlPoint, Point, Site, dot, frame_columns, subtract, times};
 use super::{Attractor, OwnRadius};
 use crate::automaton::{Automaton, LeafPrimitive, StateId};
 
@@ -51,6 +51,8 @@ pub(crate) struct SiteRule<'a> {
     attractor: &'a Attractor,
     radius: f64,
     tolerance: f64,
+    /// The share that sites use of what they may be off.
+    coarseness: f64,
     choices: Vec<Choice>,
     /// States that roots reach.
     used: Vec<usize>,
@@ -63,10 +65,15 @@ pub(crate) struct SiteRule<'a> {
 const SITE_SHARE: f64 = 0.3;
 /// The share of e by which sites may be off the attractor: the lattice's own error is inner only.
 const OUTER_SHARE: f64 = 0.5;
+/// The share of both that segments along smooth curves use: there are 1.7 times as many, as their errors are squares of their lengths, and what is left saves a tenth to two thirds of the triangles. Curves that have more than twice as many are rough.
+const ALONG_CURVES: f64 = 0.35;
+const MORE_ALONG_CURVES: f64 = 2.0;
+/// Of more segments it is not asked.
+const MANY: usize = 10_000;
 
 impl<'a> SiteRule<'a> {
-    /// The rule for a dilation by `radius`, the largest of the roots' own, to `tolerance`, both in mm.
-    pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64) -> Self {
+    /// The rule for a dilation by `radius`, the largest of the roots' own, to `tolerance`, both in mm. Sites use a share of what they may be off, `coarseness`: 1 for as few as possible.
+    pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64, coarseness: f64) -> Self {
         let mut starts: Vec<usize> = attractor.roots().iter().map(|root| root.state.index()).collect();
         starts.sort_unstable();
         starts.dedup();
@@ -78,14 +85,49 @@ impl<'a> SiteRule<'a> {
             _ => 0.0,
         };
         let deficits = if attractor.has_own_radii() { (0..attractor.roots().len()).map(deficit).collect() } else { Vec::new() };
-        let mut rule = Self { attractor, radius, tolerance, choices: Vec::new(), used, deficits };
+        let mut rule = Self { attractor, radius, tolerance, coarseness, choices: Vec::new(), used, deficits };
         choose(&mut rule);
+        if rule.is_along_curves()
+            && let Some(leaves) = rule.leaves(MANY)
+        {
+            let finer = Self { coarseness: ALONG_CURVES * coarseness, ..rule.clone() };
+            if finer.leaves((MORE_ALONG_CURVES * leaves as f64) as usize).is_some() {
+                return finer;
+            }
+        }
         rule
+    }
+
+    /// Whether segments, or points, stand for curves.
+    fn is_along_curves(&self) -> bool {
+        let states = self.attractor.automaton().states();
+        let is_of_curve = |&state: &usize| matches!(states[state].leaf, LeafPrimitive::Simplex | LeafPrimitive::Chord(_));
+        !self.is_exact() && !self.is_dense() && self.used.iter().all(is_of_curve)
+    }
+
+    /// How many leaves there are, if no more than `most`.
+    fn leaves(&self, most: usize) -> Option<usize> {
+        let attractor = self.attractor;
+        let mut leaves = 0;
+        let mut open: Vec<(Cell, Vec<ControlPoint>)> =
+            attractor.roots().iter().enumerate().map(|(index, root)| (attractor.root_cell(index), root.points.clone())).collect();
+        while let Some((cell, points)) = open.pop() {
+            let transitions = &attractor.state_of(&cell).transitions;
+            if transitions.is_empty() || self.leaf(&cell, &points).is_some() {
+                leaves += 1;
+            } else {
+                open.extend(attractor.children(&cell, &points));
+            }
+            if leaves + open.len() > most {
+                return None;
+            }
+        }
+        Some(leaves)
     }
 
     /// The share of r^2 - (r - e)^2 that is the lattice's: all of it where sites are cells themselves, without error.
     pub(crate) fn lattice_share(&self) -> f64 {
-        if self.is_exact() { 1.0 } else { 1.0 - SITE_SHARE }
+        if self.is_exact() { 1.0 } else { 1.0 - self.coarseness * SITE_SHARE }
     }
 
     /// Whether roots have different radii.
@@ -102,7 +144,7 @@ impl<'a> SiteRule<'a> {
     }
 
     /// Whether sites are the attractor itself.
-    fn is_exact(&self) -> bool {
+    pub(crate) fn is_exact(&self) -> bool {
         self.used.iter().all(|&index| self.is_simplex(index))
     }
 
@@ -123,7 +165,11 @@ impl<'a> SiteRule<'a> {
     /// How far sites may be from the attractor.
     pub(crate) fn outer_reserve(&self) -> f64 {
         let exact = |&index: &usize| self.choices[index] == Choice::Cover || self.is_simplex(index);
-        if self.used.iter().all(exact) { 0.0 } else { OUTER_SHARE * self.tolerance }
+        if self.used.iter().all(exact) { 0.0 } else { self.most_outer() }
+    }
+
+    fn most_outer(&self) -> f64 {
+        self.coarseness * OUTER_SHARE * self.tolerance
     }
 
     fn is_simplex(&self, state: usize) -> bool {
@@ -145,11 +191,11 @@ impl<'a> SiteRule<'a> {
             }
         };
         let least = self.radius - self.tolerance;
-        let allowed = least * least + SITE_SHARE * (self.radius * self.radius - least * least);
+        let allowed = least * least + self.coarseness * SITE_SHARE * (self.radius * self.radius - least * least);
         let deficit = self.deficit(cell.root);
         if deficit == 0.0 {
             let square = (least + error.inner).powi(2) + error.inner_square;
-            return (square <= allowed && error.outer <= OUTER_SHARE * self.tolerance).then_some(SiteError { square, ..error });
+            return (square <= allowed && error.outer <= self.most_outer()).then_some(SiteError { square, ..error });
         }
         // The same in space, for the root's own radius: x within `outer` of the sites and o farther from the cell has
         // (d + o)^2 + deficit <= outer^2 + 2 d o + o^2, d^2 = outer^2 - deficit, which is (outer + o')^2 at most.
@@ -157,7 +203,7 @@ impl<'a> SiteRule<'a> {
         let square = (in_space(least) + error.inner).powi(2) + error.inner_square + deficit;
         let farthest = in_space(self.radius + self.tolerance);
         let outer = (2.0 * farthest * error.outer + error.outer * error.outer) / (2.0 * self.radius);
-        (square <= allowed && outer <= OUTER_SHARE * self.tolerance).then_some(SiteError { square, outer, ..error })
+        (square <= allowed && outer <= self.most_outer()).then_some(SiteError { square, outer, ..error })
     }
 
     /// The largest of the roots' own radii, as far as points stand for their cells.
@@ -261,15 +307,7 @@ fn expected_sites(rule: &SiteRule<'_>, root: usize) -> f64 {
             if transitions.is_empty() || depth == LONGEST_PATH {
                 return f64::INFINITY;
             }
-            let children: Vec<(Cell, Vec<ControlPoint>)> = transitions
-                .iter()
-                .enumerate()
-                .map(|(index, transition)| {
-                    let mut child = vec![[0.0; 4]; transition.operator.columns()];
-                    child_points(&points, &transition.operator, &mut child);
-                    (attractor.child_cell(&cell, index, &child), child)
-                })
-                .collect();
+            let children: Vec<(Cell, Vec<ControlPoint>)> = attractor.children(&cell, &points).collect();
             let shares: Vec<f64> =
                 children.iter().map(|(child, _)| child.ball.radius.max(0.01 * cell.ball.radius).powf(LIKELY_DIMENSION)).collect();
             let total: f64 = shares.iter().sum();

@@ -622,7 +622,7 @@ mod tests {
     fn with_tree(told: impl FnOnce(&mut Tree<'_>, Vec<NodeId>, &[SiteId])) {
         let (attractor, budget) = (takagi(), Budget::default());
         let balls = Balls { least: Radius::new(RADIUS).unwrap().mm(), most: RADIUS };
-        let plan = Plan::new(&attractor, balls, Tolerance::new(TOLERANCE).unwrap(), true, &budget).unwrap();
+        let plan = Plan::new(&attractor, balls, Tolerance::new(TOLERANCE).unwrap(), true, 1.0, &budget).unwrap();
         let setting = plan.setting(plan.pitch(), &budget);
         let space = plan.space(&setting);
         let mut tree = Tree::of(plan.rule(), &setting);

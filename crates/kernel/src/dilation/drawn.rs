@@ -1,10 +1,10 @@
 //! Shapes that stand for others: triangles for trimmed and for smooth surfaces, and roots with one radius each.
 
-use super::plan::{Balls, Plan};
-use super::{Dilation, DilationError, Prediction};
+use super::DilationError;
+use super::plan::{Balls, Meant, Plan};
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Limits};
-use crate::measure::bounds::{AxisBox, bounding_box, dilated_box};
+use crate::measure::bounds::{bounding_box, dilated_box};
 use crate::tolerance::{Radius, Tolerance};
 use std::borrow::Cow;
 
@@ -28,21 +28,19 @@ const BYTES_PER_CELL: u64 = 4_000;
 pub(super) struct Drawn {
     pub(super) attractor: Attractor,
     balls: Balls,
-    /// Its dilation's distance from the one asked for, at most.
-    pub(super) deviation_mm: f64,
-    /// How far places of either are from the other one at most; infinite where radii differ, too.
-    off: f64,
+    pub(super) meant: Meant,
     /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
     /// in D(r + d), so that d adds to both bounds.
     rest: Tolerance,
 }
 
 impl Drawn {
-    /// Draws trimmed surfaces to their share of the tolerance, and splits roots whose radius varies; `None` when there are none.
+    /// Draws trimmed surfaces to their share of the tolerance, times `coarseness`, and splits roots whose radius varies; `None` when there are none.
     pub(super) fn resolved(
         attractor: &Attractor,
         radius: Radius,
         tolerance: Tolerance,
+        coarseness: f64,
         budget: &Budget,
     ) -> Result<Option<Self>, DilationError> {
         let is_trimmed = !attractor.trimmed().is_empty();
@@ -54,8 +52,8 @@ impl Drawn {
         let balls = Balls { least, most };
         let aimed = tolerance.mm().min(0.5 * balls.least);
         let (changed, mut deviation_mm) = if is_trimmed {
-            let share = length(TRIM_SHARE * aimed);
-            let (resolved, deviation_mm) = attractor.resolved(share, budget).map_err(|error| refused(error, TRIM_SHARE))?;
+            let share = coarseness * TRIM_SHARE;
+            let (resolved, deviation_mm) = attractor.resolved(length(share * aimed), budget).map_err(|error| refused(error, share))?;
             (Cow::Owned(resolved), deviation_mm)
         } else {
             (Cow::Borrowed(attractor), 0.0)
@@ -67,10 +65,11 @@ impl Drawn {
             let most = graded.radii.iter().copied().fold(0.0, f64::max);
             let (balls, rest) = (Balls { least, most }, length(aimed - deviation_mm));
             let off = if deviation_mm > 0.0 { f64::INFINITY } else { 0.0 };
-            return Ok(Some(Self { attractor: graded.attractor, balls, deviation_mm, off, rest }));
+            let bounds = dilated_box(&graded.attractor, budget)?.widened(deviation_mm);
+            return Ok(Some(Self { attractor: graded.attractor, balls, meant: Meant { off, deviation_mm, bounds }, rest }));
         }
-        let rest = length(aimed - deviation_mm);
-        Ok(Some(Self { attractor: changed.into_owned(), balls, deviation_mm, off: deviation_mm, rest }))
+        let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounding_box(attractor, budget)?.grown(radius.mm()) };
+        Ok(Some(Self { attractor: changed.into_owned(), balls, meant, rest: length(aimed - deviation_mm) }))
     }
 
     /// Draws a surface with a B-rep to its share of the tolerance; `None` where it is no such surface, or has more cells than one that is smooth for balls of this radius: another way may do with fewer.
@@ -93,36 +92,14 @@ impl Drawn {
         let drawn = attractor.drawn(share, &Budget { limits, ..budget.clone() }).map_err(|error| refused(error, SMOOTH_SHARE));
         let Some((attractor, deviation_mm)) = unless_stopped(drawn)? else { return Ok(None) };
         let Ok(rest) = Tolerance::new(aimed - deviation_mm) else { return Ok(None) };
-        Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, deviation_mm, off: deviation_mm, rest }))
+        let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius) };
+        Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest }))
     }
 
-    /// The plan of its dilation, which stands for that of the other one; and the budget of what is done for it.
-    pub(super) fn plan(&self, simplify: bool, budget: &Budget) -> Result<(Plan<'_>, Budget), DilationError> {
-        let plan = Plan::new(&self.attractor, self.balls, self.rest, simplify, budget)?;
-        Ok((plan.standing_for_another(self.off), budget.beyond(self.deviation_mm)))
-    }
-
-    /// The dilation of this attractor as that of the other one.
-    pub(super) fn of_another(
-        &self,
-        dilation: Dilation,
-        other: &Attractor,
-        radius: Radius,
-        budget: &Budget,
-    ) -> Result<Dilation, DilationError> {
-        let bounds: AxisBox = if other.has_own_radii() {
-            dilated_box(&self.attractor, budget)?.widened(self.deviation_mm)
-        } else {
-            bounding_box(other, budget)?.grown(radius.mm())
-        };
-        let (inner_mm, outer_mm) = (dilation.inner_mm + self.deviation_mm, dilation.outer_mm + self.deviation_mm);
-        Ok(Dilation { inner_mm, outer_mm, bounds, ..dilation })
-    }
-
-    /// The same of a prediction.
-    pub(super) fn predicted_of_another(&self, prediction: Prediction) -> Prediction {
-        let least_thickness_mm = (prediction.least_thickness_mm - 2.0 * self.deviation_mm).max(0.0);
-        Prediction { least_thickness_mm, ..prediction }
+    /// The plan of its dilation, as that of the other one.
+    pub(super) fn plan(&self, simplify: bool, coarseness: f64, budget: &Budget) -> Result<Plan<'_>, DilationError> {
+        let plan = Plan::new(&self.attractor, self.balls, self.rest, simplify, coarseness, budget)?;
+        Ok(plan.standing_for(self.meant))
     }
 }
 

@@ -53,7 +53,7 @@ mod tree;
 mod wall;
 
 use crate::attractor::Attractor;
-use crate::budget::Budget;
+use crate::budget::{Budget, Limits};
 use crate::measure::bounds::AxisBox;
 use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
@@ -115,18 +115,65 @@ pub fn dilate_unsimplified(
     run(attractor, radius, tolerance, budget, false)
 }
 
+/// The share of what they may be off that sites, and triangles of trimmed surfaces, use: for as few of them as possible, and for some times as many, which may tell the topology where the first do not.
+const COARSE: f64 = 1.0;
+const FINER: [f64; 2] = [0.35, 0.125];
+
+/// Cells that finer sites are made of at most, for each of the first: along curves and surfaces that are smooth they are three to eight times as many.
+const MORE_CELLS: u64 = 10;
+
 fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
-    if simplify && let Some(smooth) = Drawn::smooth(attractor, radius, tolerance, budget)? {
-        let made = smooth.plan(simplify, budget).and_then(|(plan, budget)| plan.run_in_sheets(&budget));
-        if let Some(dilation) = unless_stopped(made)? {
-            return smooth.of_another(dilation, attractor, radius, budget);
+    let order = Order { attractor, radius, tolerance, simplify };
+    if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
+        return Ok(dilation);
+    }
+    let finer = |cells: u64| {
+        let limits = Limits { cells: budget.limits.cells.min(MORE_CELLS * cells), ..budget.limits };
+        let aside = Budget { limits, ..budget.aside() };
+        for coarseness in FINER {
+            let made = unless_stopped(order.planned(coarseness, &aside, |plan| plan.run_if_told(&aside)))?;
+            if made.is_some() {
+                return Ok(made);
+            }
+        }
+        Ok(None)
+    };
+    order.planned(COARSE, budget, |plan| plan.run(finer, budget))
+}
+
+/// What is asked for.
+struct Order<'a> {
+    attractor: &'a Attractor,
+    radius: Radius,
+    tolerance: Tolerance,
+    simplify: bool,
+}
+
+impl Order<'_> {
+    /// What comes of the plan for a smooth surface; none where it is none, or where sheets do not serve it.
+    fn in_sheets<T>(
+        &self,
+        budget: &Budget,
+        work: impl FnOnce(&Plan<'_>) -> Result<Option<T>, DilationError>,
+    ) -> Result<Option<T>, DilationError> {
+        let smooth = if self.simplify { Drawn::smooth(self.attractor, self.radius, self.tolerance, budget)? } else { None };
+        let Some(smooth) = smooth else { return Ok(None) };
+        unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
+    }
+
+    /// What comes of the plan with sites of some coarseness.
+    fn planned<T>(
+        &self,
+        coarseness: f64,
+        budget: &Budget,
+        work: impl FnOnce(&Plan<'_>) -> Result<T, DilationError>,
+    ) -> Result<T, DilationError> {
+        let Self { attractor, radius, tolerance, simplify } = *self;
+        match Drawn::resolved(attractor, radius, tolerance, coarseness, budget)? {
+            Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
+            None => work(&Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)?),
         }
     }
-    let Some(drawn) = Drawn::resolved(attractor, radius, tolerance, budget)? else {
-        return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.run(budget);
-    };
-    let (plan, beyond) = drawn.plan(simplify, budget)?;
-    drawn.of_another(plan.run(&beyond)?, attractor, radius, budget)
 }
 
 /// What a dilation is predicted to cost.
@@ -165,15 +212,9 @@ pub fn predict(
     simplify: bool,
     budget: &Budget,
 ) -> Result<Prediction, DilationError> {
-    if simplify && let Some(smooth) = Drawn::smooth(attractor, radius, tolerance, budget)? {
-        let predicted = smooth.plan(simplify, budget).and_then(|(plan, budget)| plan.predict_in_sheets(&budget));
-        if let Some(prediction) = unless_stopped(predicted)? {
-            return Ok(smooth.predicted_of_another(prediction));
-        }
+    let order = Order { attractor, radius, tolerance, simplify };
+    match order.in_sheets(budget, |plan| plan.predict_in_sheets(budget))? {
+        Some(prediction) => Ok(prediction),
+        None => order.planned(COARSE, budget, |plan| plan.predict(budget)),
     }
-    let Some(drawn) = Drawn::resolved(attractor, radius, tolerance, budget)? else {
-        return Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, budget)?.predict(budget);
-    };
-    let (plan, _) = drawn.plan(simplify, budget)?;
-    Ok(drawn.predicted_of_another(plan.predict(budget)?))
 }

@@ -106,6 +106,8 @@ const NECK: f64 = 0.36;
 const LEAST_ROUNDINGS: f64 = 64.0;
 /// Cubes that are refined to settle the topology, besides an eighth of the triangles: where more would be, it stays open.
 const MOST_REFINED: usize = 2_000;
+/// Leaf cells of a shape of which some times as many are looked at to tell its topology.
+const FEW_LEAVES: u64 = 2_000;
 /// Bytes of a cell with its control points, nodes and sites.
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
@@ -287,9 +289,19 @@ pub(super) struct Plan<'a> {
     extra: f64,
     bounds: AxisBox,
     rule: SiteRule<'a>,
-    /// How far the attractor is from the one that it stands for, at most.
-    off: f64,
+    meant: Meant,
     clean_only: bool,
+}
+
+/// What a plan's attractor stands for: itself, or another one that it is nearly.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meant {
+    /// No place of either is farther from the other one than this. Infinite where no length tells.
+    pub(super) off: f64,
+    /// Bounds are that much wider.
+    pub(super) deviation_mm: f64,
+    /// The box of its exact dilation.
+    pub(super) bounds: AxisBox,
 }
 
 impl<'a> Plan<'a> {
@@ -298,6 +310,7 @@ impl<'a> Plan<'a> {
         balls: Balls,
         tolerance: Tolerance,
         simplify: bool,
+        coarseness: f64,
         budget: &Budget,
     ) -> Result<Self, DilationError> {
         let bounds = bounding_box(attractor, budget)?;
@@ -309,7 +322,7 @@ impl<'a> Plan<'a> {
         check_depth(attractor, aimed, tolerance, budget)?;
         // The unit of values is below 8 r^2 / MOST, and noise of 32 units moves a surface at sqrt(theta - R^2) > r / 2 by less than r / 2^16.
         let extra = carried(extent(&bounds, 3.0 * radius)) + radius * (0.5_f64).powi(16) + 1e-12 * extent(&bounds, radius);
-        let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0));
+        let rule = SiteRule::new(attractor, radius, (aimed - extra).max(0.0), coarseness);
         // The inner bound rounds down: see `Setting::least`.
         let pitch = Self::pitch_for(&rule, radius, aimed - extra - 4e-12 * radius);
         let least = least(radius, pitch);
@@ -321,12 +334,13 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, off: 0.0, clean_only: !simplify })
+        let meant = Meant { off: 0.0, deviation_mm: 0.0, bounds: bounds.grown(radius) };
+        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, meant, clean_only: !simplify })
     }
 
-    /// The same for an attractor that stands for another one, no place of either farther from the other one than `off`: bounds remain those of the one that is given, but the topology that is told of is the other one's. Infinite where no length tells.
-    pub(super) fn standing_for_another(self, off: f64) -> Self {
-        Self { off, ..self }
+    /// The same for an attractor that stands for another one, within what is left of the tolerance.
+    pub(super) fn standing_for(self, meant: Meant) -> Self {
+        Self { meant, ..self }
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -355,7 +369,7 @@ impl<'a> Plan<'a> {
         let thinnest = self.balls.least - self.balls.inner(self.radius - least);
         let taken = self.balls.outer(self.extra) + self.balls.outer(self.rule.outer_reserve());
         let close_in_space = setting.close.max(self.aimed - taken);
-        let setting = Setting { least, thinnest, close_in_space, off: self.off, ..setting };
+        let setting = Setting { least, thinnest, close_in_space, off: self.meant.off, ..setting };
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
@@ -427,17 +441,44 @@ impl<'a> Plan<'a> {
 
     /// 2 (r - e): bounds are of at most this length.
     fn least_thickness(&self) -> f64 {
-        2.0 * (self.balls.least - self.aimed)
+        2.0 * (self.balls.least - self.aimed - self.meant.deviation_mm).max(0.0)
     }
 
-    /// The dilation.
-    pub(super) fn run(&self, budget: &Budget) -> Result<Dilation, DilationError> {
+    /// The dilation. Where sites that stand for a few leaf cells leave the topology in doubt, it is what `finer` ones make of it, given the number of those cells, if they tell it.
+    pub(super) fn run(
+        &self,
+        finer: impl FnOnce(u64) -> Result<Option<Dilation>, DilationError>,
+        budget: &Budget,
+    ) -> Result<Dilation, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
-        match self.arranged(&setting, &space, budget)? {
-            Some(dilation) => Ok(dilation),
-            None => self.on_lattice(&setting, &space, budget),
+        let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
+        let leaves = arrangement.as_ref().map(Arrangement::leaves).filter(|&leaves| leaves <= FEW_LEAVES);
+        let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
+        let stands_for_another = self.meant.off.is_finite() && (self.meant.off > 0.0 || !self.rule.is_exact());
+        if let Some(leaves) = leaves
+            && stands_for_another
+            && !made.as_ref().is_some_and(|made| made.topology_exact)
+            && let Some(finer) = finer(leaves)?
+        {
+            return Ok(finer);
         }
+        made.map_or_else(|| self.on_lattice(&setting, &space, budget), Ok)
+    }
+
+    /// The dilation without a lattice, where its topology is told.
+    pub(super) fn run_if_told(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let space = self.space(&setting);
+        let mut arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
+        // Asked first: all else takes longer.
+        if let Some(arrangement) = &mut arrangement
+            && !arrangement.is_of_another(&self.rule.attractor().surfaces(), budget)?
+        {
+            return Ok(None);
+        }
+        let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
+        Ok(made.filter(|made| made.topology_exact))
     }
 
     /// The dilation of a surface that turns little, by a sheet on each side; none where that does not come out.
@@ -480,7 +521,7 @@ impl<'a> Plan<'a> {
         self.prove(setting, site_error, triangles, budget);
         let surface = self.assemble(setting, space, &grading, blocks, budget)?;
         let mended = self.mended(setting, space, surface, uncertain as u64, budget)?;
-        let is_shape = self.off == 0.0 && site_error.is_zero();
+        let is_shape = self.meant.off == 0.0 && site_error.is_zero();
         let may_be_exact = !setting.dense && mended.uncertain == 0 && mended.crossings == 0;
         let is_exact = may_be_exact && (is_shape || arrangement::is_of_sites(setting, &self.rule, &space.candidates, budget)?);
         self.certify(setting, mended, is_exact, Some(setting.lattice.pitch), budget)
@@ -503,6 +544,7 @@ impl<'a> Plan<'a> {
     }
 
     /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, or by what needs none, where that serves better than a lattice.
+    #[cfg(test)]
     pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let arrangement = Arrangement::new(setting, &self.rule, &space.candidates, budget)?;
         self.of_arrangement(arrangement, setting, space, budget)
@@ -665,7 +707,9 @@ impl<'a> Plan<'a> {
             inner = inner.min(self.tolerance);
         }
         // What is close to a site in space reaches as far as is aimed at.
-        [self.balls.inner(inner), self.balls.outer(outer).max(if setting.dense { self.aimed } else { 0.0 })]
+        let bounds = [self.balls.inner(inner), self.balls.outer(outer).max(if setting.dense { self.aimed } else { 0.0 })];
+        // Dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r) in D(r + d).
+        bounds.map(|bound| bound + self.meant.deviation_mm)
     }
 
     /// Tells what is proven of a surface before it is simplified, which keeps it between the same ends of the band.
@@ -685,8 +729,7 @@ impl<'a> Plan<'a> {
         budget: &Budget,
     ) -> Result<Dilation, DilationError> {
         let Mended { surface, uncertain, crossings } = mended;
-        let site = surface.site_error;
-        let [inner_mm, outer_mm] = self.proven(setting, site);
+        let [inner_mm, outer_mm] = self.proven(setting, surface.site_error);
         let leaf_cells = surface.leaves;
         let mesh = TriMesh { vertices: surface.vertices.into_iter().map(DVec3::from_array).collect(), triangles: surface.triangles };
         // Signs from pseudo-normals are right for embedded surfaces only; elsewhere they tear the result.
@@ -705,7 +748,7 @@ impl<'a> Plan<'a> {
             least_radius_mm: self.balls.least,
             pitch_mm,
             leaf_cells,
-            bounds: self.bounds.grown(self.radius),
+            bounds: self.meant.bounds,
             uncertain,
             topology_exact: is_exact && !setting.dense && uncertain == 0 && crossings == 0,
         })
@@ -769,7 +812,7 @@ mod tests {
     fn dusted(at: Point, size: f64, is_proven: bool, order: [usize; 3]) -> (BlockSurface, usize) {
         let (attractor, budget) = (rods(), Budget::default());
         let balls = Balls { least: Radius::new(1.4).unwrap().mm(), most: 1.4 };
-        let plan = Plan::new(&attractor, balls, Tolerance::new(0.14).unwrap(), true, &budget).unwrap();
+        let plan = Plan::new(&attractor, balls, Tolerance::new(0.14).unwrap(), true, 1.0, &budget).unwrap();
         let setting = plan.setting(plan.pitch, &budget);
         let tetrahedron = |first: Point, size: f64| -> [Point; 4] {
             let corner = |axis: usize| std::array::from_fn(|other| first[other] + if other == axis { size } else { 0.0 });
@@ -811,7 +854,8 @@ mod tests {
             .unwrap()
             .attractor;
         let (radius, budget) = (Radius::new(4.823).unwrap().mm(), Budget::default());
-        let plan = Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.4823).unwrap(), true, &budget).unwrap();
+        let plan =
+            Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.4823).unwrap(), true, 1.0, &budget).unwrap();
         let setting = plan.setting(plan.pitch, &budget);
         let made = plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap();
         assert_eq!((made.crossings, made.uncertain, made.solid.topology().components), (0, 0, 3));
@@ -829,7 +873,8 @@ mod tests {
             });
             let attractor = Model { name: None, shape }.lower().unwrap().attractor;
             let (radius, budget) = (Radius::new(1.0).unwrap().mm(), Budget::default());
-            let plan = Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.1).unwrap(), true, &budget).unwrap();
+            let plan =
+                Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.1).unwrap(), true, 1.0, &budget).unwrap();
             let setting = plan.setting(plan.pitch, &budget);
             let made = plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap();
             (made.uncertain > 0, made.topology_exact, made.solid.topology().components)
@@ -850,7 +895,7 @@ mod tests {
         let shape = Shape::Mesh(PolygonMesh { vertices, faces: vec![vec![0, 1], vec![2, 3]], interior: Interior::Surface });
         let attractor = Model { name: None, shape }.lower().unwrap().attractor;
         let budget = Budget::default();
-        let plan = Plan::new(&attractor, Balls { least: 1.0, most: 1.0 }, Tolerance::new(0.1).unwrap(), true, &budget).unwrap();
+        let plan = Plan::new(&attractor, Balls { least: 1.0, most: 1.0 }, Tolerance::new(0.1).unwrap(), true, 1.0, &budget).unwrap();
         let setting = plan.setting(plan.pitch, &budget);
         let space = plan.space(&setting);
         let mut arrangement = Arrangement::new(&setting, &plan.rule, &space.candidates, &budget).unwrap().unwrap();

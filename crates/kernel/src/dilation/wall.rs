@@ -177,7 +177,7 @@ fn largest_ball(surface: &Attractor, inside: &Inside<'_>, budget: &Budget) -> Re
     let bounds = bounding_box(surface, budget)?;
     let middle: [f64; 3] = std::array::from_fn(|axis| 0.5 * (bounds.low[axis].low + bounds.high[axis].high));
     let half = (0..3).map(|axis| bounds.high[axis].high - middle[axis]).fold(0.0, f64::max);
-    let rule = SiteRule::new(surface, half.max(f64::MIN_POSITIVE), half.max(f64::MIN_POSITIVE));
+    let rule = SiteRule::new(surface, half.max(f64::MIN_POSITIVE), half.max(f64::MIN_POSITIVE), 1.0);
     let mut candidates = Candidates::default();
     for (index, root) in surface.roots().iter().enumerate() {
         candidates.push(surface.root_cell(index), &root.points, true);

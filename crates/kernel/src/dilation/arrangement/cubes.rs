@@ -180,7 +180,7 @@ pub(super) struct Found {
     pub(super) open: Vec<Listed>,
     /// The sets in doubt, as the polytopes are, and whether their dilations have a common point.
     pub(super) doubts: Vec<(Set, Common)>,
-    /// Sets that were asked for.
+    /// Sets that were asked for, or as many as could have been while it was asked whether they are hidden.
     pub(super) asked: usize,
     /// Whether there was too much to look at, and this is not all.
     pub(super) is_cut_short: bool,
@@ -343,7 +343,9 @@ impl<'a> Search<'a> {
             return None;
         }
         let set: Vec<u32> = places.iter().map(|&place| list[place]).collect();
-        if self.bodies.is_hidden(&set, common, cube, list) {
+        let is_hidden = self.bodies.is_hidden(&set, common, cube, list, &mut self.found.asked);
+        self.found.is_cut_short |= self.found.asked > ASKED_OF_A_PART;
+        if is_hidden {
             return Some(false);
         }
         if may_be_settled {

@@ -12,6 +12,8 @@ use glam::DVec3;
 const MOST_BOXES: usize = 4_000;
 const HALVINGS: usize = 12;
 const HALVINGS_IN_SOLIDS: usize = 40;
+/// Bodies that are looked at in a box while a set is asked for, about.
+const BODIES_PER_SET: usize = 8;
 /// Of directions, as a share: their ends are places of the model less others, as far as the radius or more, or unit vectors.
 const ROUNDING: f64 = 1e-9;
 /// Boxes no wider than this, in units of the radius, are not halved for the face of a solid across them.
@@ -19,19 +21,21 @@ const NARROW: f64 = 0.25;
 
 impl Bodies<'_> {
     /// Whether the places in a cube that the dilations of a set have in common, unless they have none, and those that its polytopes have, are all in the interior of others, of their dilation and their polytope, or of solids. What reaches the cube is
-    /// `around`.
-    pub(super) fn is_hidden(&self, set: &[u32], common_points: Common, cube: &Cube, around: &[u32]) -> bool {
+    /// `around`. Adds to `asked` how many sets could have been asked for meanwhile.
+    pub(super) fn is_hidden(&self, set: &[u32], common_points: Common, cube: &Cube, around: &[u32], asked: &mut usize) -> bool {
         let Setting { reach, slack, .. } = *self.setting;
         let corners: Vec<Point> = cube.corners().collect();
-        let mut boxes = Boxes { set, cube, axes: self.axes(set[0]), kind: Kind::Dilation, left: MOST_BOXES };
+        let mut boxes = Boxes { set, cube, axes: self.axes(set[0]), kind: Kind::Dilation, left: MOST_BOXES, looked: 0 };
         let halvings = if self.solids.is_empty() { HALVINGS } else { HALVINGS_IN_SOLIDS };
-        [Kind::Dilation, Kind::Polytope].into_iter().all(|kind| {
+        let is_hidden = [Kind::Dilation, Kind::Polytope].into_iter().all(|kind| {
             boxes.kind = kind;
             let of_polytope = |body: u32| (&*self.polytopes.of(body).corners, slack);
             let part = |&body: &u32| if matches!(kind, Kind::Polytope) { of_polytope(body) } else { self.around(body, reach + slack) };
             let common = common_box(&boxes.axes, set.iter().map(part).chain([(&*corners, slack)]));
             (matches!(kind, Kind::Dilation) && common_points == Common::None) || self.are_hidden(&mut boxes, common, around, halvings)
-        })
+        });
+        *asked += boxes.looked / BODIES_PER_SET;
+        is_hidden
     }
 
     /// Orthonormal axes along which what a body has in common with others is likely to be narrow: those of a polygon's plane and its longest side.
@@ -54,6 +58,7 @@ impl Bodies<'_> {
             return true;
         }
         boxes.left = boxes.left.saturating_sub(1);
+        boxes.looked += around.len();
         let (size, slack) = (subtract(&high, &low), self.setting.slack);
         let centre = boxes.place(&between(&low, &high, 0.5));
         // All of the box is no farther from its centre, as a whole and along a direction, which rounding turns by some millionths of millionths.
@@ -130,6 +135,8 @@ struct Boxes<'s> {
     kind: Kind,
     /// How many more may be looked at.
     left: usize,
+    /// Bodies that were looked at, box by box.
+    looked: usize,
 }
 
 impl Boxes<'_> {

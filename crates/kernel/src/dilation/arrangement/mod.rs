@@ -46,7 +46,7 @@ mod tubes;
 use super::plan::{self, Setting};
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
-use crate::attractor::cell::{Cell, ControlPoint, Point, child_points};
+use crate::attractor::cell::{Cell, ControlPoint, Point};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
@@ -107,7 +107,7 @@ pub(super) struct Arrangement {
     copies: Arc<Copies>,
     /// The surface, where it needs no polytopes.
     flat: Option<BlockSurface>,
-    /// Whether its topology is shown to be that of what the sites stand for.
+    /// Whether its topology is shown to be that of what the sites stand for: kept, as it takes long to show.
     is_steady: bool,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
@@ -156,7 +156,7 @@ impl Arrangement {
             return Ok(None);
         }
         let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
-        let sites = || Sites::of(rule, candidates, most.min(MOST_POLYTOPES), budget);
+        let sites = || Sites::of(rule, candidates, most.min(most_of(budget)), budget);
         let Some((mut kinds, is_of_solid)) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
         let is_steady = |figures: &[Figure], off: f64| are_steady(figures, setting, off, &surfaces, budget);
@@ -214,9 +214,7 @@ impl Arrangement {
         candidates: &Candidates,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
-        // Sites are leaves here: there may be more of these than cells that were drawn.
-        let most = MOST_POLYTOPES.min(usize::try_from(budget.limits.cells).unwrap_or(usize::MAX));
-        let Some((sites, _)) = Sites::of(rule, candidates, most, budget)? else { return Ok(None) };
+        let Some((sites, _)) = Sites::of(rule, candidates, most_of(budget), budget)? else { return Ok(None) };
         let copies = Copies::default();
         let Some(flat) = offset::surface(&sites.list, setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
         let mut arrangement = Self::empty(sites, setting.clone(), Vec::new(), Arc::new(copies));
@@ -459,7 +457,7 @@ impl Arrangement {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn is_of_another(&self, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn is_of_another(&mut self, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
         if self.sites.is_exact || self.is_steady {
             return Ok(true);
         }
@@ -468,7 +466,8 @@ impl Arrangement {
         let is_within = off + slack <= reach - least;
         // Parts that are like others are apart by twice the outer distance: what is in question around one of them must not reach another.
         let is_apart = self.copies.is_empty() || 2.0 * (off + slack) <= outer - reach;
-        Ok(is_within && is_apart && are_steady(self.figures(), &self.setting, off, solids, budget)?)
+        self.is_steady = is_within && is_apart && are_steady(self.figures(), &self.setting, off, solids, budget)?;
+        Ok(self.is_steady)
     }
 
     /// Its figures without those of bends.
@@ -483,6 +482,11 @@ impl Arrangement {
         }
         (Index::new(self.sites.list, self.setting.slack), self.setting, self.copies)
     }
+}
+
+/// Sites that may be looked at: each has a leaf cell of its own.
+fn most_of(budget: &Budget) -> usize {
+    MOST_POLYTOPES.min(usize::try_from(budget.limits.cells).unwrap_or(usize::MAX))
 }
 
 /// Whether the dilation of what some sites stand for has the topology of theirs, if they are no more than can be asked. False where that is not shown.
@@ -576,11 +580,7 @@ impl Sites {
                     continue;
                 }
                 budget.cancel.check()?;
-                for (index, transition) in attractor.state_of(&cell).transitions.iter().enumerate().rev() {
-                    let mut child = vec![[0.0; 4]; transition.operator.columns()];
-                    child_points(&points, &transition.operator, &mut child);
-                    open.push((attractor.child_cell(&cell, index, &child), child));
-                }
+                open.extend(attractor.children(&cell, &points).rev());
             }
         }
         Ok((!found.list.is_empty()).then_some((found, is_of_solid)))

@@ -27,9 +27,9 @@ const AT_A_TIME: usize = 512;
 /// Cubes that are up to the polytopes at most, as a mean over the sites, and in any case: they take as much memory as a site's triangles.
 const MOST_CUBES: usize = 100;
 const FEW_CUBES: usize = 100_000;
-/// Sets that are asked for at most each time, likewise: on all that was measured thirty to a hundred and thirty of a site are.
-const MOST_ASKED: usize = 4_000;
-const FEW_ASKED: usize = 500_000;
+/// Sets that are asked for at most each time, likewise, or what takes as long: on all that was measured it is thirty to four hundred of a site.
+const MOST_ASKED: usize = 1_000;
+const FEW_ASKED: usize = 100_000;
 
 /// A set of sites whose polytopes were not shown to have a common point exactly where the dilations have, and whether these have.
 #[derive(Clone, Debug)]

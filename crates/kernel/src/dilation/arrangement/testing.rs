@@ -42,7 +42,7 @@ pub(super) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
 
 pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
     let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
-    Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, &Budget::default()).unwrap()
+    Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, 1.0, &Budget::default()).unwrap()
 }
 
 pub(super) fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {

@@ -582,7 +582,7 @@ fn needles_are_arranged() {
 #[test]
 fn hidden_places_are_hidden() {
     let mut random = Random(41);
-    let (mut hidden, mut shown, mut apart) = (0, 0, 0);
+    let (mut hidden, mut shown, mut apart, mut asked) = (0, 0, 0, 0);
     for round in 0..6 {
         let size = 1.0 + 0.5 * f64::from(round);
         let segments = sticks(&mut random, 24, size, 1.0);
@@ -608,7 +608,7 @@ fn hidden_places_are_hidden() {
                     assert!(of_dilations.is_empty(), "{round}: {set:?}");
                     apart += 1;
                 }
-                if bodies.is_hidden(&set, common, &cube, &all) {
+                if bodies.is_hidden(&set, common, &cube, &all, &mut asked) {
                     hidden += 1;
                     for x in of_dilations.into_iter().chain(of_polytopes).filter(|x| is_there(x)) {
                         assert!(all.iter().any(|&body| is_in(&engine, body, *x) == [true; 2]), "{round}: {set:?} {x}");
@@ -619,6 +619,7 @@ fn hidden_places_are_hidden() {
         });
     }
     assert!(hidden > 300 && shown > 500 && apart > 500, "{hidden} hidden, {shown} places, {apart} apart");
+    assert!(asked > hidden, "{asked}");
 }
 
 /// Segments, balls and triangles all over each other: where a place is in no body all the time, those that it is in, of all dilations or of all polytopes, meet, or some of them are in doubt.
@@ -815,7 +816,7 @@ fn short_sides_turn_no_boxes() {
                     assert!((0..9).all(|place| skew(place / 3, place % 3) < 1e-14), "{tiny} {trial}: {axes:?}");
                 }
                 if arrangement.sites.list.len() == 2 {
-                    assert!(!bodies.is_hidden(&[0, 1], Common::Unknown, &around(), &[0, 1]), "{tiny} {trial}");
+                    assert!(!bodies.is_hidden(&[0, 1], Common::Unknown, &around(), &[0, 1], &mut 0), "{tiny} {trial}");
                 }
             });
             let dilation = arranged(&shape, 1.0, 0.1);
@@ -842,7 +843,7 @@ fn places_hidden_in_solids_are_hidden() {
             let (bodies, count) = (engine.bodies(), arrangement.sites.list.len() as u32);
             let all: Vec<u32> = (0..count).collect();
             for (first, second) in (0..count).flat_map(|first| (0..first).map(move |second| (second, first))) {
-                if !bodies.is_hidden(&[first, second], Common::Unknown, &around(), &all) {
+                if !bodies.is_hidden(&[first, second], Common::Unknown, &around(), &all, &mut 0) {
                     continue;
                 }
                 hidden += 1;

@@ -13,8 +13,8 @@ mod pieces;
 mod search;
 mod spanning;
 
-use super::DilationError;
 use super::drawn::Drawn;
+use super::{COARSE, DilationError};
 use crate::attractor::Attractor;
 use crate::budget::{Budget, Stopped};
 use crate::measure::bounds::bounding_box;
@@ -105,9 +105,8 @@ pub fn stability(
     window_mm: [f64; 2],
     budget: &Budget,
 ) -> Result<Stability, DilationError> {
-    let drawn = Drawn::resolved(attractor, radius, tolerance, budget)?;
-    let (attractor, deviation) =
-        drawn.as_ref().map_or((attractor, 0.0), |Drawn { attractor, deviation_mm, .. }| (attractor, *deviation_mm));
+    let drawn = Drawn::resolved(attractor, radius, tolerance, COARSE, budget)?;
+    let (attractor, deviation) = drawn.as_ref().map_or((attractor, 0.0), |Drawn { attractor, meant, .. }| (attractor, meant.deviation_mm));
     let bounds = bounding_box(attractor, budget)?;
     let core = core(radius, tolerance);
     let resolution = RESOLUTION * (core[1] - core[0]) * 0.5;
