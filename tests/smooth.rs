@@ -36,6 +36,17 @@ fn circle(radius: f64) -> Attractor {
     lowered(&json!({"family": "nurbs_curve", "degree": 2, "knots": KNOTS, "control_points": points, "weights": weights}))
 }
 
+/// A cylinder's side around the z axis.
+fn cylinder(radius: f64, ends: [f64; 2]) -> Attractor {
+    let all = arcs(0.0, radius);
+    let points = ends.map(|z| all.iter().map(|[x, y, w]| [x / w, y / w, z]).collect::<Vec<_>>());
+    let weights: Vec<f64> = all.iter().map(|point| point[2]).collect();
+    lowered(&json!({
+        "family": "nurbs_surface", "degree": [1, 2], "knots": [[0.0, 0.0, 1.0, 1.0], KNOTS],
+        "control_points": points, "weights": [weights, weights],
+    }))
+}
+
 fn torus(far: f64, radius: f64) -> Attractor {
     let (section, turn) = (arcs(far, radius), arcs(0.0, 1.0));
     let point = |[x, z, w]: &[f64; 3], [cosine, sine, v]: &[f64; 3]| [x / w * cosine / v, x / w * sine / v, z / w];
@@ -109,14 +120,7 @@ fn few_segments_tell_the_handle_of_a_dilated_circle() {
 /// A cylinder whose bore is a little wider than the ball, so that all of its sites are near to each other there: what that would take to tell is left in doubt, but for the bounds.
 #[test]
 fn crowded_sites_are_left_in_doubt() {
-    let all = arcs(0.0, 1.002);
-    let row = |z: f64| -> Vec<[f64; 3]> { all.iter().map(|[x, y, w]| [x / w, y / w, z]).collect() };
-    let weights: Vec<f64> = all.iter().map(|point| point[2]).collect();
-    let shape = lowered(&json!({
-        "family": "nurbs_surface", "degree": [1, 2], "knots": [[0.0, 0.0, 1.0, 1.0], KNOTS],
-        "control_points": [row(0.0), row(5.0)], "weights": [weights, weights],
-    }));
-    let made = made(&shape, 1.0, 0.1);
+    let made = made(&cylinder(1.002, [0.0, 5.0]), 1.0, 0.1);
     assert_bounds(&made, 1.0, |x| (x.truncate().length() - 1.002).hypot((-x.z).max(x.z - 5.0).max(0.0)));
     assert!(!made.topology_exact || topology(&made) == (1, 1, 0));
 }
@@ -170,14 +174,7 @@ fn smooth_surfaces_have_few_triangles() {
 /// A cylinder's side: a surface with a border, whose dilation is a ring.
 #[test]
 fn borders_of_smooth_surfaces_are_rounded() {
-    let all = arcs(0.0, 5.0);
-    let row = |z: f64| -> Vec<[f64; 3]> { all.iter().map(|[x, y, w]| [x / w, y / w, z]).collect() };
-    let weights: Vec<f64> = all.iter().map(|point| point[2]).collect();
-    let shape = lowered(&json!({
-        "family": "nurbs_surface", "degree": [1, 2], "knots": [[0.0, 0.0, 1.0, 1.0], KNOTS],
-        "control_points": [row(-4.0), row(4.0)], "weights": [weights, weights],
-    }));
-    let made = made(&shape, 1.0, 0.1);
+    let made = made(&cylinder(5.0, [-4.0, 4.0]), 1.0, 0.1);
     assert_bounds(&made, 1.0, |x| (x.truncate().length() - 5.0).hypot((x.z.abs() - 4.0).max(0.0)));
     assert_eq!((topology(&made), made.topology_exact), ((1, 1, 0), true));
     // A wall of 2 mm around a circle of 5 mm, 8 mm high, and half of a ring's section on either end.
