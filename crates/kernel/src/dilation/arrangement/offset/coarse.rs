@@ -1,5 +1,6 @@
 //! Fewer triangles for a surface: such that both sheets, as far out as the radius, follow it.
 
+use super::seams::Hidden;
 use super::skin::Skin;
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
@@ -8,30 +9,37 @@ use crate::solid::mend::{MOST_AROUND, Mender};
 
 /// How far off a sheet places may be that it goes by, in units of what may be, pass by pass.
 const PASSES: [f64; 4] = [0.05, 0.2, 0.5, 1.0];
+/// The same for what is hidden, which goes first: as it must go, sheets are asked afterwards whether they may be off by more; and what it is for corners of seams in its way, as a share of that.
+const HIDDEN: [f64; 6] = [0.5, 0.8, 1.0, 1.2, 1.2, 1.2];
+const ALONG_SEAMS: f64 = 0.25;
 /// The least cosine of the angle between a triangle and its corners' normals, or its sheets.
 const LEAST_COSINE: f64 = 0.8;
 /// What strips may be off, as a share of what sheets may: they are flat from row to row, too.
 const STRIP: f64 = 0.6;
-/// The least height of a triangle, as a share of its longest side.
+/// The least height of a triangle, as a share of its longest side, and while what is hidden goes.
 const LEAST_HEIGHT: f64 = 0.02;
+const LEAST_WHILE_HIDDEN: f64 = 1e-4;
 /// Vertices that are looked at before a stop is noticed.
 const IN_A_ROW: u32 = 256;
 
 /// Which vertices are left of a surface.
 pub(super) struct Coarse<'a> {
     skin: &'a Skin,
+    hidden: &'a Hidden,
     /// How far out the sheets are, and the cosine of the angle by which the border turns at most at vertices that may go.
     radius: f64,
     turn: f64,
+    /// The least height of a triangle that may come to be, as a share of its longest side.
+    height: f64,
     mesh: HalfEdges,
     mender: Mender,
     /// The first vertex that is gone and that a triangle stands for, and the next one of each.
     first: Vec<u32>,
     next: Vec<u32>,
-    /// The same of a star, and which new triangle will stand for each.
+    /// The same of a star, and which new triangle will stand for each: those that may come to be, and whether these have hidden corners.
     gone: Vec<u32>,
     owners: Vec<usize>,
-    fresh: Vec<Fresh>,
+    fresh: Vec<(Fresh, bool)>,
     /// The normals of the star's triangles.
     normals: Vec<Point>,
     lengths: Vec<(f64, usize)>,
@@ -44,9 +52,9 @@ enum Fresh {
 }
 
 impl Fresh {
-    fn new(skin: &Skin, radius: f64, corners: [u32; 3]) -> Option<Self> {
+    fn new(skin: &Skin, radius: f64, height: f64, corners: [u32; 3]) -> Option<Self> {
         match corners.iter().position(|&corner| corner == skin.beyond()) {
-            None => Triangle::new(skin, radius, corners).map(Self::Triangle),
+            None => Triangle::new(skin, radius, height, corners).map(Self::Triangle),
             Some(k) => Side::new(skin, radius, [corners[(k + 2) % 3], corners[(k + 1) % 3]]).map(Self::Side),
         }
     }
@@ -81,6 +89,7 @@ struct Side {
     ends: [Point; 2],
     ways: [[Point; 2]; 2],
     along: Point,
+    is_seam: bool,
     sag: f64,
 }
 
@@ -92,6 +101,11 @@ impl Side {
         if dot(&ways[0][0], &ways[1][0]) < 0.0 {
             ways[1][0] = ways[1][0].map(|part| -part);
         }
+        // Along seams there are sheets alone.
+        let is_seam = ends.iter().all(|&end| skin.seams.copies(end).is_some());
+        if is_seam {
+            ways.iter_mut().for_each(|own| own[1] = own[0]);
+        }
         if (0..2).any(|k| dot(&ways[0][k], &ways[1][k]) < LEAST_COSINE) {
             return None;
         }
@@ -101,7 +115,7 @@ impl Side {
             dot(&lifted(&way, &turned, side), &turned).abs() / 8.0
         };
         let sag = bend(0, radius).max(bend(0, -radius)).max(bend(1, radius)) / STRIP;
-        Some(Self { ends: places, ways, along: unit(&way), sag })
+        Some(Self { ends: places, ways, along: unit(&way), is_seam, sag })
     }
 
     /// How far a vertex is off the side, as far out as the radius along the normals and the way out.
@@ -110,7 +124,8 @@ impl Side {
         let way = subtract(&self.ends[1], &self.ends[0]);
         let share = dot(&subtract(x, &self.ends[0]), &self.along) / dot(&way, &self.along);
         let off = subtract(x, &between(&self.ends[0], &self.ends[1], share));
-        let own = [skin.ups[vertex as usize], skin.outs[vertex as usize]];
+        let up = skin.ups[vertex as usize];
+        let own = [up, if self.is_seam { up } else { skin.outs[vertex as usize] }];
         let turned = |k: usize| {
             let mean = between(&self.ways[0][k], &self.ways[1][k], share);
             let sign = if dot(&mean, &own[k]) < 0.0 { -1.0 } else { 1.0 };
@@ -134,14 +149,14 @@ struct Triangle {
 }
 
 impl Triangle {
-    /// None where it is a sliver, or is not along both sheets.
-    fn new(skin: &Skin, radius: f64, corners: [u32; 3]) -> Option<Self> {
+    /// None where it is a sliver, lower than a share of its longest side, or is not along both sheets.
+    fn new(skin: &Skin, radius: f64, height: f64, corners: [u32; 3]) -> Option<Self> {
         let places = corners.map(|corner| skin.places[corner as usize]);
         let across = |[a, b, c]: &[Point; 3]| cross(&subtract(b, a), &subtract(c, a));
         let raw = across(&places);
         let longest = (0..3).map(|k| distance_squared(&places[k], &places[(k + 1) % 3])).fold(0.0, f64::max);
         let double = dot(&raw, &raw).sqrt();
-        if double <= LEAST_HEIGHT * longest {
+        if double <= height * longest {
             return None;
         }
         let normal = raw.map(|part| part / double);
@@ -193,36 +208,105 @@ pub(super) fn lifted(x: &Point, up: &Point, by: f64) -> Point {
 }
 
 impl<'a> Coarse<'a> {
-    pub(super) fn new(skin: &'a Skin, radius: f64, turn: f64) -> Self {
+    pub(super) fn new(skin: &'a Skin, hidden: &'a Hidden, radius: f64, turn: f64) -> Self {
         let mesh = skin.mesh.clone();
         let mut mender = Mender::default();
         mender.start(&mesh);
         let (first, next) = (vec![NONE; mesh.triangles() as usize], vec![NONE; skin.places.len()]);
         let (gone, owners, fresh, normals, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { skin, radius, turn, mesh, mender, first, next, gone, owners, fresh, normals, lengths }
+        Self { skin, hidden, radius, turn, height: LEAST_HEIGHT, mesh, mender, first, next, gone, owners, fresh, normals, lengths }
     }
 
-    /// Removes vertices as long as no vertex that is gone is farther off a sheet than it may be.
+    /// Removes vertices as long as no vertex that is gone is farther off a sheet than it may be: first those that are hidden, given what that may be at first. False where one of these stays.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn run(&mut self, most: &[f64], budget: &Budget) -> Result<(), Stopped> {
-        for share in PASSES {
-            for vertex in 0..self.skin.beyond() {
-                if vertex.is_multiple_of(IN_A_ROW) {
-                    budget.cancel.check()?;
-                }
-                if self.skin.turns[vertex as usize] >= self.turn && self.mesh.star(vertex, MOST_AROUND, &mut self.mender.star) {
-                    self.remove(vertex, share, most);
-                }
+    pub(super) fn run(&mut self, first: &[f64], most: &[f64], budget: &Budget) -> Result<bool, Stopped> {
+        // What is hidden goes to seams, row by row; where many of their corners are in the way, these have to go before.
+        for share in HIDDEN {
+            self.height = LEAST_WHILE_HIDDEN;
+            for (&vertex, number) in self.hidden.all.iter().zip(0..) {
+                check(number, budget)?;
+                self.remove(vertex, share, first, true);
+            }
+            if !self.shows() {
+                break;
+            }
+            for &[vertex, _] in self.skin.seams.places.values().filter_map(|copies| copies.first_chunk()) {
+                self.remove(vertex, ALONG_SEAMS * share, first, false);
             }
         }
-        Ok(())
+        if self.shows() {
+            return Ok(false);
+        }
+        self.height = LEAST_HEIGHT;
+        for share in PASSES {
+            for vertex in 0..self.skin.beyond() {
+                check(vertex, budget)?;
+                self.remove(vertex, share, most, false);
+            }
+        }
+        Ok(true)
     }
 
-    /// Moves a vertex, whose star is known, to the nearest neighbour that serves.
-    fn remove(&mut self, vertex: u32, share: f64, most: &[f64]) {
-        let Self { mesh, mender, first, next, gone, normals, lengths, .. } = self;
+    /// Whether a vertex is left that is hidden.
+    fn shows(&self) -> bool {
+        self.hidden.all.iter().any(|&vertex| self.mesh.is_used(vertex))
+    }
+
+    /// Moves a vertex to the nearest neighbour that serves, if it is to be so on a seam before others, and with it the other one of a seam.
+    fn remove(&mut self, vertex: u32, share: f64, most: &[f64], to_seams: bool) {
+        let mate = match self.skin.seams.copies(vertex) {
+            None => None,
+            Some(&[one, other]) if one == vertex => Some(other),
+            Some(_) => return,
+        };
+        let may_turn = |vertex: u32| self.skin.turns[vertex as usize] >= self.turn;
+        if !may_turn(vertex) || !mate.is_none_or(may_turn) || !self.begin(vertex, to_seams) {
+            return;
+        }
+        for index in 0..self.lengths.len() {
+            let m = self.lengths[index].1;
+            if !self.serves(m, share, most) || !self.mender.keeps_manifold(&self.mesh, m) {
+                continue;
+            }
+            if let Some(mate) = mate {
+                let end = self.skin.seams.first(self.mender.star.ring[m]);
+                let is_done = self.begin(mate, to_seams) && self.follow(mate, end, share, most);
+                let is_back = self.begin(vertex, to_seams) && self.lengths.get(index).is_some_and(|length| length.1 == m);
+                if !is_done {
+                    continue;
+                }
+                // Nothing but what is beyond the seam has changed.
+                if !is_back || !self.serves(m, share, most) {
+                    return;
+                }
+            }
+            self.collapse(vertex, m);
+            return;
+        }
+    }
+
+    /// Moves a vertex, which was begun with, to the end of a seam if that serves; whether it does.
+    fn follow(&mut self, vertex: u32, end: u32, share: f64, most: &[f64]) -> bool {
+        let is_end = |&&(_, m): &&(f64, usize)| {
+            let other = self.mender.star.ring[m];
+            other != self.skin.beyond() && self.skin.seams.first(other) == end
+        };
+        let Some(&(_, m)) = self.lengths.iter().find(is_end) else { return false };
+        let serves = self.serves(m, share, most) && self.mender.keeps_manifold(&self.mesh, m);
+        if serves {
+            self.collapse(vertex, m);
+        }
+        serves
+    }
+
+    /// Looks at what is around a vertex, and where it may move, first to what is near; or to seams, then to what is near and not hidden. False where it is gone, or its triangles are no star.
+    fn begin(&mut self, vertex: u32, to_seams: bool) -> bool {
+        if !self.mesh.star(vertex, MOST_AROUND, &mut self.mender.star) {
+            return false;
+        }
+        let Self { skin, hidden, mesh, mender, first, next, gone, normals, lengths, .. } = self;
         let ring = &mender.star.ring;
         gone.clear();
         gone.push(vertex);
@@ -242,43 +326,46 @@ impl<'a> Coarse<'a> {
         }));
         lengths.clear();
         // What is on the border goes along it.
-        let beyond = ring.iter().position(|&other| other == self.skin.beyond());
+        let beyond = ring.iter().position(|&other| other == skin.beyond());
         let may_go = |m: usize| beyond.is_none_or(|beyond| (m + 1) % count == beyond || (beyond + 1) % count == m);
         let all = ring.iter().enumerate().filter(|&(m, _)| may_go(m));
         lengths.extend(all.map(|(m, &other)| (distance_squared(at(vertex), at(other)), m)));
         lengths.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for index in 0..self.lengths.len() {
-            let m = self.lengths[index].1;
-            if self.serves(m, share, most) && self.mender.keeps_manifold(&self.mesh, m) {
-                self.collapse(vertex, m);
-                return;
-            }
+        if to_seams {
+            // Joined to each other they would be in each other's way.
+            lengths.retain(|&(_, m)| ring[m] == skin.beyond() || !hidden.is_hidden[ring[m] as usize]);
+            lengths.sort_by_key(|&(_, m)| skin.seams.copies(ring[m]).is_none());
         }
+        true
     }
 
     /// Whether the star's vertex may move to ring m.
     fn serves(&mut self, m: usize, share: f64, most: &[f64]) -> bool {
-        let Self { skin, radius, mender, gone, owners, fresh, normals, .. } = self;
+        let Self { skin, hidden, radius, height, mender, gone, owners, fresh, normals, .. } = self;
         let ring = &mender.star.ring;
         let count = ring.len();
         fresh.clear();
         for k in kept(Some(m), count) {
             let corners = [ring[m], ring[k], ring[(k + 1) % count]];
-            let Some(own) = Fresh::new(skin, *radius, corners) else { return false };
+            let Some(own) = Fresh::new(skin, *radius, *height, corners) else { return false };
             if matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0) {
                 return false;
             }
-            if corners.iter().any(|&corner| corner != skin.beyond() && own.sag() > share * most[corner as usize]) {
+            // What has a hidden corner will not be left as it is.
+            let is_passing = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);
+            let is_off = |&corner: &u32| corner != skin.beyond() && own.sag() > share * most[corner as usize];
+            if !is_passing && corners.iter().any(is_off) {
                 return false;
             }
-            fresh.push(own);
+            fresh.push((own, is_passing));
         }
         owners.clear();
         gone.iter().all(|&vertex| {
-            let depths = fresh.iter().map(|own| own.depth(skin, vertex)).enumerate();
+            let depths = fresh.iter().map(|(own, _)| own.depth(skin, vertex)).enumerate();
             let Some((owner, _)) = depths.max_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
             owners.push(owner);
-            fresh[owner].error(skin, *radius, vertex) <= share * most[vertex as usize]
+            let (own, is_passing) = &fresh[owner];
+            *is_passing || own.error(skin, *radius, vertex) <= share * most[vertex as usize]
         })
     }
 
@@ -312,4 +399,9 @@ impl<'a> Coarse<'a> {
             own = self.next[own as usize];
         }
     }
+}
+
+/// Notices a stop every now and then.
+fn check(number: u32, budget: &Budget) -> Result<(), Stopped> {
+    if number.is_multiple_of(IN_A_ROW) { budget.cancel.check() } else { Ok(()) }
 }

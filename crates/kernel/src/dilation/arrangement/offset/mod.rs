@@ -1,6 +1,8 @@
-//! Surfaces that turn little from face to face, such as fine meshes of smooth ones: a sheet on each side, as far out as the radius, and strips around their borders that join both.
+//! Surfaces that turn little from face to face but at seams, such as fine meshes of smooth ones with sharp edges: a sheet on each side, as far out as the radius, and strips around their borders that join both.
 //!
-//! Let S be the union of faces of which no two turn by much where they have a side in common, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
+//! At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
+//!
+//! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
 //! are moved in all directions away from S, too (`sheets`). What comes out bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
 //! * All of its triangles have s <= d <= t, and so has each way from a place of one of these to the place with the same shares in the feet of its corners d <= t (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of M: where no cell is, the boundary winds around nothing. So M is in D_t(S).
@@ -8,9 +10,10 @@
 //! * Wherever s <= d(x) <= t there is a direction w with w . (x - c) > 0 for all places c of S that are closest to x; and at places of the boundary of M there is one that leaves it through all facets there, too (`ways`).
 //!
 //! So M has the topology of D_r(S): see [`critical`](crate::dilation::critical) for the same of lattices. Where the faces stand for another shape S', no place of either farther than e from the other one, and s <= r - e and r + 2 e <= t, there also is a w wherever r - e <= d(x) <= r + e such that w . (x - c) > e for
-//! all places c of S no farther from x than t: then D_r(S') has the topology of D_r(S), see `steady`. Where that does not come out, as where parts of S come so near to each other that their dilations touch, polytopes, or a lattice, do the work.
+//! all places c of S no farther from x than d(x) + 2 e: then D_r(S') has the topology of D_r(S), see `steady`. Where that does not come out, as where parts of S come so near to each other that their dilations touch, polytopes, or a lattice, do the work.
 
 mod coarse;
+mod seams;
 mod sheets;
 mod skin;
 #[cfg(test)]
@@ -38,6 +41,8 @@ use std::cell::Cell;
 use std::collections::HashSet;
 use ways::Ways;
 
+/// By how many times the angle that a normal may be off its corner's a surface turns at seams at least. Neighbours that both turn as much as may be from the corner between them turn by twice that; with less, seams may end in the midst of what turns about as much along a side.
+const SEAMS: [f64; 2] = [2.0, 1.2];
 /// Shares of half the band: by which sheets may be nearer where the surface turns at corners, how far off them places may be that they go by, and both together.
 const TURNED: f64 = 0.75;
 const OFF: f64 = 0.75;
@@ -68,38 +73,68 @@ pub(super) fn surface(
     }
     let [inner, outer] = [setting.least + setting.slack, setting.outer - setting.slack];
     let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
-    let Some(skin) = Skin::new(&triangles, 1.0 - TURNED * half / radius, setting.slack) else { return Ok(None) };
-    let around = Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer };
+    let mut last = None;
+    for share in SEAMS {
+        let Some(skin) = Skin::new(&triangles, 1.0 - TURNED * half / radius, share, setting.slack) else {
+            continue;
+        };
+        // With as many seams as before there are the same.
+        if last.replace(skin.seams.all.len()) == Some(skin.seams.all.len()) {
+            continue;
+        }
+        budget.cancel.check()?;
+        let made = along(&skin, setting, &round, budget)?;
+        if made.is_some() {
+            return Ok(made);
+        }
+    }
+    Ok(None)
+}
+
+/// The same, given the surface with its seams.
+fn along(skin: &Skin, setting: &Setting, round: &(impl Fn(f64) -> f64 + Sync), budget: &Budget) -> Result<Option<Flat>, Stopped> {
+    let [inner, outer] = [setting.least + setting.slack, setting.outer - setting.slack];
+    let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
+    let around = Around { skin, faces: &Faces::new(skin.faces()), inner, outer };
     budget.cancel.check()?;
-    let ways = Ways::new(&skin, around.faces, [inner, outer]);
+    let ways = Ways::new(skin, around.faces, [inner, outer]);
     let (off, reach) = (setting.off + setting.slack, setting.reach);
     let is_steady = setting.off > 0.0 && inner <= reach - off && reach + 2.0 * off <= outer && ways.lead_out(off, budget)?;
     if !is_steady && !ways.lead_out(0.0, budget)? {
         return Ok(None);
     }
     let at = |share: f64| radius + share * half;
+    let Some(valleys) = skin.seams.valleys(skin, radius) else {
+        return Ok(None);
+    };
+    let hidden = skin.hidden(&valleys, around.faces, radius, half);
     let [row, column] = [[SIDE, RIM], [FACET, SIDE]].map(|[near, far]| 2.0 * (at(near) / at(far)).acos());
-    let mut most: Vec<f64> = skin.cosines.iter().map(|cosine| (BOTH * half - radius * (1.0 - cosine)).min(OFF * half)).collect();
-    let mut good = HashSet::new();
+    let fold = 2.0 * (at(-TURNED) / radius).acos();
+    let first: Vec<f64> = skin.cosines.iter().map(|cosine| (BOTH * half - radius * (1.0 - cosine)).min(OFF * half)).collect();
+    let (mut most, mut good) = (first.clone(), HashSet::new());
     for round_number in 0..ROUNDS {
-        let mut coarse = Coarse::new(&skin, radius, column.cos());
-        coarse.run(&most, budget)?;
+        let mut coarse = Coarse::new(skin, &hidden, radius, column.cos());
+        if !coarse.run(&first, &most, budget)? {
+            return Ok(None);
+        }
         let (names, left) = coarse.triangles();
         let share = 1.0 + FINER * f64::from(round_number);
-        let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share };
-        let expected = shape.triangles(&skin, &left);
+        let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
+        let expected = shape.triangles(skin, &left);
         if expected > 2.0 * budget.limits.triangles as f64 {
             return Ok(Some(Flat::Beyond(expected)));
         }
         if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
             return Ok(None);
         }
-        let Some(sheets) = Sheets::new(&skin, &left, &shape, &round) else { return Ok(None) };
+        let Some(sheets) = Sheets::new(skin, &valleys, &left, &shape, round) else {
+            return Ok(None);
+        };
         let faults = around.faults(&sheets, &good, budget)?;
         if faults.is_empty() {
             let is_left = ways.leave(&sheets, budget)?;
             let mut surface = BlockSurface { vertices: sheets.vertices, triangles: sheets.triangles, ..BlockSurface::default() };
-            let is_shown = is_left && is_embedded(&mut surface, budget)? && holds(&surface, &skin);
+            let is_shown = is_left && is_embedded(&mut surface, budget)? && holds(&surface, skin);
             return Ok(is_shown.then(|| if is_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) }));
         }
         good = (0..sheets.triangles.len() as u32).map(|triangle| sheets.name(triangle)).collect();

@@ -1,7 +1,9 @@
-//! The surface that is dilated: triangles with common corners, of which little turns from one to the next.
+//! The surface that is dilated: triangles with common corners, of which little turns from one to the next, but at seams.
 
+use super::seams::Seams;
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::dilation::arrangement::faces::numbered;
+use crate::measure::triangle::closest_on_triangle;
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::topology::Incidence;
 
@@ -11,8 +13,12 @@ const MOST_STEPS: usize = 64;
 const MOST_AROUND: usize = 1_000;
 /// Twice the area of a triangle over the square of its longest side at least.
 const SLIVER: f64 = 1e-6;
-/// The cosine of the angle between triangles at a common side at most.
-const FOLDED: f64 = -0.5;
+/// The cosine of the angle by which triangles turn at a common side that is no seam at least, and of the angle between them at most.
+const SMOOTH: f64 = 0.5;
+const ACUTE: f64 = 0.9;
+
+/// Of so many inner sides one is a seam at most.
+const MOST_SHARP: usize = 4;
 
 /// A surface of triangles with its normals.
 pub(super) struct Skin {
@@ -26,28 +32,57 @@ pub(super) struct Skin {
     /// The least cosine of the angles between a corner's normal and those of its triangles.
     pub(super) cosines: Vec<f64>,
     pub(super) around: Incidence,
-    /// The sides that one triangle alone has, as it has them, and which it is.
+    /// The sides that one triangle alone has, as it has them, and which it is; seams are none of these.
     pub(super) borders: Vec<([u32; 2], u32)>,
     /// Unit vectors that lead away from the surface at ends of these, and 0 elsewhere; and the cosine of the angle by which the border turns there.
     pub(super) outs: Vec<Point>,
     pub(super) turns: Vec<f64>,
+    /// Where it was taken apart: each part has its own vertices there.
+    pub(super) seams: Seams,
 }
 
 impl Skin {
-    /// The surface of some triangles; none where the normal of one turns from that of a corner by more than `turn` tells, its cosine, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, or where most inner sides are flat, by no more than `flatness`:
+    /// The surface of some triangles, with seams where it turns by so many times the angle that a normal may be off that of a corner, whose cosine is `turn`; none where the normal of one turns from that of a corner by more than `turn` tells, its cosine, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, where parts meet at seams in other ways than along whole ones that are all hollow on a side, or all not, or where most inner sides are flat, by no more than `flatness`, or many are seams:
     /// then there are few faces. Cost: some tenths of a microsecond for each.
-    pub(super) fn new(faces: &[[Point; 3]], turn: f64, flatness: f64) -> Option<Self> {
-        let (places, triangles) = numbered(faces);
-        let mut normals = Vec::with_capacity(faces.len());
+    pub(super) fn new(faces: &[[Point; 3]], turn: f64, seams: f64, flatness: f64) -> Option<Self> {
+        let least = (seams * turn.acos()).cos().max(SMOOTH);
+        let (mut places, mut triangles) = numbered(faces);
+        let normals: Vec<Point> = faces.iter().map(upright).collect::<Option<_>>()?;
+        let (mut borders, mut smooth, mut sharp, mut inwards, mut flat) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), 0);
+        for edge in edges(&triangles).chunk_by(|a, b| a.ends == b.ends) {
+            match *edge {
+                [own] => borders.push(own),
+                [own, other] => {
+                    let both = [own, other].map(|edge| edge.inward(&places, &triangles, &normals));
+                    let cosine = dot(&both[0], &both[1]);
+                    if cosine > ACUTE {
+                        return None;
+                    }
+                    if -cosine < least {
+                        sharp.push([own, other]);
+                        inwards.push(both);
+                        continue;
+                    }
+                    smooth.push([own, other]);
+                    let corner = &places[triangles[other.triangle as usize][(other.side as usize + 2) % 3] as usize];
+                    let beside = subtract(corner, &places[own.ends[0] as usize]);
+                    flat += usize::from(dot(&normals[own.triangle as usize], &beside).abs() <= flatness);
+                }
+                _ => return None,
+            }
+        }
+        let inner = smooth.len() + sharp.len();
+        if 2 * flat >= inner || MOST_SHARP * sharp.len() >= inner {
+            return None;
+        }
+        let mut seams = Seams::part(&mut places, &mut triangles, &sharp, &inwards, &smooth);
         let mut ups = vec![[0.0; 3]; places.len()];
-        for (face, corners) in faces.iter().zip(&triangles) {
-            let normal = upright(face)?;
-            normals.push(normal);
+        for ((face, normal), corners) in faces.iter().zip(&normals).zip(&triangles) {
             for (k, &corner) in corners.iter().enumerate() {
                 let [a, b] = [1, 2].map(|step| subtract(&face[(k + step) % 3], &face[k]));
-                let angle = dot(&cross(&a, &b), &normal).atan2(dot(&a, &b));
+                let angle = dot(&cross(&a, &b), normal).atan2(dot(&a, &b));
                 let up = &mut ups[corner as usize];
-                let share = if dot(up, &normal) < 0.0 { -angle } else { angle };
+                let share = if dot(up, normal) < 0.0 { -angle } else { angle };
                 *up = std::array::from_fn(|axis| up[axis] + share * normal[axis]);
             }
         }
@@ -59,46 +94,37 @@ impl Skin {
                 *least = least.min(dot(normal, &ups[corner as usize]).abs());
             }
         }
-        if cosines.iter().any(|&cosine| cosine < turn) {
+        if cosines.iter().any(|&cosine| cosine < turn) || !seams.find_rings(&normals, &ups) {
             return None;
         }
-        let (mut borders, mut flat, mut inner) = (Vec::new(), 0, 0);
         let (mut outs, mut turns) = (vec![[0.0; 3]; places.len()], vec![1.0; places.len()]);
-        for edge in edges(&triangles).chunk_by(|a, b| a.ends == b.ends) {
-            match edge {
-                [own] => {
-                    let [a, b] = own.of(&triangles);
-                    let out = own.inward(&places, &triangles, &normals).map(|part| -part);
-                    for end in [a, b] {
-                        let sum = &mut outs[end as usize];
-                        turns[end as usize] = if *sum == [0.0; 3] { -1.0 } else { dot(sum, &out) };
-                        *sum = std::array::from_fn(|axis| sum[axis] + out[axis]);
-                    }
-                    borders.push(([a, b], own.triangle));
-                }
-                [own, other] => {
-                    inner += 1;
-                    let [inward, other_inward] = [own, other].map(|edge| edge.inward(&places, &triangles, &normals));
-                    // Folded back, normals are alike, too.
-                    if dot(&inward, &other_inward) > FOLDED {
-                        return None;
-                    }
-                    let corner = &places[triangles[other.triangle as usize][(other.side as usize + 2) % 3] as usize];
-                    let beside = subtract(corner, &places[own.ends[0] as usize]);
-                    flat += usize::from(dot(&normals[own.triangle as usize], &beside).abs() <= flatness);
-                }
-                _ => return None,
+        // Where seams end at the border, that one tells.
+        let mut is_at_border = vec![false; places.len()];
+        borders.iter().flat_map(|edge| edge.of(&triangles)).for_each(|end| is_at_border[end as usize] = true);
+        let sides = borders.iter().map(|edge| (edge, true)).chain(sharp.iter().flatten().map(|edge| (edge, false)));
+        for (edge, is_border) in sides {
+            let out = edge.inward(&places, &triangles, &normals).map(|part| -part);
+            for end in edge.of(&triangles).into_iter().filter(|&end| is_border || !is_at_border[end as usize]) {
+                let sum = &mut outs[end as usize];
+                turns[end as usize] = if *sum == [0.0; 3] { -1.0 } else { dot(sum, &out) };
+                *sum = std::array::from_fn(|axis| sum[axis] + out[axis]);
             }
         }
+        // Where seams end, or more than two parts meet, nothing goes.
+        for (vertex, _) in seams.rings.iter().filter(|ring| ring.is_border || ring.corners.len() != 2).flat_map(|ring| &ring.corners) {
+            turns[*vertex as usize] = -1.0;
+        }
+        let borders: Vec<([u32; 2], u32)> = borders.iter().map(|edge| (edge.of(&triangles), edge.triangle)).collect();
         let around = Incidence::new(places.len(), &triangles);
-        if around.most() > MOST_AROUND || 2 * flat >= inner {
+        if around.most() > MOST_AROUND {
             return None;
         }
         outs.iter_mut().for_each(|out| *out = unit(out));
         let beyond = places.len() as u32;
-        let more: Vec<[u32; 3]> = borders.iter().map(|&([a, b], _)| [b, a, beyond]).collect();
+        let sides = borders.iter().map(|(ends, _)| ends).chain(seams.all.iter().flat_map(|seam| &seam.ends));
+        let more: Vec<[u32; 3]> = sides.map(|&[a, b]| [b, a, beyond]).collect();
         let mesh = HalfEdges::new([places.as_slice(), &[[0.0; 3]]].concat(), &[triangles.as_slice(), &more].concat());
-        Some(Self { places, triangles, mesh, normals, ups, cosines, around, borders, outs, turns })
+        Some(Self { places, triangles, mesh, normals, ups, cosines, around, borders, outs, turns, seams })
     }
 
     /// The corner that none of its triangles has.
@@ -106,7 +132,7 @@ impl Skin {
         self.places.len() as u32
     }
 
-    /// Whether a vertex is on the border.
+    /// Whether a vertex is on the border, or on a seam.
     pub(super) fn is_border(&self, vertex: u32) -> bool {
         self.outs[vertex as usize] != [0.0; 3]
     }
@@ -130,6 +156,12 @@ impl Skin {
             face = twin / 3;
         }
         face
+    }
+
+    /// The place of a face that is closest to another place.
+    pub(super) fn closest(&self, face: u32, x: &Point) -> Point {
+        let [a, b, c] = self.triangles[face as usize].map(|corner| &self.places[corner as usize]);
+        closest_on_triangle(x, a, b, c)
     }
 
     /// Where the corners of its triangles are.

@@ -77,6 +77,82 @@ impl Mesh {
         })
     }
 
+    /// Two caps of balls that meet at a rim, each as wide as an angle.
+    fn lens(around: usize, across: usize, radius: f64, angle: f64) -> Self {
+        let cap = |side: f64| {
+            Self::of(around, across, |u, v| {
+                let (u, v) = (TAU * u, angle * v);
+                let height = side * (v.cos() - angle.cos());
+                radius * DVec3::new(v.sin() * u.cos(), v.sin() * u.sin(), height)
+            })
+        };
+        cap(1.0).and(cap(-1.0)).welded()
+    }
+
+    /// A barrel with domes, which turn outwards or inwards.
+    fn drum(around: usize, across: usize, radius: f64, domes: f64) -> Self {
+        let side = Self::of(around, across, |u, v| {
+            let own = radius * (1.0 + 0.2 * (PI * v).sin());
+            DVec3::new(own * (TAU * u).cos(), own * (TAU * u).sin(), 2.0 * radius * v)
+        });
+        let dome = |height: f64, side: f64| {
+            Self::of(around, across, |u, v| {
+                let own = radius * v;
+                DVec3::new(own * (TAU * u).cos(), own * (TAU * u).sin(), height + side * domes * (1.0 - v * v))
+            })
+        };
+        side.and(dome(0.0, -1.0)).and(dome(2.0 * radius, 1.0)).welded()
+    }
+
+    /// A cube with bulging faces: seams, and corners where three of them meet.
+    fn cushion(along: usize, half: f64, bulge: f64) -> Self {
+        let face = |axis: usize, side: f64| {
+            Self::of(along, along, |u, v| {
+                let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+                let mut x = [0.0; 3];
+                (x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]) =
+                    (side * (half + bulge * (1.0 - a * a) * (1.0 - b * b)), half * a * side, half * b);
+                DVec3::from_array(x)
+            })
+        };
+        (0..3).flat_map(|axis| [face(axis, 1.0), face(axis, -1.0)]).reduce(Self::and).unwrap().welded()
+    }
+
+    /// A wide arch with a fold along it, from border to border.
+    fn fold(along: usize, across: usize, slope: f64) -> Self {
+        Self::of(along, across, |u, v| {
+            let (angle, beside) = (4.2 * (u - 0.5), v - 0.5);
+            let own = 12.0 + 12.0 * slope * beside.abs() * (1.0 + 0.5 * beside.abs());
+            DVec3::new(own * angle.sin(), 12.0 * beside, own * angle.cos())
+        })
+    }
+
+    /// The same with two folds, between which the border is straight.
+    fn folds(along: usize, across: usize) -> Self {
+        Self::of(along, across, |u, v| {
+            let (angle, beside) = (4.2 * (u - 0.5), v - 0.5);
+            let up = (beside.abs() - 0.2).max(0.0);
+            let own = 12.0 + 9.0 * up * (1.0 + 0.5 * up) + 0.02 * (4.0 * angle).sin();
+            DVec3::new(own * angle.sin(), 12.0 * beside, own * angle.cos())
+        })
+    }
+
+    /// The same with one vertex for all at a place.
+    fn welded(self) -> Self {
+        let (mut mesh, mut numbers) = (Self::default(), HashMap::new());
+        for face in &self.faces {
+            let corners = face.iter().map(|&corner| {
+                let x = self.vertices[corner as usize];
+                *numbers.entry(x.to_array().map(|x| (x * 1e7).round() as i64)).or_insert_with(|| {
+                    mesh.vertices.push(x);
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            mesh.faces.push(corners.collect());
+        }
+        mesh
+    }
+
     fn and(mut self, other: Self) -> Self {
         let first = self.vertices.len() as u32;
         self.vertices.extend(other.vertices);
@@ -141,25 +217,57 @@ fn shape(case: usize, random: &mut Random) -> (Mesh, (u64, u64, i64)) {
     }
 }
 
-/// What is made keeps its bounds everywhere, and has the topology that is known of the surface.
+/// What is made keeps its bounds everywhere, at some places for which it is asked, too, and has the topology that is known of the surface.
+fn assert_made(case: usize, mesh: &Mesh, [radius, tolerance]: [f64; 2], expected: (u64, u64, i64), places: u32, random: &mut Random) {
+    let mesh = mesh.clone().turned(random);
+    let attractor = mesh.lowered();
+    assert!(mesh.is_made(radius, tolerance) && is_flat(&attractor, radius, tolerance), "{case}");
+    let dilation = arranged(&attractor, radius, tolerance);
+    assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
+    assert_eq!(topology(&dilation), expected, "{case}");
+    assert!(holds_everywhere(&dilation, radius, |x| mesh.distance(x), random), "{case}");
+    let inside = Inside::new(dilation.solid.mesh());
+    for _ in 0..places {
+        let x = mesh.near(radius, random);
+        assert_bounds(case, &inside, &dilation, radius, x, mesh.distance(x));
+    }
+}
+
 #[test]
 fn sheets_keep_their_bounds_and_have_the_surface_s_topology() {
     let mut random = Random(113);
     for case in 0..14 {
         let (mesh, expected) = shape(case, &mut random);
-        let mesh = mesh.turned(&mut random);
         let (radius, share) = ([1.0, 0.6, 1.4][case % 3], [0.1, 0.2][case % 2]);
-        let (attractor, tolerance) = (mesh.lowered(), share * radius);
-        assert!(mesh.is_made(radius, tolerance) && is_flat(&attractor, radius, tolerance), "{case}");
-        let dilation = arranged(&attractor, radius, tolerance);
-        assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
-        assert_eq!(topology(&dilation), expected, "{case}");
-        assert!(holds_everywhere(&dilation, radius, |x| mesh.distance(x), &mut random), "{case}");
-        let inside = Inside::new(dilation.solid.mesh());
-        for _ in 0..300 {
-            let x = mesh.near(radius, &mut random);
-            assert_bounds(case, &inside, &dilation, radius, x, mesh.distance(x));
-        }
+        assert_made(case, &mesh, [radius, share * radius], expected, 300, &mut random);
+    }
+}
+
+/// A shape with seams, with the components, the cavities and the Euler number of its dilation.
+fn seamed(case: usize) -> (Mesh, (u64, u64, i64)) {
+    // For the lesser tolerance, finer ones.
+    let fine = 1 + case / 9;
+    match case % 9 {
+        0 => (Mesh::lens(60 * fine, 20 * fine, 12.0, 0.9), (1, 1, 4)),
+        1 => (Mesh::drum(48 * fine, 12 * fine, 8.0, 2.0), (1, 1, 4)),
+        2 => (Mesh::drum(48 * fine, 12 * fine, 8.0, -2.0), (1, 1, 4)),
+        3 => (Mesh::cushion(20 * fine, 10.0, 1.5), (1, 1, 4)),
+        4 => (Mesh::fold(48 * fine, 16 * fine, 0.7), (1, 0, 2)),
+        5 => (Mesh::fold(48 * fine, 16 * fine, -0.7), (1, 0, 2)),
+        6 => (Mesh::lens(60 * fine, 30 * fine, 14.0, 0.7), (1, 1, 4)),
+        7 => (Mesh::folds(48 * fine, 20 * fine), (1, 0, 2)),
+        _ => (Mesh::cushion(16 * fine, 8.0, -1.0), (1, 1, 4)),
+    }
+}
+
+/// Where the surface turns much at seams: closed ones and such that end at the border, hollow on either side, and corners.
+#[test]
+fn sheets_meet_at_seams() {
+    let mut random = Random(149);
+    for case in 0..15 {
+        let (mesh, expected) = seamed(case);
+        let (radius, share) = ([1.0, 0.7, 1.2][case % 3], [0.1, 0.05][case / 9]);
+        assert_made(case, &mesh, [radius, share * radius], expected, 100, &mut random);
     }
 }
 
@@ -226,7 +334,13 @@ fn what_is_no_smooth_surface_is_left_to_others() {
     let folded = Mesh::of(20, 8, |u, v| DVec3::new(20.0 * (2.0 * u - 1.0).abs(), 10.0 * v, 4.0 * (u - 0.5).powi(2)));
     let roof = Mesh::of(20, 20, |u, v| DVec3::new(20.0 * u, 10.0 * v, 6.0 * (u - 0.5).abs()));
     let crossed = Mesh::vault(20, 16, 12.0, 20.0).and(Mesh::vault(20, 16, 12.0, 20.0).moved(DVec3::new(0.0, 5.0, 0.0)));
-    for (case, mesh) in [twice, winged, notched, folded, roof, crossed].iter().enumerate() {
+    // Three folds that meet at a place, of which two are hollow on one side and one on the other; and a blade.
+    let bracket = Mesh::of(24, 24, |u, v| {
+        let (x, y) = (20.0 * (u - 0.5), 20.0 * (v - 0.5));
+        DVec3::new(x, y, if x > 0.0 && y > 0.0 { 1.2 * x.min(y) } else { 0.0 } + 0.02 * (x * x + 0.5 * x * y))
+    });
+    let blade = Mesh::lens(60, 20, 40.0, 0.2);
+    for (case, mesh) in [twice, winged, notched, folded, roof, crossed, bracket, blade].iter().enumerate() {
         assert!(!mesh.is_made(1.0, 0.1), "{case}");
     }
     // Directions of faces do not matter.
@@ -272,7 +386,7 @@ fn faces_below_places_are_found() {
     let mut random = Random(139);
     let mesh = Mesh::torus(40, 24, [15.0, 6.0]);
     let corners = mesh.corners();
-    let skin = Skin::new(&corners, 0.97, 1e-9).unwrap();
+    let skin = Skin::new(&corners, 0.97, 2.0, 1e-9).unwrap();
     let mut found = 0;
     for _ in 0..300 {
         let from = random.next() as u32 % corners.len() as u32;
@@ -292,6 +406,7 @@ fn faces_below_places_are_found() {
 #[test]
 fn sheets_do_not_depend_on_threads_and_can_be_stopped() {
     assert_steady(&Mesh::strip(60, 4, 15.0, 6.0, 1.0).lowered(), 1.0, 0.1);
+    assert_steady(&Mesh::cushion(20, 10.0, 1.5).lowered(), 1.0, 0.1);
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Ways along which the distance from a surface grows.
 
+use super::coarse::lifted;
+use super::seams::Seam;
 use super::sheets::Sheets;
 use super::skin::{Skin, upright};
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
@@ -18,10 +20,16 @@ const ALONG_SIDE: usize = 6;
 const AROUND_SIDE: usize = 8;
 /// Sides longer than this, as a share of the distance, are halved where nothing is shown of all of one.
 const SHORT: f64 = 0.2;
+/// Parts smaller than this are halved no more where a direction is sought.
+const FINE: f64 = 0.02;
+/// Steps towards a direction.
+const STEPS: usize = 24;
 /// What is left for rounding, as a share of the distance.
 const NOISE: f64 = 1e-9;
 /// Parts that are looked at one after the other.
 const IN_A_ROW: usize = 64;
+/// Groups of faces likewise.
+const FEW: usize = 8;
 
 /// A surface, and the distances from it between which the ways are asked for.
 pub(super) struct Ways<'a> {
@@ -38,6 +46,27 @@ struct Cone {
     axis: Point,
     cosine: f64,
     sine: f64,
+}
+
+/// What is no farther from a middle than it is wide.
+struct Part {
+    middle: Point,
+    wide: f64,
+}
+
+impl Part {
+    /// The hull of some points.
+    fn of(points: &[Point]) -> Self {
+        let middle: Point = std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / points.len() as f64);
+        let wide = points.iter().map(|point| distance_squared(point, &middle)).fold(0.0, f64::max).sqrt();
+        Self { middle, wide: wide * (1.0 + NOISE) }
+    }
+}
+
+/// The ways to a place from what is closest to it of the faces that are near, and how long these are; and the least of that.
+struct Near {
+    faces: Vec<(Point, f64)>,
+    distance: f64,
 }
 
 impl<'a> Ways<'a> {
@@ -75,14 +104,32 @@ impl<'a> Ways<'a> {
         let (groups, cones) = (faces.groups(), cones());
         let at = |vertex: u32| skin.places[vertex as usize];
         let rays = |vertex: u32| -> Vec<Point> {
-            let others = skin.around.at(vertex).iter().flat_map(|&triangle| skin.triangles[triangle as usize]);
-            others.filter(|&other| other != vertex).map(|other| unit(&subtract(&at(other), &at(vertex)))).collect()
+            let own = [vertex];
+            let copies = skin.seams.copies(vertex).unwrap_or(&own);
+            let others = copies.iter().flat_map(|&copy| {
+                skin.around.at(copy).iter().flat_map(|&triangle| skin.triangles[triangle as usize]).filter(move |&other| other != copy)
+            });
+            others.map(|other| unit(&subtract(&at(other), &at(vertex)))).collect()
         };
-        let mut borders: Vec<u32> = skin.borders.iter().flat_map(|(ends, _)| *ends).collect();
+        let seams = skin.seams.all.iter().flat_map(|seam| seam.ends[0]);
+        let mut borders: Vec<u32> = skin.borders.iter().flat_map(|(ends, _)| *ends).chain(seams).map(|end| skin.seams.first(end)).collect();
         borders.sort_unstable();
         borders.dedup();
-        Ok(all(&groups, budget, |group| ways.lead_from(group) || group.iter().all(|&face| ways.lead_from(&[face])))?
+        let left = |group: &&[u32]| -> Result<Vec<u32>, Stopped> {
+            budget.cancel.check()?;
+            let is_whole = ways.lead_from(group);
+            Ok(group.iter().copied().filter(|&face| !is_whole && !ways.lead_from(&[face])).collect())
+        };
+        let left = groups.par_iter().with_min_len(FEW).map(left).collect::<Result<Vec<Vec<u32>>, Stopped>>()?.concat();
+        // Without seams, sheets would cross where these are.
+        if !left.is_empty() && skin.seams.all.is_empty() {
+            return Ok(false);
+        }
+        let mut is_left = vec![false; skin.triangles.len()];
+        left.iter().for_each(|&face| is_left[face as usize] = true);
+        Ok(all(&left, budget, |&face| ways.lead_from_parts(face, &is_left))?
             && all(&skin.borders, budget, |(ends, triangle)| ways.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
+            && all(&skin.seams.all, budget, |seam| ways.lead_over(seam))?
             && all(&borders, budget, |&vertex| ways.lead_around(&at(vertex), &rays(vertex), &cones))?)
     }
 
@@ -108,22 +155,142 @@ impl<'a> Ways<'a> {
 
     /// Whether it is so of the places that what is between some of a surface is closest to, in the directions of a cone: of all together, or of the parts of a side or a triangle.
     fn lead_along(&self, places: &[Point], cone: &Cone) -> bool {
-        self.lead_at_once(places, cone) || self.halves(places).is_some_and(|halves| halves.iter().all(|half| self.lead_along(half, cone)))
+        self.lead_at_once(places, cone)
+            || match self.halves(places, SHORT) {
+                Some(halves) => halves.iter().all(|half| self.lead_along(half, cone)),
+                None => false,
+            }
     }
 
-    /// The halves of a side, or of a triangle across its longest side; none where that is short, and of others.
-    fn halves(&self, places: &[Point]) -> Option<[Vec<Point>; 2]> {
-        let count = places.len();
-        let long = |k: usize| distance_squared(&places[k], &places[(k + 1) % count]);
-        let k = (0..count).max_by(|&p, &q| long(p).total_cmp(&long(q)))?;
-        (count <= 3 && long(k) > (SHORT * self.outer).powi(2)).then(|| {
-            let half = between(&places[k], &places[(k + 1) % count], 0.5);
-            [k, (k + 1) % count].map(|replaced| {
-                let mut part = places.to_vec();
-                part[replaced] = half;
-                part
-            })
+    /// The same, or in directions that are sought, see [`Ways::lead_apart`].
+    fn lead_somewhere(&self, places: &[Point], cone: &Cone) -> bool {
+        self.lead_along(places, cone)
+            || (!self.skin.seams.all.is_empty() && self.lead_apart(places, &cone.around(), [self.inner, self.outer]))
+    }
+
+    /// Whether it is so of what is between two distances from some places, in directions between some that are unit vectors, and has its closest place among these: for what is around a middle, by no more than h, of all faces that may be closest to some of it, each along a way that leads from its closest places by more than h.
+    fn lead_apart(&self, places: &[Point], ways: &[Point], [from, to]: [f64; 2]) -> bool {
+        if let [a, b, c, d] = ways {
+            return [[*a, *b, *c], [*a, *c, *d]].iter().all(|half| self.lead_apart(places, half, [from, to]));
+        }
+        let axis = unit(&ways.iter().fold([0.0; 3], |sum: Point, way| std::array::from_fn(|k| sum[k] + way[k])));
+        // What is between directions is that much shorter at most.
+        let cosine = ways.iter().map(|way| dot(way, &axis)).fold(1.0, f64::min);
+        if cosine < FRAC_1_SQRT_2 {
+            let halves = halves(ways, true);
+            return halves.iter().all(|half| self.lead_apart(places, half, [from, to]));
+        }
+        let all = places.iter().flat_map(|place| ways.iter().flat_map(move |way| [from, to / cosine].map(|by| lifted(place, way, by))));
+        let part = Part::of(&all.collect::<Vec<Point>>());
+        if part.wide > self.outer {
+            // What is wide beside the distances has no direction of its own, but most of a large face has that of all.
+            let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+            if self.lead_at_once(places, &Cone { axis, cosine: cosine - NOISE, sine: sine + NOISE }) {
+                return true;
+            }
+        } else {
+            let near = self.near(&part, part.wide + to + 2.0 * self.more);
+            if near.distance + part.wide < from || self.is_left(&part, &near, to, &[]) {
+                return true;
+            }
+        }
+        let [long, turned] = [longest(places).1, to * longest(ways).1];
+        let most = long.max(turned).max(to - from);
+        if most < FINE * self.outer {
+            return false;
+        }
+        if most == to - from {
+            let middle = 0.5 * (from + to);
+            return [[from, middle], [middle, to]].into_iter().all(|between| self.lead_apart(places, ways, between));
+        }
+        if most == long {
+            return halves(places, false).iter().all(|half| self.lead_apart(half, ways, [from, to]));
+        }
+        halves(ways, true).iter().all(|half| self.lead_apart(places, half, [from, to]))
+    }
+
+    /// Likewise of the inside of a face, and of its inner sides and corners, on both sides of it, each in the directions that belong to it: of those that no face has which is not left, and no earlier one.
+    fn lead_from_parts(&self, face: u32, is_left: &[bool]) -> bool {
+        let Skin { triangles, places, normals, mesh, around, .. } = self.skin;
+        let (corners, normal) = (triangles[face as usize], normals[face as usize]);
+        let at = corners.map(|corner| places[corner as usize]);
+        let along = |other: u32, side: f64| {
+            let own = normals[other as usize];
+            own.map(|part| part * side.copysign(side * dot(&own, &normal)))
+        };
+        let is_known = |other: u32| other < face || !is_left[other as usize];
+        let between = [self.inner, self.outer];
+        let is_side_left = |k: usize, side: f64| {
+            let twin = mesh.twin(3 * face + k as u32);
+            let other = twin / 3;
+            if twin == NONE {
+                return false;
+            }
+            other as usize >= triangles.len()
+                || is_known(other)
+                || self.lead_apart(&[at[k], at[(k + 1) % 3]], &[along(face, side), along(other, side)], between)
+        };
+        let is_corner_left = |k: usize, side: f64| {
+            let all = around.at(corners[k]);
+            if self.skin.is_border(corners[k]) || all.iter().any(|&other| other != face && is_known(other)) {
+                return true;
+            }
+            let all: Vec<Point> = all.iter().map(|&other| along(other, side)).collect();
+            let axis = unit(&all.iter().fold([0.0; 3], |sum: Point, way| std::array::from_fn(|k| sum[k] + way[k])));
+            let cosine = all.iter().map(|way| dot(way, &axis)).fold(1.0, f64::min) - NOISE;
+            let cone = Cone { axis, cosine, sine: (1.0 - cosine * cosine).max(0.0).sqrt() };
+            cosine > FRAC_1_SQRT_2 && self.lead_apart(&[at[k]], &cone.around(), between)
+        };
+        [1.0, -1.0].into_iter().all(|side: f64| {
+            self.lead_apart(&at, &[along(face, side)], between)
+                && (0..3).all(|k| is_side_left(k, side))
+                && (0..3).all(|k| is_corner_left(k, side))
         })
+    }
+
+    /// The faces within a distance of the middle of a part.
+    fn near(&self, part: &Part, within: f64) -> Near {
+        let (mut faces, mut least) = (Vec::new(), f64::INFINITY);
+        self.faces.around(std::slice::from_ref(&part.middle), within, |face| {
+            let way = subtract(&part.middle, &self.faces.all[face as usize].closest(&part.middle));
+            let distance = dot(&way, &way).sqrt();
+            if distance <= within {
+                faces.push((way, distance));
+                least = least.min(distance);
+            }
+            true
+        });
+        Near { faces, distance: least }
+    }
+
+    /// Whether there is a direction along which all that may be closest to some place of a part, and no farther than a distance, is left behind, and which leads through some facets.
+    ///
+    /// A face is convex: the way to a place from what of it is closest changes by no more than the place does (Moreau, "Proximite et dualite dans un espace hilbertien", Bull. SMF 93, 1965). So along w it leads on everywhere in the part if it does so at the middle by more than the part
+    /// is wide. Places of it that are farther than that by up to 2 e are off by sqrt((d + 2 e)^2 - d^2) at most.
+    fn is_left(&self, part: &Part, near: &Near, most: f64, through: &[Point]) -> bool {
+        let within = (near.distance + 2.0 * (part.wide + self.more)) * (1.0 + NOISE);
+        let least = part.wide + self.more + 2.0 * (self.more * (most + self.more)).sqrt() + NOISE * self.outer;
+        let through = through.iter().map(|normal| normal.map(|part| part * self.outer));
+        let all: Vec<Point> = near.faces.iter().filter(|face| face.1 <= within).map(|face| face.0).chain(through).collect();
+        // The shortest of the means of these ways leads on along all of them as far as any direction does: by steps to the one along which it leads on least.
+        let mut mean = all.iter().fold([0.0; 3], |sum: Point, own| std::array::from_fn(|k| sum[k] + own[k] / all.len() as f64));
+        for _ in 0..STEPS {
+            let length = dot(&mean, &mean).sqrt();
+            let worst = all.iter().map(|way| (dot(way, &mean), way)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((along, way)) = worst.filter(|_| length > least) else { return false };
+            if along > least * length {
+                return true;
+            }
+            let way = subtract(way, &mean);
+            let share = (-dot(&mean, &way) / dot(&way, &way)).clamp(0.0, 1.0);
+            mean = std::array::from_fn(|k| mean[k] + share * way[k]);
+        }
+        false
+    }
+
+    /// The halves of a side, or of a triangle across its longest side; none where that is short, as a share of the distance, and of others.
+    fn halves(&self, places: &[Point], short: f64) -> Option<[Vec<Point>; 2]> {
+        (places.len() <= 3 && longest(places).1 > short * self.outer).then(|| halves(places, false))
     }
 
     fn lead_at_once(&self, places: &[Point], cone: &Cone) -> bool {
@@ -143,7 +310,7 @@ impl<'a> Ways<'a> {
     fn lead_around(&self, place: &Point, rays: &[Point], cones: &[Cone]) -> bool {
         // No place out along such a direction has this one closest: going along a ray leads closer.
         let is_beside = |cone: &Cone| rays.iter().any(|ray| dot(ray, &cone.axis) > cone.sine + NOISE);
-        cones.iter().all(|cone| is_beside(cone) || self.lead_along(&[*place], cone))
+        cones.iter().all(|cone| is_beside(cone) || self.lead_somewhere(&[*place], cone))
     }
 
     /// Likewise of the inside of a side of the border, given the normal of its triangle: in all directions across the side that do not lead over the triangle.
@@ -153,7 +320,26 @@ impl<'a> Ways<'a> {
         (0..AROUND_SIDE).all(|step| {
             let (own, along) = (PI * (step as f64 + 0.5) / AROUND_SIDE as f64).sin_cos();
             let axis = std::array::from_fn(|k| along * normal[k] + own * out[k]);
-            self.lead_along(ends, &Cone { axis, cosine, sine })
+            self.lead_somewhere(ends, &Cone { axis, cosine, sine })
+        })
+    }
+
+    /// Likewise of the inside of a seam: in all directions across it that lead over neither of its triangles.
+    fn lead_over(&self, seam: &Seam) -> bool {
+        let ends = seam.ends[0].map(|end| self.skin.places[end as usize]);
+        // Normals of both triangles on the side with room between them.
+        let [from, to] = [0, 1].map(|k| {
+            let normal = self.skin.normals[seam.triangles[k] as usize];
+            if dot(&normal, &seam.inwards[1 - k]) > 0.0 { normal.map(|part| -part) } else { normal }
+        });
+        let angle = dot(&from, &to).clamp(-1.0, 1.0).acos();
+        let beside = unit(&std::array::from_fn(|k| to[k] - dot(&from, &to) * from[k]));
+        let steps = (AROUND_SIDE as f64 * angle / PI).ceil().max(1.0);
+        let (sine, cosine) = (0.5 * angle / steps + NOISE).sin_cos();
+        (0..steps as usize).all(|step| {
+            let (over, along) = (angle * (step as f64 + 0.5) / steps).sin_cos();
+            let axis = std::array::from_fn(|k| along * from[k] + over * beside[k]);
+            self.lead_somewhere(&ends, &Cone { axis, cosine, sine })
         })
     }
 
@@ -186,19 +372,69 @@ impl<'a> Ways<'a> {
                 twin != NONE
                     && (ends.iter().any(|&end| serves[end]) || {
                         let mean = unit(&std::array::from_fn(|axis| up[axis] + normals[(twin / 3) as usize][axis]));
-                        leads(&mean, triangle) && leads(&mean, twin / 3) && self.leaves_between(&ends.map(|end| places[end]), &mean)
+                        let through = [*up, normals[(twin / 3) as usize]];
+                        leads(&mean, triangle)
+                            && leads(&mean, twin / 3)
+                            && self.leaves_between(&ends.map(|end| places[end]), &mean, &through)
                     })
             };
-            let is_corner_left = |k: usize| serves[k] || self.leaves_between(&[places[k]], way(own[k]));
-            (serves.contains(&true) || self.leaves_between(&places, up)) && (0..3).all(is_side_left) && (0..3).all(is_corner_left)
+            let facets = |k: usize| -> Vec<Point> { around.at(own[k]).iter().map(|&other| normals[other as usize]).collect() };
+            let is_corner_left = |k: usize| serves[k] || self.leaves_between(&[places[k]], way(own[k]), &facets(k));
+            (serves.contains(&true) || self.leaves_between(&places, up, &[*up])) && (0..3).all(is_side_left) && (0..3).all(is_corner_left)
         })
     }
 
-    /// Whether all faces that are as near to some place of a corner, a side or a triangle are left behind along a direction, which may be told of parts.
-    fn leaves_between(&self, places: &[Point], along: &Point) -> bool {
-        self.leaves(places, along, lowest(places, along))
-            || self.halves(places).is_some_and(|halves| halves.iter().all(|half| self.leaves_between(half, along)))
+    /// Whether all faces that are as near to some place of a corner, a side or a triangle are left behind along a direction, or those closest to it along another one that leads through some facets, which may be told of parts.
+    fn leaves_between(&self, places: &[Point], along: &Point, through: &[Point]) -> bool {
+        if self.leaves(places, along, lowest(places, along)) {
+            return true;
+        }
+        match self.halves(places, SHORT) {
+            Some(halves) => halves.iter().all(|half| self.leaves_between(half, along, through)),
+            None => self.leaves_apart(places, through),
+        }
     }
+
+    /// The same along directions that are sought.
+    fn leaves_apart(&self, places: &[Point], through: &[Point]) -> bool {
+        let part = Part::of(places);
+        let is_small = part.wide <= self.outer;
+        (is_small && self.is_left(&part, &self.near(&part, self.outer + 2.0 * part.wide), self.outer, through))
+            || self.halves(places, FINE).is_some_and(|halves| halves.iter().all(|half| self.leaves_apart(half, through)))
+    }
+}
+
+impl Cone {
+    /// Directions that all of it is between, if it is no wider than a right angle.
+    fn around(&self) -> [Point; 4] {
+        let Self { axis, cosine, sine } = self;
+        let least = (0..3).min_by(|&p, &q| axis[p].abs().total_cmp(&axis[q].abs())).unwrap_or_default();
+        let first = unit(&cross(axis, &std::array::from_fn(|k| f64::from(u8::from(k == least)))));
+        let second = cross(axis, &first);
+        let tangent = sine / cosine;
+        [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]
+            .map(|[p, q]| unit(&std::array::from_fn(|k| axis[k] + tangent * (p * first[k] + q * second[k]))))
+    }
+}
+
+/// Which side of a polygon is longest, and how long it is.
+fn longest(places: &[Point]) -> (usize, f64) {
+    let count = places.len();
+    let long = |k: usize| distance_squared(&places[k], &places[(k + 1) % count]);
+    let k = (0..count).max_by(|&p, &q| long(p).total_cmp(&long(q))).unwrap_or_default();
+    (k, long(k).sqrt())
+}
+
+/// The halves of a side, or of a triangle, across its longest side: of places, or of directions.
+fn halves(places: &[Point], are_ways: bool) -> [Vec<Point>; 2] {
+    let (k, next) = (longest(places).0, (longest(places).0 + 1) % places.len());
+    let half = between(&places[k], &places[next], 0.5);
+    let half = if are_ways { unit(&half) } else { half };
+    [k, next].map(|replaced| {
+        let mut part = places.to_vec();
+        part[replaced] = half;
+        part
+    })
 }
 
 /// Whether what a face has in a ball is lower than a height along a direction: it is in a disc of its plane.
