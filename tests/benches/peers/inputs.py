@@ -291,6 +291,52 @@ def bumpy(n, m):
     return patch(place, n, m)
 
 
+def together(parts):
+    """Parts as one, with one vertex for all at a place."""
+    counts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+    return weld(np.concatenate([vertices for vertices, _ in parts]), np.concatenate([cells + count for (_, cells), count in zip(parts, counts)]))
+
+
+def lens(n, m, wide=1.3):
+    """Two caps of balls of a radius that meet at a sharp rim of radius 1."""
+    half = np.arcsin(1 / wide)
+
+    def cap(side):
+        def place(u, v):
+            turn, tilt = 2 * np.pi * u, half * v
+            return wide * np.sin(tilt) * np.cos(turn), wide * np.sin(tilt) * np.sin(turn), side * wide * (np.cos(tilt) - np.cos(half))
+
+        return patch(place, n, m)
+
+    return together([cap(1), cap(-1)])
+
+
+def drum(n, m):
+    """A barrel with a dome at each end, sharp rims between them."""
+
+    def side(u, v):
+        out = 1 + 0.3 * np.sin(np.pi * v)
+        return out * np.cos(2 * np.pi * u), out * np.sin(2 * np.pi * u), 2 * v
+
+    def dome(end, up):
+        return lambda u, v: (v * np.cos(2 * np.pi * u), v * np.sin(2 * np.pi * u), end + 0.3 * up * (1 - v * v))
+
+    return together([patch(side, n, m), patch(dome(0, -1), n, m // 2), patch(dome(2, 1), n, m // 2)])
+
+
+def cushion(n):
+    """A cube whose faces bulge: sharp edges, and corners where three of them meet."""
+
+    def face(axis, side):
+        def place(u, v):
+            a, b = 2 * u - 1, 2 * v - 1
+            return np.roll(np.stack([side * (1 + 0.25 * (1 - a * a) * (1 - b * b)), side * a, b]), axis, axis=0)
+
+        return patch(place, n, n)
+
+    return together([face(axis, side) for axis in range(3) for side in (1, -1)])
+
+
 def sierpinski_tetrahedron(depth):
     """The faces of the 4^depth tetrahedra of side 2^-depth."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0], [0.5, np.sqrt(3) / 6, np.sqrt(2 / 3)]])
@@ -386,6 +432,9 @@ SHAPES = {
     "mobius": lambda: mobius(256, 32),
     "enneper": lambda: enneper(128, 128),
     "bumpy": lambda: bumpy(192, 96),
+    "lens": lambda: lens(128, 48),
+    "drum": lambda: drum(128, 48),
+    "cushion": lambda: cushion(48),
 }
 MAIN = list(SHAPES)[:8]
 
