@@ -83,7 +83,7 @@ pub(super) fn surface(
             continue;
         }
         budget.cancel.check()?;
-        let made = along(&skin, setting, &round, budget)?;
+        let made = along(&Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer }, setting, &round, budget)?;
         if made.is_some() {
             return Ok(made);
         }
@@ -92,12 +92,11 @@ pub(super) fn surface(
 }
 
 /// The same, given the surface with its seams.
-fn along(skin: &Skin, setting: &Setting, round: &(impl Fn(f64) -> f64 + Sync), budget: &Budget) -> Result<Option<Flat>, Stopped> {
-    let [inner, outer] = [setting.least + setting.slack, setting.outer - setting.slack];
+fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + Sync), budget: &Budget) -> Result<Option<Flat>, Stopped> {
+    let Around { skin, faces, inner, outer } = *around;
     let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
-    let around = Around { skin, faces: &Faces::new(skin.faces()), inner, outer };
     budget.cancel.check()?;
-    let ways = Ways::new(skin, around.faces, [inner, outer]);
+    let ways = Ways::new(skin, faces, [inner, outer]);
     let (off, reach) = (setting.off + setting.slack, setting.reach);
     let is_steady = setting.off > 0.0 && inner <= reach - off && reach + 2.0 * off <= outer && ways.lead_out(off, budget)?;
     if !is_steady && !ways.lead_out(0.0, budget)? {
@@ -107,7 +106,7 @@ fn along(skin: &Skin, setting: &Setting, round: &(impl Fn(f64) -> f64 + Sync), b
     let Some(valleys) = skin.seams.valleys(skin, radius) else {
         return Ok(None);
     };
-    let hidden = skin.hidden(&valleys, around.faces, radius, half);
+    let hidden = skin.hidden(&valleys, faces, radius, half);
     let [row, column] = [[SIDE, RIM], [FACET, SIDE]].map(|[near, far]| 2.0 * (at(near) / at(far)).acos());
     let fold = 2.0 * (at(-TURNED) / radius).acos();
     let first: Vec<f64> = skin.cosines.iter().map(|cosine| (BOTH * half - radius * (1.0 - cosine)).min(OFF * half)).collect();

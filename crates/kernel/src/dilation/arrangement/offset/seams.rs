@@ -139,7 +139,7 @@ impl Seams {
                 let (a, b) = (own[k], other[if is_aligned { 1 - k } else { k }]);
                 let [up, other_up] = [(normal, a), (other_normal, b)].map(|(normal, vertex)| dot(normal, &ups[vertex as usize]) > 0.0);
                 for is_above in [true, false] {
-                    let (one, another) = ((a, up == is_above), (b, (other_up == is_above) == is_aligned));
+                    let [one, another] = across([a, b], [up, other_up], is_aligned, is_above);
                     next.entry(one).or_default().push((another, is_hollow == is_above));
                     next.entry(another).or_default().push((one, is_hollow == is_above));
                 }
@@ -269,6 +269,11 @@ impl Hidden {
             self.all.push(vertex);
         }
     }
+}
+
+/// The corners of both parts at an end of a seam that are on the side of the first one's triangle where its normal is, or on the other one: given whether the triangles' normals are up there, and whether they are on one side.
+pub(super) fn across([one, other]: [u32; 2], [up, other_up]: [bool; 2], is_aligned: bool, is_above: bool) -> [Corner; 2] {
+    [(one, up == is_above), (other, (other_up == is_above) == is_aligned)]
 }
 
 /// A place moved the least way that leads up to three directions by some lengths; none where these are nearly dependent.

@@ -1,7 +1,7 @@
 //! Both sheets of a surface, strips around its border that join them, and strips along its seams that join those of its parts.
 
 use super::coarse::lifted;
-use super::seams::{Corner, Ring, Valleys};
+use super::seams::{Corner, Ring, Valleys, across};
 use super::skin::{Skin, edges};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::dilation::surface::NameMap;
@@ -196,7 +196,7 @@ impl Sheets {
             for is_above in [true, false] {
                 let corners = [0, 1].map(|k| {
                     let j = if is_aligned { 1 - k } else { k };
-                    [(ends[k], is_up[k] == is_above), (others[j], (other_up[j] == is_above) == is_aligned)]
+                    across([ends[k], others[j]], [is_up[k], other_up[j]], is_aligned, is_above)
                 });
                 let is_hollow = |corner: &Corner| {
                     skin.seams
@@ -232,13 +232,13 @@ impl Sheets {
         for (ring, top) in ends {
             let &[one, other] = ring.corners.as_slice() else { return None };
             let below = [one, other].map(|(foot, is_up)| (foot, !is_up));
-            let across = column(self, below);
-            let own = self.ends_at_border(skin, ring, outward, [top, across[0], *across.last()?], shape, round)?;
+            let arc = column(self, below);
+            let own = self.ends_at_border(skin, ring, outward, [top, arc[0], *arc.last()?], shape, round)?;
             let [first, last] = &own;
             // What both have in common ends where they do.
             let shared = first.iter().zip(last).take_while(|(a, b)| a == b).count();
             let mut around = first[shared - 1..first.len() - 1].to_vec();
-            around.extend_from_slice(&across);
+            around.extend_from_slice(&arc);
             around.extend(last[shared..last.len() - 1].iter().rev());
             self.fill(skin, one.0, &around, shape, round);
             for ((foot, is_up), mut rows) in ring.corners.iter().zip(own) {

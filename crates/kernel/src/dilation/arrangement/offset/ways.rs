@@ -8,6 +8,7 @@ use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtr
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::{Body, lowest, middle};
 use crate::dilation::arrangement::faces::{Face, Faces};
+use crate::dilation::arrangement::polytopes::frame;
 use crate::dilation::convex::Convex;
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::topology::Incidence;
@@ -138,8 +139,7 @@ impl<'a> Ways<'a> {
         let Skin { triangles, normals, around, .. } = self.skin;
         let first = normals[group[0] as usize];
         let aligned = |normal: &Point| if dot(normal, &first) < 0.0 { normal.map(|part| -part) } else { *normal };
-        let sum = group.iter().map(|&face| aligned(&normals[face as usize]));
-        let up = unit(&sum.fold([0.0; 3], |sum: Point, normal| std::array::from_fn(|axis| sum[axis] + normal[axis])));
+        let up = mean(group.iter().map(|&face| aligned(&normals[face as usize])));
         let corners = group.iter().flat_map(|&face| triangles[face as usize]);
         let normals = corners.clone().flat_map(|corner| around.at(corner)).map(|&face| &normals[face as usize]);
         let cosine = normals.map(|normal| dot(normal, &up).abs()).fold(1.0, f64::min) - NOISE;
@@ -147,10 +147,8 @@ impl<'a> Ways<'a> {
         if cosine < FRAC_1_SQRT_2 {
             return false;
         }
-        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let places: Vec<Point> = corners.map(|corner| self.skin.places[corner as usize]).collect();
-        let cone = Cone { axis: up, cosine, sine };
-        [cone.axis, up.map(|part| -part)].into_iter().all(|axis| self.lead_along(&places, &Cone { axis, ..cone }))
+        [up, up.map(|part| -part)].into_iter().all(|axis| self.lead_along(&places, &Cone::new(axis, cosine)))
     }
 
     /// Whether it is so of the places that what is between some of a surface is closest to, in the directions of a cone: of all together, or of the parts of a side or a triangle.
@@ -173,7 +171,7 @@ impl<'a> Ways<'a> {
         if let [a, b, c, d] = ways {
             return [[*a, *b, *c], [*a, *c, *d]].iter().all(|half| self.lead_apart(places, half, [from, to]));
         }
-        let axis = unit(&ways.iter().fold([0.0; 3], |sum: Point, way| std::array::from_fn(|k| sum[k] + way[k])));
+        let axis = mean(ways.iter().copied());
         // What is between directions is that much shorter at most.
         let cosine = ways.iter().map(|way| dot(way, &axis)).fold(1.0, f64::min);
         if cosine < FRAC_1_SQRT_2 {
@@ -184,8 +182,7 @@ impl<'a> Ways<'a> {
         let part = Part::of(&all.collect::<Vec<Point>>());
         if part.wide > self.outer {
             // What is wide beside the distances has no direction of its own, but most of a large face has that of all.
-            let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-            if self.lead_at_once(places, &Cone { axis, cosine: cosine - NOISE, sine: sine + NOISE }) {
+            if self.lead_at_once(places, &Cone::new(axis, cosine - NOISE)) {
                 return true;
             }
         } else {
@@ -236,10 +233,9 @@ impl<'a> Ways<'a> {
                 return true;
             }
             let all: Vec<Point> = all.iter().map(|&other| along(other, side)).collect();
-            let axis = unit(&all.iter().fold([0.0; 3], |sum: Point, way| std::array::from_fn(|k| sum[k] + way[k])));
+            let axis = mean(all.iter().copied());
             let cosine = all.iter().map(|way| dot(way, &axis)).fold(1.0, f64::min) - NOISE;
-            let cone = Cone { axis, cosine, sine: (1.0 - cosine * cosine).max(0.0).sqrt() };
-            cosine > FRAC_1_SQRT_2 && self.lead_apart(&[at[k]], &cone.around(), between)
+            cosine > FRAC_1_SQRT_2 && self.lead_apart(&[at[k]], &Cone::new(axis, cosine).around(), between)
         };
         [1.0, -1.0].into_iter().all(|side: f64| {
             self.lead_apart(&at, &[along(face, side)], between)
@@ -405,16 +401,23 @@ impl<'a> Ways<'a> {
 }
 
 impl Cone {
+    fn new(axis: Point, cosine: f64) -> Self {
+        Self { axis, cosine, sine: (1.0 - cosine * cosine).max(0.0).sqrt() }
+    }
+
     /// Directions that all of it is between, if it is no wider than a right angle.
     fn around(&self) -> [Point; 4] {
         let Self { axis, cosine, sine } = self;
-        let least = (0..3).min_by(|&p, &q| axis[p].abs().total_cmp(&axis[q].abs())).unwrap_or_default();
-        let first = unit(&cross(axis, &std::array::from_fn(|k| f64::from(u8::from(k == least)))));
-        let second = cross(axis, &first);
+        let [first, second, _] = frame(axis);
         let tangent = sine / cosine;
         [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]
             .map(|[p, q]| unit(&std::array::from_fn(|k| axis[k] + tangent * (p * first[k] + q * second[k]))))
     }
+}
+
+/// The direction between some.
+fn mean(ways: impl Iterator<Item = Point>) -> Point {
+    unit(&ways.fold([0.0; 3], |sum: Point, way| std::array::from_fn(|k| sum[k] + way[k])))
 }
 
 /// Which side of a polygon is longest, and how long it is.
@@ -470,7 +473,7 @@ fn cones() -> Vec<Cone> {
             let corners = [at(i, j), at(i + 1.0, j), at(i, j + 1.0), at(i + 1.0, j + 1.0)];
             // The part is the hull of its corners in directions, of which one is farthest.
             let cosine = corners.iter().map(|corner| dot(corner, &axis)).fold(1.0, f64::min) - NOISE;
-            cones.push(Cone { axis, cosine, sine: (1.0 - cosine * cosine).sqrt() });
+            cones.push(Cone::new(axis, cosine));
         }
     }
     cones
