@@ -15,6 +15,9 @@ use crate::solid::Inside;
 const STEPS: usize = 6;
 const DEPTHS: [f64; 2] = [0.03, 0.001];
 
+/// Two bodies one of which a step is made to, and then the other, whose directions have no more than this as their product, may be apart.
+const FACING: f64 = -0.3;
+
 /// Dilations of a set are parted where there is no place that is nearer than this to all of them, in units of the slack.
 const LEAST_GAP: f64 = 64.0;
 
@@ -45,6 +48,15 @@ pub(super) enum Common {
     Unknown,
 }
 
+/// Where some bodies are all around a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Hub {
+    At(Point),
+    /// Nowhere: the dilations of these two have no common point.
+    Apart([u32; 2]),
+    Unknown,
+}
+
 /// What is taken for a body.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
@@ -58,12 +70,20 @@ pub(super) enum Kind {
 }
 
 /// A body that is near to a place.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     /// The way to the place from the point of the figure that is closest to it.
     pub(super) way: Point,
     /// How long that is.
     distance: f64,
+    /// How high the place is above the highest plane that the body's dilations are cut by, and that plane's normal.
+    cut: (f64, Point),
+}
+
+impl Default for Near {
+    fn default() -> Self {
+        Self { way: [0.0; 3], distance: 0.0, cut: (f64::NEG_INFINITY, [0.0; 3]) }
+    }
 }
 
 impl Bodies<'_> {
@@ -71,23 +91,37 @@ impl Bodies<'_> {
     #[inline]
     pub(super) fn near(&self, body: u32, x: &Point) -> Near {
         let way = subtract(x, &self.figures[body as usize].closest(x));
-        Near { way, distance: dot(&way, &way).sqrt() }
+        let mut cut = Near::default().cut;
+        for plane in &self.polytopes.of(body).cuts {
+            cut = higher(cut, (height(plane, x), normal(plane)));
+        }
+        Near { way, distance: dot(&way, &way).sqrt(), cut }
     }
 
-    /// How far a place is beyond a body, or less, and where it is within, how far it is from being beyond, or less, as a negative number: a convex function, with a subgradient.
-    pub(super) fn above(&self, kind: Kind, body: u32, x: &Point) -> (f64, Point) {
-        let polytope = self.polytopes.of(body);
-        let Some(radius) = self.radius(kind) else { return top(x, polytope.planes.iter()).unwrap_or((f64::INFINITY, [0.0; 3])) };
-        self.above_near(radius, body, x, &self.near(body, x))
-    }
-
-    /// The same of a body that is a dilation by a radius, cut as it is.
+    /// How far a place is beyond a body, or less, and where it is within, how far it is from being beyond, or less, as a negative number: a convex function, with a subgradient. Given is where the place is from the body.
     #[inline]
-    fn above_near(&self, radius: f64, body: u32, x: &Point, near: &Near) -> (f64, Point) {
-        let Near { way, distance } = *near;
-        let away = if distance > 0.0 { way.map(|part| part / distance) } else { way };
-        let beyond = (distance - self.figures[body as usize].in_space(radius), away);
-        top(x, self.polytopes.of(body).cuts.iter()).filter(|&(height, _)| height > beyond.0).unwrap_or(beyond)
+    pub(super) fn above_at(&self, kind: Kind, body: u32, x: &Point, near: &Near) -> (f64, Point) {
+        let Some(radius) = self.radius(kind) else {
+            return top(x, &self.polytopes.of(body).planes).unwrap_or((f64::INFINITY, [0.0; 3]));
+        };
+        let Near { way, distance, cut } = *near;
+        let beyond = distance - self.figures[body as usize].in_space(radius);
+        if cut.0 > beyond {
+            return cut;
+        }
+        (beyond, if distance > 0.0 { way.map(|part| part / distance) } else { way })
+    }
+
+    /// The same of any place.
+    #[cfg(test)]
+    pub(super) fn above(&self, kind: Kind, body: u32, x: &Point) -> (f64, Point) {
+        self.above_at(kind, body, x, &self.near(body, x))
+    }
+
+    /// How far a place is from being beyond what is inside of all kinds of a body, as a number below 0: it is no less deep in any, and planes of its polytope need not be asked. What is no less tells nothing.
+    #[inline]
+    pub(super) fn above_all(&self, body: u32, x: &Point, near: &Near) -> f64 {
+        self.above_at(Kind::Inner, body, x, near).0
     }
 
     /// The radius of a dilation; none of a polytope.
@@ -101,25 +135,21 @@ impl Bodies<'_> {
         }
     }
 
-    /// The same as [`Bodies::above`] for a cube's centre.
-    fn above_centre(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
-        let of_polytope = || self.above(Kind::Polytope, body, &cube.centre);
-        self.radius(kind).map_or_else(of_polytope, |radius| self.above_near(radius, body, &cube.centre, near))
-    }
-
     /// Whether any kind of a body may have places in a cube.
     pub(super) fn reaches(&self, kinds: &[Kind], body: u32, cube: &Cube, near: &Near) -> bool {
-        kinds.iter().any(|&kind| {
-            let (above, away) = self.above_centre(kind, body, cube, near);
+        let reaches = |kind: Kind| {
+            let (above, away) = self.above_at(kind, body, &cube.centre, near);
             above <= cube.half_along(&away) + 4.0 * self.setting.slack
-        })
+        };
+        // What no polytope reaches needs no planes.
+        kinds.iter().any(|&kind| (!matches!(kind, Kind::Polytope) || reaches(Kind::Outer)) && reaches(kind))
     }
 
     /// Whether a body may have places in one of the parts of a cube, for all that is known of where the cube's centre, `from`, is from it.
     ///
     /// The distance is convex: everywhere it is no less than it grows from there along its gradient. What is dropped is farther from the centre than the radius: so the gradient is known well enough for cubes up to [`STEADY_CUBE`].
     #[inline]
-    pub(super) fn may_reach(&self, body: u32, cube: &Cube, from: &Point, Near { way, distance }: &Near) -> bool {
+    pub(super) fn may_reach(&self, body: u32, cube: &Cube, from: &Point, Near { way, distance, .. }: &Near) -> bool {
         if cube.half > STEADY_CUBE * self.setting.reach {
             return true;
         }
@@ -130,15 +160,19 @@ impl Bodies<'_> {
     /// How high a cube's centre is above a body, or less, with the slope of a linear function that is below it all over the cube, up to the slack. Near to a figure rounding may turn the way from it, and the body is no lower than its radius anywhere.
     pub(super) fn below(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> (f64, Point) {
         let is_steady = near.distance > STEADY * self.setting.reach;
-        let near = if is_steady { *near } else { Near::default() };
-        self.above_centre(kind, body, cube, &near)
+        let near = if is_steady { *near } else { Near { way: [0.0; 3], distance: 0.0, ..*near } };
+        self.above_at(kind, body, &cube.centre, &near)
     }
 
-    /// At least how deep a cube's centre is inside of all kinds of a body, and exactly that but in polyhedra; less than 0 where it is beyond one, and less than `least` where it is less deep, by whatever.
+    /// At least how deep a cube's centre is inside of all kinds of a body, and exactly that but in polyhedra, and where it is deep enough for all of the cube; less than 0 where it is beyond one, and less than `least` where it is less deep, by whatever.
     pub(super) fn depth(&self, kinds: &[Kind], body: u32, cube: &Cube, near: &Near, least: f64) -> f64 {
+        let sure = -self.above_all(body, &cube.centre, near);
+        if sure > cube.half_diagonal() + self.setting.slack {
+            return sure;
+        }
         let mut depth = f64::INFINITY;
         for &kind in kinds {
-            depth = depth.min(-self.above_centre(kind, body, cube, near).0);
+            depth = depth.min(-self.above_at(kind, body, &cube.centre, near).0);
             if depth < least {
                 break;
             }
@@ -148,33 +182,68 @@ impl Bodies<'_> {
 
     /// Whether a place is surely inside of all kinds of a body.
     pub(super) fn is_inside(&self, kinds: &[Kind], body: u32, x: &Point) -> bool {
-        kinds.iter().all(|&kind| self.above(kind, body, x).0 < -self.setting.slack)
+        let (near, most) = (self.near(body, x), -self.setting.slack);
+        self.above_all(body, x, &near) < most || kinds.iter().all(|&kind| self.above_at(kind, body, x, &near).0 < most)
     }
 
-    /// How far a place is beyond the one of some bodies that it is farthest from, as [`Bodies::above`] tells.
-    fn farthest(&self, kind: Kind, set: &[u32], x: &Point) -> Option<(f64, Point)> {
-        set.iter().map(|&body| self.above(kind, body, x)).reduce(higher)
+    /// Whether a body may be around all of a cube, as far as the linear function tells that is below it and touches it at the cube's centre: it is highest at a corner.
+    #[inline]
+    pub(super) fn may_hold(&self, kind: Kind, body: u32, cube: &Cube, near: &Near) -> bool {
+        let (above, away) = self.above_at(kind, body, &cube.centre, near);
+        above + cube.half_along(&away) < 0.0
     }
 
-    /// A place inside of all kinds of some bodies, if one is met on the way from x, step by step to where the one that it is farthest from is.
-    pub(super) fn hub(&self, kinds: &[Kind], set: &[u32], mut x: Point) -> Option<Point> {
+    /// How far a place is beyond the one of some bodies that it is farthest from, as [`Bodies::above_at`] tells, of the first kind of which that is no less than something; and which one that is.
+    fn beyond(&self, kinds: &[Kind], set: &[u32], x: &Point, least: f64) -> Option<(f64, (Point, u32))> {
+        kinds.iter().find_map(|&kind| {
+            let above = |&body: &u32| {
+                let near = self.near(body, x);
+                if matches!(kind, Kind::Polytope) && self.above_all(body, x, &near) < least.min(0.0) {
+                    return None;
+                }
+                let (above, away) = self.above_at(kind, body, x, &near);
+                Some((above, (away, body)))
+            };
+            set.iter().filter_map(above).reduce(higher).filter(|&(above, _)| above >= least)
+        })
+    }
+
+    /// How far a place is beyond the one of some dilations that it is farthest from.
+    fn farthest(&self, set: &[u32], x: &Point) -> (f64, Point) {
+        let beyond = self.beyond(&[Kind::Dilation], set, x, f64::NEG_INFINITY);
+        beyond.map_or((0.0, [0.0; 3]), |(above, (away, _))| (above, away))
+    }
+
+    /// A place inside of all kinds of some bodies, if one is met on the way from x, step by step to where the one that it is farthest from is. Dilations are the first kind.
+    pub(super) fn hub(&self, kinds: &[Kind], set: &[u32], mut x: Point) -> Hub {
         let Setting { reach, slack, .. } = *self.setting;
         let mut depth = DEPTHS[0] * reach;
+        let mut last: Option<(Point, u32)> = None;
         for _ in 0..STEPS {
-            let beyond = |&kind: &Kind| self.farthest(kind, set, &x).filter(|&(above, _)| above >= -slack);
-            let Some((above, away)) = kinds.iter().find_map(beyond) else { return Some(x) };
+            let Some((above, (away, body))) = self.beyond(kinds, set, &x, -slack) else { return Hub::At(x) };
+            if let Some((before, other)) = last.filter(|(before, _)| dot(before, &away) < FACING)
+                && self.are_apart(kinds[0], [other, body], &unit(&subtract(&before, &away)))
+            {
+                return Hub::Apart([other, body]);
+            }
+            last = Some((away, body));
             x = std::array::from_fn(|axis| x[axis] - (above + depth) * away[axis]);
             depth = (0.5 * depth).max(DEPTHS[1] * reach);
         }
-        None
+        Hub::Unknown
+    }
+
+    /// Whether planes across a direction show that dilations of two bodies have no common point, that of the first being below and the other's above.
+    fn are_apart(&self, kind: Kind, bodies: [u32; 2], direction: &Point) -> bool {
+        let radius = self.radius(kind).unwrap_or(f64::INFINITY);
+        let [first, second] = bodies.map(|body| &self.figures[body as usize]);
+        let gap = -second.highest(&direction.map(|part| -part)) - first.highest(direction);
+        gap > first.in_space(radius) + second.in_space(radius) + self.setting.slack
     }
 
     /// Where in a box all kinds of some bodies have a common point: with some room around it, or with some to spare.
     pub(super) fn common(&self, kinds: &[Kind], set: &[u32], within: [Point; 2], spare: f64) -> Place {
-        common_point(within, |x| {
-            let beyond = |&kind: &Kind| self.farthest(kind, set, x).filter(|&(above, _)| above > spare);
-            kinds.iter().find_map(beyond).map(|(above, away)| (above - spare, away))
-        })
+        common_point(within, |x| self.beyond(kinds, set, x, spare).map(|(above, (away, _))| (above - spare, away)))
     }
 
     /// Whether the dilations of a set have a common point.
@@ -197,7 +266,7 @@ impl Bodies<'_> {
         if part(known) {
             return Vec::new();
         }
-        let lowest = lowest(within, |x| self.farthest(Kind::Dilation, set, x).unwrap_or((0.0, [0.0; 3])));
+        let lowest = lowest(within, |x| self.farthest(set, x));
         let Some((x, gap)) = lowest.filter(|&(_, gap)| gap > LEAST_GAP * slack) else { return Vec::new() };
         let plane = |(place, &body): (usize, &u32)| {
             let figure = &self.figures[body as usize];
@@ -212,6 +281,14 @@ impl Bodies<'_> {
         let planes: Vec<(u32, Plane)> = set.iter().enumerate().filter_map(plane).collect();
         let all: Vec<Plane> = planes.iter().map(|&(_, plane)| plane).chain(self.cuts(set).copied()).collect();
         if part(&all) { planes } else { Vec::new() }
+    }
+
+    /// For dilations of a set that have a common point: those whose polytopes do not hold the place that is deepest in all; all where it is in all polytopes.
+    pub(super) fn short(&self, set: &[u32]) -> Vec<u32> {
+        let deepest = lowest(self.within(set), |x| self.farthest(set, x));
+        let is_short = |&&body: &&u32| deepest.is_none_or(|(x, _)| !self.is_inside(&[Kind::Polytope], body, &x));
+        let short: Vec<u32> = set.iter().filter(is_short).copied().collect();
+        if short.is_empty() { set.to_vec() } else { short }
     }
 
     /// The planes that dilations of a set are cut by.
@@ -251,12 +328,23 @@ pub(super) fn higher<T>(a: (f64, T), b: (f64, T)) -> (f64, T) {
 }
 
 /// How high a place is above the plane of some that it is highest above, and the plane's normal.
-fn top<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>) -> Option<(f64, Point)> {
-    let top = planes.map(|plane| (height(plane, x), plane)).reduce(higher);
-    top.map(|(height, plane)| (height, normal(plane)))
+fn top(x: &Point, planes: &[Plane]) -> Option<(f64, Point)> {
+    let larger = |a: f64, b: f64| if b > a { b } else { a };
+    // Four at a time, none of which waits for another; and which one it was is asked once the height is known.
+    let (fours, rest) = planes.as_chunks::<4>();
+    let mut top = f64::NEG_INFINITY;
+    for [a, b, c, d] in fours {
+        top = larger(top, larger(larger(height(a, x), height(b, x)), larger(height(c, x), height(d, x))));
+    }
+    for plane in rest {
+        top = larger(top, height(plane, x));
+    }
+    let plane = planes.iter().find(|plane| height(plane, x) == top)?;
+    Some((top, normal(plane)))
 }
 
-/// The same, if it is higher than something, and by how much.
+/// The same of planes from several bodies, if it is higher than something, and by how much.
 pub(super) fn highest<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>, than: f64) -> Option<(f64, Point)> {
-    top(x, planes).filter(|&(height, _)| height > than).map(|(height, normal)| (height - than, normal))
+    let top = planes.map(|plane| (height(plane, x), plane)).reduce(higher).filter(|&(height, _)| height > than);
+    top.map(|(height, plane)| (height - than, normal(plane)))
 }

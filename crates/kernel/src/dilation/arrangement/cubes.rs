@@ -3,7 +3,7 @@
 //! That is up to the bodies that reach a cube. Of most cubes one body holds it all, or a place, a *hub*, is inside of all bodies: both settle a cube as a whole, with all sets of bodies there.
 //! Rounding may leave a crack between cubes; it is narrower than the slack that is asked to spare wherever something is told of a cube, so that places in it are told of, too.
 
-use super::bodies::{AXES, Bodies, Common, Kind, Near, STEADY_CUBE};
+use super::bodies::{AXES, Bodies, Common, Hub, Kind, Near, STEADY_CUBE};
 use super::ellipsoid::Place;
 use super::figure::{Figure, box_of};
 use crate::attractor::cell::{Point, between, dot, subtract};
@@ -168,6 +168,8 @@ pub(super) struct Search<'a> {
     /// Of every body of a cube the hubs in it, bit by bit, and how many hubs there are.
     hubs: Vec<u64>,
     count: u32,
+    /// Two bodies whose dilations have no common point: they have no hub, nor have any with both in smaller cubes.
+    apart: Option<[u32; 2]>,
     /// Cubes that were looked at in the part.
     cubes: usize,
     found: Found,
@@ -198,7 +200,21 @@ impl<'a> Search<'a> {
     pub(super) fn new(bodies: &'a Bodies<'a>, stage: &'static Stage) -> Self {
         let (known, listed, near, hubs) = (NameMap::default(), Vec::new(), Vec::new(), Vec::new());
         let (depths, above) = (Vec::new(), Vec::new());
-        Self { bodies, stage, due: None, known, listed, near, depths, above, hubs, count: 0, cubes: 0, found: Found::default() }
+        Self {
+            bodies,
+            stage,
+            due: None,
+            known,
+            listed,
+            near,
+            depths,
+            above,
+            hubs,
+            count: 0,
+            apart: None,
+            cubes: 0,
+            found: Found::default(),
+        }
     }
 
     /// Looks at a part of space.
@@ -235,11 +251,15 @@ impl<'a> Search<'a> {
                 self.near.push(near);
             }
         }
+        let known = self.apart;
         if !self.is_settled(cube, to) {
+            let apart = self.apart;
             for number in 0..8 {
+                self.apart = apart;
                 self.look(&cube.part(number), to, &cube.centre, budget)?;
             }
         }
+        self.apart = known;
         self.listed.truncate(to);
         self.near.truncate(to);
         Ok(())
@@ -256,9 +276,17 @@ impl<'a> Search<'a> {
             if is_covered(bodies, inside, cube, list, near, &mut self.depths) {
                 return true;
             }
-            let sum = near.iter().fold([0.0; 3], |sum: Point, near| std::array::from_fn(|axis| sum[axis] + near.way[axis]));
-            let middle = subtract(&cube.centre, &sum.map(|part| part / list.len() as f64));
-            if (list.len() <= MANY && bodies.hub(inside, list, middle).is_some()) || is_in_a_solid(bodies, cube) {
+            let are_apart = self.apart.is_some_and(|apart| apart.iter().all(|body| list.contains(body)));
+            if list.len() <= MANY && !are_apart {
+                let sum = near.iter().fold([0.0; 3], |sum: Point, near| std::array::from_fn(|axis| sum[axis] + near.way[axis]));
+                let middle = subtract(&cube.centre, &sum.map(|part| part / list.len() as f64));
+                match bodies.hub(inside, list, middle) {
+                    Hub::At(_) => return true,
+                    Hub::Apart(apart) => self.apart = Some(apart),
+                    Hub::Unknown => {}
+                }
+            }
+            if is_in_a_solid(bodies, cube) {
                 return true;
             }
         }
@@ -453,8 +481,11 @@ impl<'a> Search<'a> {
 impl Stage {
     /// What is known of a set, of which all are near to a place, wherever it is.
     fn known(&self, bodies: &Bodies<'_>, set: &[u32], near: &Point) -> Known {
-        if let Some(x) = bodies.hub(self.inside, set, *near) {
-            return Known::Meet(x);
+        match bodies.hub(self.inside, set, *near) {
+            Hub::At(x) => return Known::Meet(x),
+            // Of the last stage the first kind is the dilation by the radius.
+            Hub::Apart(_) => return Known::Doubtful(if self.is_last { Common::None } else { Common::Unknown }),
+            Hub::Unknown => {}
         }
         match bodies.common(self.inside, set, bodies.within(set), -bodies.setting.slack) {
             Place::At(x) => Known::Meet(x),
@@ -482,9 +513,11 @@ pub(super) fn is_covered(bodies: &Bodies<'_>, kinds: &[Kind], cube: &Cube, list:
         }
         depths.push(depth);
     }
-    let may_hold = list.iter().zip(depths).filter(|(_, depth)| **depth >= cube.half);
+    let mut may_hold = list.iter().zip(near).zip(depths).filter(|(_, depth)| **depth >= cube.half).map(|(body, _)| body);
     // What is convex and holds the corners holds all.
-    may_hold.into_iter().any(|(&body, _)| cube.corners().all(|corner| bodies.is_inside(kinds, body, &corner)))
+    may_hold.any(|(&body, near)| {
+        bodies.may_hold(kinds[0], body, cube, near) && cube.corners().all(|corner| bodies.is_inside(kinds, body, &corner))
+    })
 }
 
 /// Whether all of a cube is inside of a solid.

@@ -227,8 +227,9 @@ impl<'a> Engine<'a> {
                     sites.iter().any(|&site| is_cut[site as usize])
                 }
                 Common::Some => {
-                    sites.iter().for_each(|&site| next[site as usize].is_around = true);
-                    sites.iter().any(|&site| !self.states[site as usize].is_around)
+                    let short = self.bodies().short(sites);
+                    short.iter().for_each(|&site| next[site as usize].is_around = true);
+                    short.iter().any(|&site| !self.states[site as usize].is_around)
                 }
                 _ => false,
             };

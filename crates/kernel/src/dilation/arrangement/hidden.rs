@@ -1,6 +1,6 @@
 //! Whether some bodies' common points are all within others, or in solids: told by halving boxes.
 
-use super::bodies::{AXES, Bodies, Common, Kind, common_box};
+use super::bodies::{AXES, Bodies, Common, Kind, common_box, higher};
 use super::cubes::Cube;
 use super::ellipsoid::is_empty;
 use super::figure::Polygon;
@@ -8,6 +8,8 @@ use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
 use crate::dilation::plan::Setting;
 use glam::DVec3;
 
+/// What bodies are taken for.
+const KINDS: [Kind; 2] = [Kind::Dilation, Kind::Polytope];
 /// Boxes at most, and halvings of one, that are looked at for places that are not hidden; of halvings more beside solids, whose faces may be much longer than the radius.
 const MOST_BOXES: usize = 4_000;
 const HALVINGS: usize = 12;
@@ -27,7 +29,7 @@ impl Bodies<'_> {
         let corners: Vec<Point> = cube.corners().collect();
         let mut boxes = Boxes { set, cube, axes: self.axes(set[0]), kind: Kind::Dilation, left: MOST_BOXES, looked: 0 };
         let halvings = if self.solids.is_empty() { HALVINGS } else { HALVINGS_IN_SOLIDS };
-        let is_hidden = [Kind::Dilation, Kind::Polytope].into_iter().all(|kind| {
+        let is_hidden = KINDS.into_iter().all(|kind| {
             boxes.kind = kind;
             let of_polytope = |body: u32| (&*self.polytopes.of(body).corners, slack);
             let part = |&body: &u32| if matches!(kind, Kind::Polytope) { of_polytope(body) } else { self.around(body, reach + slack) };
@@ -71,9 +73,17 @@ impl Bodies<'_> {
         }
         let mut highest = f64::NEG_INFINITY;
         for &body in boxes.set {
-            let (above, away) = self.above(boxes.kind, body, &centre);
-            if above > half_along(&away) {
-                return true;
+            let near = self.near(body, &centre);
+            let mut above = self.above_all(body, &centre, &near);
+            if above >= 0.0 {
+                // Where no polytope is, planes need not be asked.
+                for kind in [Kind::Outer, boxes.kind] {
+                    let away;
+                    (above, away) = self.above_at(kind, body, &centre, &near);
+                    if above > half_along(&away) {
+                        return true;
+                    }
+                }
             }
             highest = highest.max(above);
         }
@@ -90,17 +100,30 @@ impl Bodies<'_> {
         let corner = |number: usize| boxes.place(&std::array::from_fn(|axis| if number >> axis & 1 == 1 { high[axis] } else { low[axis] }));
         let (mut left, mut deepest) = (Vec::new(), f64::INFINITY);
         for &body in around {
-            let [own, of_polytope] = [Kind::Dilation, Kind::Polytope].map(|kind| self.above(kind, body, &centre));
-            if own.0 >= half_along(&own.1) || of_polytope.0 >= half_along(&of_polytope.1) {
-                continue;
-            }
-            let above = own.0.max(of_polytope.0);
-            // What is convex and holds the corners holds all.
-            if above < -half
-                || (above < -slack && (0..8).all(|number| self.is_inside(&[Kind::Dilation, Kind::Polytope], body, &corner(number))))
-            {
+            let near = self.near(body, &centre);
+            // What is convex and holds the corners holds all, and at one of them it is as high as a linear function below it, or higher.
+            let holds = |(above, away): (f64, Point)| {
+                above < -half
+                    || (above < -slack
+                        && above + half_along(&away) < 0.0
+                        && (0..8).all(|number| self.is_inside(&KINDS, body, &corner(number))))
+            };
+            if holds(self.above_at(Kind::Inner, body, &centre, &near)) {
                 return true;
             }
+            let mut top = (f64::NEG_INFINITY, [0.0; 3]);
+            let reaches = KINDS.into_iter().all(|kind| {
+                let own = self.above_at(kind, body, &centre, &near);
+                top = higher(top, own);
+                own.0 < half_along(&own.1)
+            });
+            if !reaches {
+                continue;
+            }
+            if holds(top) {
+                return true;
+            }
+            let above = top.0;
             left.push(body);
             if above < deepest {
                 // Looked at first in the halves: it is likely to hide them.

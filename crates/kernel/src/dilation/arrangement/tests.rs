@@ -1,4 +1,4 @@
-use super::bodies::{Common, Kind, Near};
+use super::bodies::{Common, Hub, Kind, Near};
 use super::cubes::{ANY, Cube, MOST_BODIES, PRESENT, Search, is_covered};
 use super::ellipsoid::Place;
 use super::engine::Engine;
@@ -695,11 +695,11 @@ fn what_is_not_in_doubt_meets() {
     assert!(met.iter().all(|&met| met > 300) && exposed > 15_000, "{met:?} met, {doubtful} in doubt, {exposed} exposed");
 }
 
-/// What is told of a body and a cube from another place: bodies that do not reach it, sets that have no common place in it, and bodies that hold all of it, against places in it.
+/// What is told of a body and a cube from another place: bodies that do not reach it, sets that have no common place in it, or anywhere, and bodies that hold all of it, against places in it.
 #[test]
 fn what_is_told_of_cubes_holds_in_them() {
     let mut random = Random(67);
-    let (mut dropped, mut parted, mut covered) = (0, 0, 0);
+    let (mut dropped, mut parted, mut covered, mut apart) = (0, 0, 0, 0);
     for round in 0..12 {
         let size = 3.0;
         let shape = if round % 2 == 0 {
@@ -748,9 +748,22 @@ fn what_is_told_of_cubes_holds_in_them() {
                             }
                         }
                     }
+                    let is_in = |body: u32, x: &[f64; 3]| stage.inside.iter().all(|&kind| bodies.above(kind, body, x).0 < 0.0);
+                    for _ in 0..4 {
+                        let set: Vec<u32> = (0..2).map(|_| all[(random.next() % all.len() as u64) as usize]).collect();
+                        match bodies.hub(stage.inside, &set, cube.centre) {
+                            Hub::At(x) => assert!(set.iter().all(|&body| is_in(body, &x)), "{round}: {set:?} at {x:?}"),
+                            Hub::Apart(pair) => {
+                                apart += 1;
+                                let place = bodies.common(&stage.inside[..1], &pair, bodies.within(&pair), 0.0);
+                                assert!(!matches!(place, Place::At(_)) && pair.iter().all(|body| set.contains(body)), "{round}: {pair:?}");
+                            }
+                            Hub::Unknown => {}
+                        }
+                    }
                     if is_covered(&bodies, stage.inside, &cube, &all, &near, &mut Vec::new()) {
                         covered += 1;
-                        let holds = |&body: &u32| places.iter().all(|x| bodies.is_inside(stage.inside, body, x));
+                        let holds = |&body: &u32| places.iter().all(|x| is_in(body, x));
                         assert!(all.iter().any(holds), "{round}: nothing holds {cube:?}");
                     }
                 }
@@ -758,6 +771,7 @@ fn what_is_told_of_cubes_holds_in_them() {
         });
     }
     assert!(dropped > 5_000 && parted > 5_000 && covered > 200, "{dropped} dropped, {parted} parted, {covered} covered");
+    assert!(apart > 1_000, "{apart} apart");
 }
 
 /// Two rods across each other, seen from cubes with their centres on one of them up to rounding, where the way from it is noise: what is told of them there does not part them.
