@@ -189,10 +189,10 @@ impl AttractorError {
     }
 }
 
-/// Roots for the triangles of what was drawn, given the state of triangles.
-fn triangles_of(drawn: &Tessellation, state: StateId) -> impl Iterator<Item = Root> {
-    let corner = |&index: &u32| drawn.vertices[index as usize].extend(1.0).to_array();
-    drawn.triangles.iter().map(move |corners| Root { state, points: corners.iter().map(corner).collect(), rational: false, solid: None })
+/// Roots for triangles, given their state.
+fn roots_of(vertices: &[DVec3], triangles: &[[u32; 3]], state: StateId) -> impl Iterator<Item = Root> {
+    let corner = |&index: &u32| vertices[index as usize].extend(1.0).to_array();
+    triangles.iter().map(move |corners| Root { state, points: corners.iter().map(corner).collect(), rational: false, solid: None })
 }
 
 /// How far what was drawn is from the shape, rounding included, in mm.
@@ -336,7 +336,7 @@ impl Attractor {
         let mut roots: Vec<Root> = uncut.iter().map(|&root| self.roots[root].clone()).collect();
         let triangle = |state: &State| state.leaf == LeafPrimitive::Simplex && state.dimension == 3;
         let state = self.automaton.states().iter().position(triangle).map(StateId::new);
-        roots.extend(state.into_iter().flat_map(|state| triangles_of(&drawn, state)));
+        roots.extend(state.into_iter().flat_map(|state| roots_of(&drawn.vertices, &drawn.triangles, state)));
         let deviation = deviation_of(&drawn);
         let mut solids = self.solids.clone();
         for solid in &mut solids {
@@ -356,16 +356,21 @@ impl Attractor {
         self.solids.is_empty() && !self.has_own_radii() && self.roots.iter().all(is_face) && are_whole()
     }
 
-    /// Such a surface as triangles that have their corners in common where cells have, with its Hausdorff distance from this one, at most; none where that is no attractor.
+    /// Such a surface as triangles that have their corners in common where cells have, with its Hausdorff distance from this one, at most.
     ///
     /// # Errors
     /// [`RefineError`], of drawing them.
-    pub(crate) fn drawn(&self, tolerance: Tolerance, budget: &Budget) -> Result<Option<(Self, f64)>, RefineError> {
+    pub(crate) fn drawn(&self, tolerance: Tolerance, budget: &Budget) -> Result<(TriMesh, f64), RefineError> {
         let drawn = complex::refine(self, &(0..self.roots.len()).collect::<Vec<usize>>(), None, tolerance, budget)?;
-        let roots = triangles_of(&drawn, StateId::new(0)).collect();
-        let triangles =
-            Automaton::new(vec![State::simplex(3)]).ok().and_then(|automaton| Self::new(automaton, roots, Vec::new(), Vec::new()).ok());
-        Ok(triangles.map(|triangles| (triangles, deviation_of(&drawn))))
+        let deviation_mm = deviation_of(&drawn);
+        Ok((TriMesh { vertices: drawn.vertices, triangles: drawn.triangles }, deviation_mm))
+    }
+
+    /// Triangles as an attractor; none where they are no such.
+    pub(crate) fn of_triangles(mesh: &TriMesh) -> Option<Self> {
+        let automaton = Automaton::new(vec![State::simplex(3)]).ok()?;
+        let roots = roots_of(&mesh.vertices, &mesh.triangles, StateId::new(0)).collect();
+        Self::new(automaton, roots, Vec::new(), Vec::new()).ok()
     }
 
     /// The trimmed surface that a root belongs to.

@@ -2,6 +2,7 @@
 
 use super::DilationError;
 use super::plan::{Balls, Meant, Plan};
+use super::unfold::unfolded;
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Limits};
 use crate::measure::bounds::{bounding_box, dilated_box};
@@ -16,6 +17,9 @@ const GRADE_SHARE: f64 = 0.4;
 
 /// Share of the tolerance that triangles which stand for smooth surfaces may use.
 const SMOOTH_SHARE: f64 = 0.2;
+
+/// Share of it by which they may move where they turn back.
+const UNFOLDED_SHARE: f64 = 0.2;
 
 /// Cells of a smooth surface at most: in any case, and for each square of the radius times the tolerance in half of the box around. With no radius of curvature below that of the ball a cell that is off by a fifth of the tolerance has about one such square; rough surfaces have more.
 const FEW_CELLS: f64 = 10_000.0;
@@ -90,7 +94,10 @@ impl Drawn {
         let cells = (FEW_CELLS + CELLS_PER_SQUARE * (x * y + y * z + z * x) / (radius * aimed)) as u64;
         let limits = Limits { cells: cells.min(budget.limits.memory_bytes / BYTES_PER_CELL).min(budget.limits.cells), ..budget.limits };
         let drawn = attractor.drawn(share, &Budget { limits, ..budget.clone() }).map_err(|error| refused(error, SMOOTH_SHARE));
-        let Some((attractor, deviation_mm)) = unless_stopped(drawn)? else { return Ok(None) };
+        let Some((mesh, deviation_mm)) = unless_stopped(drawn.map(Some))? else { return Ok(None) };
+        let (mesh, moved) = unfolded(mesh, UNFOLDED_SHARE * aimed);
+        let deviation_mm = deviation_mm + moved;
+        let Some(attractor) = Attractor::of_triangles(&mesh) else { return Ok(None) };
         let Ok(rest) = Tolerance::new(aimed - deviation_mm) else { return Ok(None) };
         let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius) };
         Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest }))

@@ -50,6 +50,7 @@ mod star;
 mod stitch;
 mod surface;
 mod tree;
+mod unfold;
 mod wall;
 
 use crate::attractor::Attractor;

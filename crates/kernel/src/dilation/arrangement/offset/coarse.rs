@@ -33,6 +33,8 @@ pub(super) struct Coarse<'a> {
     height: f64,
     mesh: HalfEdges,
     mender: Mender,
+    /// Triangles one of whose sheets looks the other way, as a surface has where it bends by more than the distance over less than may be off: they may become such ones, until they are gone.
+    inverted: Vec<bool>,
     /// The first vertex that is gone and that a triangle stands for, and the next one of each.
     first: Vec<u32>,
     next: Vec<u32>,
@@ -74,6 +76,10 @@ impl Fresh {
             Self::Triangle(own) => own.error(skin, radius, vertex),
             Self::Side(own) => own.error(skin, radius, vertex),
         }
+    }
+
+    fn is_inverted(&self) -> bool {
+        matches!(self, Self::Triangle(own) if own.is_inverted)
     }
 
     fn sag(&self) -> f64 {
@@ -146,10 +152,12 @@ struct Triangle {
     normal: Point,
     sheets: [(Point, Point); 2],
     sag: f64,
+    /// Whether one of these is not along it.
+    is_inverted: bool,
 }
 
 impl Triangle {
-    /// None where it is a sliver, lower than a share of its longest side, or is not along both sheets.
+    /// None where it is a sliver, lower than a share of its longest side, or leans from its corners' normals.
     fn new(skin: &Skin, radius: f64, height: f64, corners: [u32; 3]) -> Option<Self> {
         let places = corners.map(|corner| skin.places[corner as usize]);
         let across = |[a, b, c]: &[Point; 3]| cross(&subtract(b, a), &subtract(c, a));
@@ -165,14 +173,12 @@ impl Triangle {
             return None;
         }
         let mut sheets = [([0.0; 3], [0.0; 3]); 2];
-        let mut sag = 0.0_f64;
+        let (mut sag, mut is_inverted) = (0.0_f64, false);
         let ups: [Point; 3] = std::array::from_fn(|k| skin.ups[corners[k] as usize].map(|part| part * cosines[k].signum()));
         for (sheet, side) in sheets.iter_mut().zip([radius, -radius]) {
             let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side));
             let own = unit(&across(&out));
-            if dot(&own, &normal) < LEAST_COSINE {
-                return None;
-            }
+            is_inverted |= dot(&own, &normal) < LEAST_COSINE;
             *sheet = (out[0], own);
             // Of a curve with these normals at its ends.
             for k in 0..3 {
@@ -180,7 +186,7 @@ impl Triangle {
                 sag = sag.max(dot(&subtract(&out[next], &out[k]), &subtract(&ups[next], &ups[k])).abs() / 8.0);
             }
         }
-        Some(Self { corners: places, normal, sheets, sag })
+        Some(Self { corners: places, normal, sheets, sag, is_inverted })
     }
 
     /// How far inside a place is, seen along the normal: the least of its shares in the corners.
@@ -213,8 +219,27 @@ impl<'a> Coarse<'a> {
         let mut mender = Mender::default();
         mender.start(&mesh);
         let (first, next) = (vec![NONE; mesh.triangles() as usize], vec![NONE; skin.places.len()]);
+        let is_inverted = |&corners: &[u32; 3]| Triangle::new(skin, radius, 0.0, corners).is_some_and(|own| own.is_inverted);
+        let mut inverted: Vec<bool> = skin.triangles.iter().map(is_inverted).collect();
+        inverted.resize(first.len(), false);
         let (gone, owners, fresh, normals, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { skin, hidden, radius, turn, height: LEAST_HEIGHT, mesh, mender, first, next, gone, owners, fresh, normals, lengths }
+        Self {
+            skin,
+            hidden,
+            radius,
+            turn,
+            height: LEAST_HEIGHT,
+            mesh,
+            mender,
+            inverted,
+            first,
+            next,
+            gone,
+            owners,
+            fresh,
+            normals,
+            lengths,
+        }
     }
 
     /// Removes vertices as long as no vertex that is gone is farther off a sheet than it may be: first those that are hidden, given what that may be at first. False where one of these stays.
@@ -341,18 +366,20 @@ impl<'a> Coarse<'a> {
 
     /// Whether the star's vertex may move to ring m.
     fn serves(&mut self, m: usize, share: f64, most: &[f64]) -> bool {
-        let Self { skin, hidden, radius, height, mender, gone, owners, fresh, normals, .. } = self;
+        let Self { skin, hidden, radius, height, mender, inverted, gone, owners, fresh, normals, .. } = self;
         let ring = &mender.star.ring;
         let count = ring.len();
         fresh.clear();
         for k in kept(Some(m), count) {
             let corners = [ring[m], ring[k], ring[(k + 1) % count]];
             let Some(own) = Fresh::new(skin, *radius, *height, corners) else { return false };
-            if matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0) {
+            let is_turned = matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0);
+            // What has a hidden corner will not be left as it is, nor will what is inverted.
+            let has_hidden = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);
+            let is_passing = has_hidden || own.is_inverted();
+            if is_turned || (is_passing && !has_hidden && !inverted[(mender.star.halves[k] / 3) as usize]) {
                 return false;
             }
-            // What has a hidden corner will not be left as it is.
-            let is_passing = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);
             let is_off = |&corner: &u32| corner != skin.beyond() && own.sag() > share * most[corner as usize];
             if !is_passing && corners.iter().any(is_off) {
                 return false;
@@ -370,11 +397,12 @@ impl<'a> Coarse<'a> {
     }
 
     fn collapse(&mut self, vertex: u32, m: usize) {
-        let Self { mesh, mender, first, next, gone, owners, .. } = self;
+        let Self { mesh, mender, inverted, first, next, gone, owners, fresh: made, .. } = self;
         mesh.collapse(vertex, &mender.star, m);
         let halves = &mender.star.halves;
         halves.iter().for_each(|half| first[(half / 3) as usize] = NONE);
         let fresh: Vec<usize> = kept(Some(m), halves.len()).map(|k| (halves[k] / 3) as usize).collect();
+        fresh.iter().zip(made).for_each(|(&triangle, (own, _))| inverted[triangle] = own.is_inverted());
         for (&own, &owner) in gone.iter().zip(&*owners) {
             let first = &mut first[fresh[owner]];
             next[own as usize] = *first;
