@@ -22,7 +22,7 @@ pub(super) fn unfolded(mesh: TriMesh, most: f64) -> (TriMesh, f64) {
     let points: Vec<Point> = mesh.vertices.iter().map(|vertex| vertex.to_array()).collect();
     let mut unfolding = Unfolding { mesh: HalfEdges::new(points, &mesh.triangles), moved: vec![0.0; mesh.triangles.len()], most };
     let all = 3 * unfolding.mesh.triangles();
-    let mut folds: Vec<u32> = (0..all).filter(|&half| unfolding.is_fold(half)).collect();
+    let mut folds: Vec<u32> = (0..all).filter(|&half| half < unfolding.mesh.twin(half) && unfolding.is_fold(half)).collect();
     if folds.is_empty() {
         return (mesh, 0.0);
     }
@@ -30,10 +30,9 @@ pub(super) fn unfolded(mesh: TriMesh, most: f64) -> (TriMesh, f64) {
     let mut left = all;
     while let Some(half) = folds.pop().filter(|_| left > 0) {
         left -= 1;
+        let pair = [half, unfolding.mesh.twin(half)];
         if unfolding.turn(half) {
-            let around = [half, next(half), previous(half)];
-            let twins = around.map(|half| unfolding.mesh.twin(half)).into_iter().filter(|&twin| twin != NONE);
-            folds.extend(twins.flat_map(|twin| [twin, next(twin), previous(twin)]).filter(|&half| unfolding.is_fold(half)));
+            folds.extend(pair.into_iter().flat_map(|half| [half, next(half), previous(half)]).filter(|&half| unfolding.is_fold(half)));
         }
     }
     let moved = unfolding.moved.iter().copied().fold(0.0, f64::max);
@@ -65,11 +64,10 @@ impl Unfolding {
         if twin == NONE { None } else { self.mesh.triangle(twin / 3).map(|corners| self.normal(corners)) }
     }
 
-    /// Whether a surface turns back at a side; each is asked for once, by one of its halves.
+    /// Whether a surface turns back at a side.
     fn is_fold(&self, half: u32) -> bool {
         let own = self.mesh.triangle(half / 3).map(|corners| self.normal(corners));
-        let beyond = if self.mesh.twin(half) > half { self.beyond(half) } else { None };
-        own.zip(beyond).is_some_and(|(own, beyond)| dot(&own, &beyond) < FOLDED)
+        own.zip(self.beyond(half)).is_some_and(|(own, beyond)| dot(&own, &beyond) < FOLDED)
     }
 
     /// Turns a side where there is a fold, if triangles turn by less around it then.
@@ -124,7 +122,7 @@ mod tests {
     fn folds(mesh: &TriMesh) -> usize {
         let points = mesh.vertices.iter().map(|vertex| vertex.to_array()).collect();
         let unfolding = Unfolding { mesh: HalfEdges::new(points, &mesh.triangles), moved: Vec::new(), most: 0.0 };
-        (0..3 * unfolding.mesh.triangles()).filter(|&half| unfolding.is_fold(half)).count()
+        (0..3 * unfolding.mesh.triangles()).filter(|&half| half < unfolding.mesh.twin(half) && unfolding.is_fold(half)).count()
     }
 
     /// How far random places of a surface are from another at most.

@@ -102,7 +102,7 @@ impl Bodies<'_> {
     #[inline]
     pub(super) fn above_at(&self, kind: Kind, body: u32, x: &Point, near: &Near) -> (f64, Point) {
         let Some(radius) = self.radius(kind) else {
-            return top(x, &self.polytopes.of(body).planes).unwrap_or((f64::INFINITY, [0.0; 3]));
+            return top(x, self.polytopes.of(body).planes.iter()).unwrap_or((f64::INFINITY, [0.0; 3]));
         };
         let Near { way, distance, cut } = *near;
         let beyond = distance - self.figures[body as usize].in_space(radius);
@@ -328,23 +328,12 @@ pub(super) fn higher<T>(a: (f64, T), b: (f64, T)) -> (f64, T) {
 }
 
 /// How high a place is above the plane of some that it is highest above, and the plane's normal.
-fn top(x: &Point, planes: &[Plane]) -> Option<(f64, Point)> {
-    let larger = |a: f64, b: f64| if b > a { b } else { a };
-    // Four at a time, none of which waits for another; and which one it was is asked once the height is known.
-    let (fours, rest) = planes.as_chunks::<4>();
-    let mut top = f64::NEG_INFINITY;
-    for [a, b, c, d] in fours {
-        top = larger(top, larger(larger(height(a, x), height(b, x)), larger(height(c, x), height(d, x))));
-    }
-    for plane in rest {
-        top = larger(top, height(plane, x));
-    }
-    let plane = planes.iter().find(|plane| height(plane, x) == top)?;
-    Some((top, normal(plane)))
+fn top<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>) -> Option<(f64, Point)> {
+    let top = planes.map(|plane| (height(plane, x), plane)).reduce(higher);
+    top.map(|(height, plane)| (height, normal(plane)))
 }
 
-/// The same of planes from several bodies, if it is higher than something, and by how much.
+/// The same, if it is higher than something, and by how much.
 pub(super) fn highest<'p>(x: &Point, planes: impl Iterator<Item = &'p Plane>, than: f64) -> Option<(f64, Point)> {
-    let top = planes.map(|plane| (height(plane, x), plane)).reduce(higher).filter(|&(height, _)| height > than);
-    top.map(|(height, plane)| (height - than, normal(plane)))
+    top(x, planes).filter(|&(height, _)| height > than).map(|(height, normal)| (height - than, normal))
 }
