@@ -86,6 +86,8 @@ const ROUNDS_OF_BENDS: usize = 6;
 
 /// Sites of a lattice of which it is asked whether the topology is that of what they stand for, at most.
 const MOST_STEADY: usize = 20_000;
+/// The same where there is no lattice.
+const MOST_ASKED: usize = 300_000;
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: u64 = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
@@ -155,13 +157,15 @@ impl Arrangement {
         if setting.dense || setting.clean_only {
             return Ok(None);
         }
-        let most = (budget.limits.memory_bytes as f64 / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize;
-        let sites = || Sites::of(rule, candidates, most.min(most_of(budget)), budget);
+        let memory = budget.limits.memory_bytes as f64;
+        let few = ((memory / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize).min(MOST_POLYTOPES);
+        let most = (memory / BYTES_PER_SITE) as usize;
+        let sites = || Sites::of(rule, candidates, most_of(most.max(few), budget), budget);
         let Some((mut kinds, is_of_solid)) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
         let is_steady = |figures: &[Figure], off: f64| are_steady(figures, setting, off, &surfaces, budget);
         let mut copies = Copies::default();
-        if setting.rounding < CARRIED * setting.half_band() {
+        if kinds.list.len() <= few && setting.rounding < CARRIED * setting.half_band() {
             copies = Copies::leave_out(&mut kinds.list, &is_of_solid, &surfaces, setting, NOISE * setting.half_band(), budget)?;
             if copies.moved > ROUNDED * setting.slack && !is_steady(&copies.figures, copies.moved)? {
                 let Some((all, _)) = sites()? else { return Ok(None) };
@@ -183,6 +187,9 @@ impl Arrangement {
             let mut arrangement = Self::empty(kinds, setting, surfaces, Arc::new(copies));
             arrangement.take(flat);
             return Ok(Some(arrangement));
+        }
+        if kinds.list.len() > few {
+            return Ok(None);
         }
         let slack = CLEARED * setting.slack;
         let cleared = noise::cleared(&kinds.list, NOISE * setting.half_band(), [FLATNESS * setting.slack, FLATNESS * slack], budget)?;
@@ -214,7 +221,7 @@ impl Arrangement {
         candidates: &Candidates,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
-        let Some((sites, _)) = Sites::of(rule, candidates, most_of(budget), budget)? else { return Ok(None) };
+        let Some((sites, _)) = Sites::of(rule, candidates, most_of(MOST_POLYTOPES, budget), budget)? else { return Ok(None) };
         let copies = Copies::default();
         let Some(flat) = offset::surface(&sites.list, setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
         let mut arrangement = Self::empty(sites, setting.clone(), Vec::new(), Arc::new(copies));
@@ -462,6 +469,9 @@ impl Arrangement {
             return Ok(true);
         }
         let Setting { least, reach, outer, off, slack, .. } = self.setting;
+        if self.sites.list.len() > MOST_ASKED {
+            return Ok(false);
+        }
         // Closed surfaces that have nothing inside farther from them than `least` were filled: nothing nearer may be in question.
         let is_within = off + slack <= reach - least;
         // Parts that are like others are apart by twice the outer distance: what is in question around one of them must not reach another.
@@ -484,9 +494,9 @@ impl Arrangement {
     }
 }
 
-/// Sites that may be looked at: each has a leaf cell of its own.
-fn most_of(budget: &Budget) -> usize {
-    MOST_POLYTOPES.min(usize::try_from(budget.limits.cells).unwrap_or(usize::MAX))
+/// Sites that may be looked at, of so many: each has a leaf cell of its own.
+fn most_of(sites: usize, budget: &Budget) -> usize {
+    sites.min(usize::try_from(budget.limits.cells).unwrap_or(usize::MAX))
 }
 
 /// Whether the dilation of what some sites stand for has the topology of theirs, if they are no more than can be asked. False where that is not shown.
@@ -529,6 +539,9 @@ fn few_near(
     let most = FEW_NEAR + sites.iter().map(may_be_near).sum::<f64>();
     Ok((near.total() as f64 <= most).then_some(near))
 }
+
+/// Bytes held at most for each site where no polytopes are made; each way has limits of its own, too.
+const BYTES_PER_SITE: f64 = 1_600.0;
 
 /// Triangles of a polytope that little is near to, about: with more sites than memory has room for that many, polytopes are not even begun.
 const LEAST_TRIANGLES: f64 = 24.0;
