@@ -10,10 +10,12 @@ use super::sheet::Sheet;
 use super::squares::Squares;
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, distance_squared};
-use crate::budget::Budget;
+use crate::budget::{self, Budget};
 use crate::dilation::convex::Convex as _;
+use crate::dilation::dilate;
 use crate::solid::Inside;
 use crate::split_mix::Random;
+use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -404,6 +406,24 @@ fn limits_hold_for_height_fields() {
     let shape = lowered(&vertices, faces);
     assert!(is_flat(&shape, 2.1, 0.08));
     assert_limited(&shape, 2.1, 0.08);
+}
+
+/// What there is no room for polytopes around: 600 bytes for each of 24 triangles of one.
+#[test]
+fn graphs_of_more_triangles_than_polytopes_are_made() {
+    let triangles = graph(6, &mut Random(73));
+    let (vertices, faces) = surface(&triangles, 2);
+    let shape = lowered(&vertices, faces);
+    let with = |bytes_per_triangle: u64| {
+        let memory_bytes = bytes_per_triangle * triangles.len() as u64;
+        let budget = Budget { limits: budget::Limits { memory_bytes, ..budget::Limits::default() }, ..Budget::default() };
+        dilate(&shape, Radius::new(2.1).unwrap(), Tolerance::new(0.08).unwrap(), &budget)
+    };
+    let [most, some] = [100_000, 4_000].map(|bytes| with(bytes).unwrap());
+    assert!(most.pitch_mm.is_none() && some.pitch_mm.is_none());
+    assert_eq!(most.solid.mesh(), some.solid.mesh());
+    // Nor for what is known of the graph.
+    assert!(with(1_500).is_ok_and(|made| made.pitch_mm.is_some()));
 }
 
 #[test]
