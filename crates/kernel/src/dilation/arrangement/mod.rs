@@ -160,7 +160,7 @@ impl Arrangement {
         let memory = budget.limits.memory_bytes as f64;
         let few = ((memory / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize).min(MOST_POLYTOPES);
         let most = (memory / BYTES_PER_SITE) as usize;
-        let sites = || Sites::of(rule, candidates, most_of(most.max(few), budget), budget);
+        let sites = || Sites::of(rule, candidates, most_of(most, budget), budget);
         let Some((mut kinds, is_of_solid)) = sites()? else { return Ok(None) };
         let surfaces = rule.attractor().surfaces();
         let is_steady = |figures: &[Figure], off: f64| are_steady(figures, setting, off, &surfaces, budget);
@@ -381,9 +381,10 @@ impl Arrangement {
         self.sites.leaves
     }
 
-    /// Bytes held at most: for what is made, and for what is put elsewhere, too.
+    /// Bytes held at most: for what is made, for what is put elsewhere, too, and for what is known of the sites where there are no polytopes.
     pub(super) fn memory_bytes(&self) -> f64 {
-        (self.made * BYTES_PER_TRIANGLE).max(self.triangles * plan::BYTES_PER_TRIANGLE)
+        let of_sites = if self.flat.is_some() { self.sites.list.len() as f64 * BYTES_PER_SITE } else { 0.0 };
+        (self.made * BYTES_PER_TRIANGLE).max(self.triangles * plan::BYTES_PER_TRIANGLE).max(of_sites)
     }
 
     /// About how many triangles will be made, and how many there will be, from a sample of the polytopes: of those that are there more often, more.
