@@ -340,7 +340,7 @@ impl Attractor {
 
     /// The bounding ball of a cell; see `StateBound` for the proof.
     #[inline]
-    fn ball(&self, state: StateId, points: &[ControlPoint], rational: bool, stretch: f64) -> Ball {
+    pub(super) fn ball(&self, state: StateId, points: &[ControlPoint], rational: bool, stretch: f64) -> Ball {
         match self.bound(state) {
             StateBound::Frame { centre, reach, radius, similar, .. } => {
                 let columns = frame_columns(points);

@@ -18,6 +18,7 @@ mod needle;
 mod patch;
 mod polytope;
 mod precision;
+mod product;
 mod radii;
 mod refine;
 pub(crate) mod sites;

@@ -106,7 +106,7 @@ impl<'a> SiteRule<'a> {
     }
 
     /// How many leaves there are, if no more than `most`.
-    fn leaves(&self, most: usize) -> Option<usize> {
+    pub(crate) fn leaves(&self, most: usize) -> Option<usize> {
         let attractor = self.attractor;
         let mut leaves = 0;
         let mut open: Vec<(Cell, Vec<ControlPoint>)> =

@@ -172,7 +172,16 @@ impl Order<'_> {
         let Self { attractor, radius, tolerance, simplify } = *self;
         match Drawn::resolved(attractor, radius, tolerance, coarseness, budget)? {
             Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
-            None => work(&Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)?),
+            None => {
+                let plan = |attractor| {
+                    Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)
+                };
+                let whole = plan(attractor)?;
+                match whole.split() {
+                    Some(split) => work(&plan(&split)?),
+                    None => work(&whole),
+                }
+            }
         }
     }
 }

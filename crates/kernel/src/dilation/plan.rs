@@ -108,6 +108,8 @@ const LEAST_ROUNDINGS: f64 = 64.0;
 const MOST_REFINED: usize = 2_000;
 /// Leaf cells of a shape of which some times as many are looked at to tell its topology.
 const FEW_LEAVES: u64 = 2_000;
+/// Cells at most of products that are split along one factor at a time.
+const MOST_SPLIT: usize = 300_000;
 /// Bytes of a cell with its control points, nodes and sites.
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
@@ -336,6 +338,15 @@ impl<'a> Plan<'a> {
         }
         let meant = Meant { off: 0.0, deviation_mm: 0.0, bounds: bounds.grown(radius) };
         Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, meant, clean_only: !simplify })
+    }
+
+    /// The attractor with as many roots as there are leaf cells, where it is made of products that have fewer when they are split along one factor at a time.
+    pub(super) fn split(&self) -> Option<Attractor> {
+        if self.rule.is_dense() || self.rule.is_exact() {
+            return None;
+        }
+        let split = self.rule.attractor().split_along_factors(MOST_SPLIT, |cell, points| self.rule.leaf(cell, points).is_some())?;
+        self.rule.leaves(split.roots().len()).is_none().then_some(split)
     }
 
     /// The same for an attractor that stands for another one, within what is left of the tolerance.
