@@ -6,6 +6,7 @@
 use super::cell::{Cell, ControlPoint, child_points};
 use super::{Attractor, Root};
 use crate::automaton::{StateId, SubdivisionOperator, Transition};
+use crate::budget::{Budget, Stopped};
 use std::collections::HashMap;
 
 /// Cells at most of which it is asked along which factor to split.
@@ -17,34 +18,44 @@ type Bounded = (Cell, Vec<ControlPoint>);
 impl Attractor {
     /// The same attractor with smaller roots in the place of those that are products: they are split along one factor at a time, all along the same, until all are small enough. None where there is no product, some cannot be split so, there would be more than `most`, or roots have radii of their own or are trimmed.
     ///
-    /// Cost: some microseconds for each of the cells.
-    pub(crate) fn split_along_factors(&self, most: usize, is_small: impl Fn(&Cell, &[ControlPoint]) -> bool) -> Option<Self> {
-        let is_product = |root: &Root| self.automaton.factors(root.state).len() > 1;
-        if self.has_own_radii() || !self.trimmed.is_empty() || !self.roots.iter().any(is_product) {
-            return None;
-        }
-        let of_root = |(index, root): (usize, &Root)| (self.root_cell(index), root.points.clone());
-        let mut cells: Vec<Bounded> = self.roots.iter().enumerate().filter(|(_, root)| is_product(root)).map(of_root).collect();
+    /// Cost: some microseconds for each of the cells, which are held with their control points.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn split_along_factors(
+        &self,
+        most: usize,
+        is_small: impl Fn(&Cell, &[ControlPoint]) -> bool,
+        budget: &Budget,
+    ) -> Result<Option<Self>, Stopped> {
         let mut splitter = Splitter::new(self);
+        let is_product = |root: &Root| splitter.is_product(root.state);
+        if self.has_own_radii() || !self.trimmed.is_empty() || !self.roots.iter().any(is_product) {
+            return Ok(None);
+        }
+        let (products, others): (Vec<usize>, Vec<usize>) = (0..self.roots.len()).partition(|&root| is_product(&self.roots[root]));
+        let mut cells: Vec<Bounded> = products.iter().map(|&root| (self.root_cell(root), self.roots[root].points.clone())).collect();
         while !cells.iter().all(|(cell, points)| is_small(cell, points)) {
-            let along = splitter.best(&cells)?;
+            let Some(along) = splitter.best(&cells) else { return Ok(None) };
             let mut finer = Vec::with_capacity(2 * cells.len());
             for (cell, points) in &cells {
-                splitter.split(cell, points, along, &mut finer)?;
-                (finer.len() <= most).then_some(())?;
+                budget.cancel.check()?;
+                if splitter.split(cell, points, along, &mut finer).is_none() || finer.len() > most {
+                    return Ok(None);
+                }
             }
             cells = finer;
         }
-        let mut roots: Vec<Root> = self.roots.iter().filter(|root| !is_product(root)).cloned().collect();
+        let mut roots: Vec<Root> = others.iter().map(|&root| self.roots[root].clone()).collect();
         roots.extend(cells.into_iter().map(|(cell, points)| {
             let Root { rational, solid, .. } = self.roots[cell.root as usize];
             Root { state: cell.state, points, rational, solid }
         }));
         let mut solids = self.solids.clone();
         for solid in &mut solids {
-            solid.first_root -= self.roots[..solid.first_root].iter().filter(|root| is_product(root)).count();
+            solid.first_root -= products.partition_point(|&root| root < solid.first_root);
         }
-        Some(Self { trims: vec![None; roots.len()], roots, solids, brep: None, ..self.clone() })
+        Ok(Some(Self { trims: vec![None; roots.len()], roots, solids, brep: None, ..self.clone() }))
     }
 }
 
@@ -68,8 +79,13 @@ impl<'a> Splitter<'a> {
     fn new(attractor: &'a Attractor) -> Self {
         let automaton = &attractor.automaton;
         let all = (0..automaton.states().len()).map(StateId::new);
-        let states = all.map(|id| (automaton.factors(id), id)).filter(|(factors, _)| factors.len() > 1).collect();
-        Self { attractor, states, steps: HashMap::new() }
+        // What is bounded by the hull of its control points needs nothing else of what it is a part of.
+        let products = all.filter(|&id| automaton.factors(id).len() > 1 && !automaton.state(id).frame);
+        Self { attractor, states: products.map(|id| (automaton.factors(id), id)).collect(), steps: HashMap::new() }
+    }
+
+    fn is_product(&self, state: StateId) -> bool {
+        self.states.get(self.attractor.automaton.factors(state)) == Some(&state)
     }
 
     /// The factor along which cells have the least errors when they are split, as far as a sample of them tells; none where none can be split.
@@ -103,7 +119,6 @@ impl<'a> Splitter<'a> {
         parts.extend(steps.iter().map(|Step { to, operator }| {
             let mut own = vec![[0.0; 4]; operator.columns()];
             child_points(points, operator, &mut own);
-            // Products are bounded by the hulls of their control points.
             let ball = attractor.ball(*to, &own, rational, 0.0);
             (Cell { state: *to, ball, ..*cell }, own)
         }));
@@ -133,7 +148,7 @@ mod tests {
     use super::*;
     use crate::attractor::cell::{Ball, distance_squared};
     use crate::attractor::sites::SiteRule;
-    use crate::budget::Budget;
+    use crate::budget::StopReason;
     use crate::dilation::dilate;
     use crate::model::{ControlNet, Curve, CurveScheme, Model, Shape, Sum, TensorProduct};
     use crate::tolerance::{Radius, Tolerance};
@@ -209,7 +224,8 @@ mod tests {
     fn what_is_split_is_the_same_shape() {
         for (number, attractor) in all().iter().enumerate() {
             let error = |shape: &Attractor, cell: &Cell, points: &[ControlPoint]| shape.leaf_error(cell, points).min(cell.ball.radius);
-            let Some(split) = attractor.split_along_factors(50_000, |cell, points| error(attractor, cell, points) <= 0.2) else {
+            let is_small = |cell: &Cell, points: &[ControlPoint]| error(attractor, cell, points) <= 0.2;
+            let Some(split) = attractor.split_along_factors(50_000, is_small, &Budget::default()).unwrap() else {
                 assert_eq!(number, 3, "only a volume has so many");
                 continue;
             };
@@ -239,19 +255,28 @@ mod tests {
     fn what_is_rough_along_one_factor_alone_takes_few_cells() {
         let attractor = takagi_and_arch();
         let is_small = |cell: &Cell, points: &[ControlPoint]| attractor.leaf_error(cell, points) <= 0.2;
-        let split = attractor.split_along_factors(1 << 20, is_small).unwrap();
+        let budget = Budget::default();
+        let split = |most: usize| attractor.split_along_factors(most, is_small, &budget).unwrap();
+        let cells = split(1 << 20).unwrap().roots().len();
         // Takagi's curve needs 2^9 parts or more, whose heights are halved each time and a little more, and the arch 2^5 or fewer.
-        assert!(split.roots().len() <= 1 << 15, "{}", split.roots().len());
-        assert!(attractor.split_along_factors(split.roots().len() - 1, is_small).is_none());
-        let made = dilate(&attractor, Radius::new(3.0).unwrap(), Tolerance::new(0.6).unwrap(), &Budget::default()).unwrap();
+        assert!(cells <= 1 << 15, "{cells}");
+        assert!(split(cells).is_some() && split(cells - 1).is_none());
+        let made = dilate(&attractor, Radius::new(3.0).unwrap(), Tolerance::new(0.6).unwrap(), &budget).unwrap();
         assert!(made.topology_exact && made.pitch_mm.is_none() && made.leaf_cells <= 1 << 14, "{}", made.leaf_cells);
         // With as many parts along the arch as along the curve there would be far more.
-        assert!(SiteRule::new(&attractor, 3.0, 0.6, 1.0).leaves(1 << 15).is_none());
+        assert!(SiteRule::new(&attractor, 3.0, 0.6, 1.0).leaves(1 << 15, &budget.cancel).unwrap().is_none());
+    }
+
+    #[test]
+    fn splitting_is_stopped() {
+        let budget = Budget::default();
+        budget.cancel.fire(StopReason::Cancelled);
+        assert!(takagi_and_arch().split_along_factors(1 << 20, |_, _| false, &budget).is_err());
     }
 
     #[test]
     fn what_is_no_product_is_not_split() {
         let arch = curve(CurveScheme::Bezier, &[[0.0; 3], [0.0, 15.0, 30.0], [0.0, 30.0, 0.0]]);
-        assert!(lowered(Shape::Curve(arch)).split_along_factors(1 << 20, |_, _| false).is_none());
+        assert!(lowered(Shape::Curve(arch)).split_along_factors(1 << 20, |_, _| false, &Budget::default()).unwrap().is_none());
     }
 }

@@ -3,6 +3,7 @@
 use super::cell::{Cell, ControlPoint, Point, Site, dot, frame_columns, subtract, times};
 use super::{Attractor, OwnRadius};
 use crate::automaton::{Automaton, LeafPrimitive, StateId};
+use crate::budget::{CancelToken, Stopped};
 
 /// Errors of replacing a cell of A by its sites S, in mm: d(x, A) <= d(x, S) + outer, and
 /// d(x, S)^2 <= (d(x, A) + inner)^2 + inner_square.
@@ -87,11 +88,12 @@ impl<'a> SiteRule<'a> {
         let deficits = if attractor.has_own_radii() { (0..attractor.roots().len()).map(deficit).collect() } else { Vec::new() };
         let mut rule = Self { attractor, radius, tolerance, coarseness, choices: Vec::new(), used, deficits };
         choose(&mut rule);
+        let never = CancelToken::new();
         if rule.is_along_curves()
-            && let Some(leaves) = rule.leaves(MANY)
+            && let Ok(Some(leaves)) = rule.leaves(MANY, &never)
         {
             let finer = Self { coarseness: ALONG_CURVES * coarseness, ..rule.clone() };
-            if finer.leaves((MORE_ALONG_CURVES * leaves as f64) as usize).is_some() {
+            if let Ok(Some(_)) = finer.leaves((MORE_ALONG_CURVES * leaves as f64) as usize, &never) {
                 return finer;
             }
         }
@@ -106,12 +108,16 @@ impl<'a> SiteRule<'a> {
     }
 
     /// How many leaves there are, if no more than `most`.
-    pub(crate) fn leaves(&self, most: usize) -> Option<usize> {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn leaves(&self, most: usize, cancel: &CancelToken) -> Result<Option<usize>, Stopped> {
         let attractor = self.attractor;
         let mut leaves = 0;
         let mut open: Vec<(Cell, Vec<ControlPoint>)> =
             attractor.roots().iter().enumerate().map(|(index, root)| (attractor.root_cell(index), root.points.clone())).collect();
         while let Some((cell, points)) = open.pop() {
+            cancel.check()?;
             let transitions = &attractor.state_of(&cell).transitions;
             if transitions.is_empty() || self.leaf(&cell, &points).is_some() {
                 leaves += 1;
@@ -119,10 +125,10 @@ impl<'a> SiteRule<'a> {
                 open.extend(attractor.children(&cell, &points));
             }
             if leaves + open.len() > most {
-                return None;
+                return Ok(None);
             }
         }
-        Some(leaves)
+        Ok(Some(leaves))
     }
 
     /// The share of r^2 - (r - e)^2 that is the lattice's: all of it where sites are cells themselves, without error.

@@ -177,7 +177,7 @@ impl Order<'_> {
                     Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)
                 };
                 let whole = plan(attractor)?;
-                match whole.split() {
+                match whole.split(budget)? {
                     Some(split) => work(&plan(&split)?),
                     None => work(&whole),
                 }

@@ -16,9 +16,10 @@ use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
 use crate::attractor::Attractor;
+use crate::attractor::cell::{Cell, ControlPoint};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::automaton::LeafPrimitive;
-use crate::budget::Budget;
+use crate::budget::{Budget, Stopped};
 use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
@@ -109,7 +110,10 @@ const MOST_REFINED: usize = 2_000;
 /// Leaf cells of a shape of which some times as many are looked at to tell its topology.
 const FEW_LEAVES: u64 = 2_000;
 /// Cells at most of products that are split along one factor at a time.
-const MOST_SPLIT: usize = 300_000;
+const MOST_SPLIT: u64 = 300_000;
+/// One in so many bytes may hold them.
+const SPLIT_SHARE: u64 = 8;
+const BYTES_PER_CONTROL_POINT: u64 = 32;
 /// Bytes of a cell with its control points, nodes and sites.
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
@@ -341,12 +345,18 @@ impl<'a> Plan<'a> {
     }
 
     /// The attractor with as many roots as there are leaf cells, where it is made of products that have fewer when they are split along one factor at a time.
-    pub(super) fn split(&self) -> Option<Attractor> {
+    pub(super) fn split(&self, budget: &Budget) -> Result<Option<Attractor>, Stopped> {
         if self.rule.is_dense() || self.rule.is_exact() {
-            return None;
+            return Ok(None);
         }
-        let split = self.rule.attractor().split_along_factors(MOST_SPLIT, |cell, points| self.rule.leaf(cell, points).is_some())?;
-        self.rule.leaves(split.roots().len()).is_none().then_some(split)
+        let attractor = self.rule.attractor();
+        let controls = attractor.roots().iter().map(|root| root.points.len()).max().unwrap_or(0) as u64;
+        let room = budget.limits.memory_bytes / (SPLIT_SHARE * (BYTES_PER_CELL + BYTES_PER_CONTROL_POINT * controls));
+        let most = room.min(budget.limits.cells).min(MOST_SPLIT) as usize;
+        let is_leaf = |cell: &Cell, points: &[ControlPoint]| self.rule.leaf(cell, points).is_some();
+        let Some(split) = attractor.split_along_factors(most, is_leaf, budget)? else { return Ok(None) };
+        let is_fewer = self.rule.leaves(split.roots().len(), &budget.cancel)?.is_none();
+        Ok(is_fewer.then_some(split))
     }
 
     /// The same for an attractor that stands for another one, within what is left of the tolerance.
