@@ -3,13 +3,16 @@
 
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::{Attractor, refine, stream};
-use lacuna_kernel::budget::{Budget, PHASES, Progress};
-use lacuna_kernel::dilation::{Side, close, dilate, wall};
+use lacuna_kernel::budget::{Budget, PHASES, Progress, StopReason};
+use lacuna_kernel::dilation::{DilationError, Side, close, dilate, wall};
 use lacuna_kernel::levels::solid_level;
 use lacuna_kernel::measure::{ContactQuery, bounding_box, hausdorff, intersect};
-use lacuna_kernel::model::{AffineMap, BezierCurve, Ifs, Interior, Model, PolygonMesh, Primitive, Shape};
+use lacuna_kernel::model::{
+    AffineMap, BezierCurve, ControlNet, Curve, CurveScheme, Ifs, Interior, Model, PolygonMesh, Primitive, Shape, Sum,
+};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 /// What a computation tells, from the first word to the last.
 #[derive(Default)]
@@ -133,4 +136,29 @@ fn copies_on_a_lattice_are_exact() {
     solid_level(&ifs, &bounds, 2, &heard.budget()).unwrap();
     let refined: Vec<_> = heard.all().into_iter().filter(|told| told.phase == "refine").map(|told| told.bound_mm).collect();
     assert_eq!(refined, [Some(0.0); 2]);
+}
+
+/// A tetrahedron of the lattice may hold so many sites that it takes seconds, and its block minutes.
+#[test]
+fn a_block_that_is_full_of_sites_is_stopped() {
+    let curve = |scheme: CurveScheme, points: [[f64; 3]; 3]| Curve {
+        scheme,
+        control_points: ControlNet { size: vec![3], points: points.map(DVec3::from_array).to_vec(), weights: None },
+    };
+    let takagi = CurveScheme::Interpolation { vertical_scaling: vec![0.5, 0.5] };
+    let sum = lowered(Shape::Sum(Sum {
+        u: curve(takagi, [[0.0; 3], [15.0, 0.0, 15.0], [30.0, 0.0, 0.0]]),
+        v: curve(CurveScheme::Bezier, [[0.0; 3], [0.0, 15.0, 30.0], [0.0, 30.0, 0.0]]),
+    }));
+    let budget = Budget::default();
+    let cancel = budget.cancel.clone();
+    let firing = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(4));
+        cancel.fire(StopReason::Cancelled);
+        Instant::now()
+    });
+    let stopped = dilate(&sum, Radius::new(3.0).unwrap(), mm(0.003), &budget);
+    assert!(matches!(stopped, Err(DilationError::Stopped(_))), "{stopped:?}");
+    // It is asked within milliseconds; whoever asks between blocks alone takes some minutes.
+    assert!(firing.join().unwrap().elapsed() < Duration::from_secs(20));
 }

@@ -14,10 +14,11 @@
 use super::affine::Affine;
 use super::convex::{Convex, SiteSearch};
 use super::critical::Critical;
-use super::lattice::{Cube, ENCLOSING, Grading, Number, Plain, UNITS, is_mirrored};
+use super::frame::{DEEP, FAR, Frame, NOTHING, UNKNOWN, Value};
+use super::lattice::{Cube, Grading, Number, Plain, UNITS, is_mirrored};
 use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
-use super::plan::{JUNG, Setting};
+use super::plan::Setting;
 use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::star::{Star, Stars, note};
 use super::surface::{BlockSurface, NameHasher, NameMap, Seam, UNNAMED, VertexName};
@@ -25,6 +26,7 @@ use super::tree::{Candidates, Hit, NodeId, SiteId, Tree, Weighted, in_space, wit
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract};
 use crate::attractor::sites::SiteRule;
+use crate::budget::CancelToken;
 use crate::measure::triangle::{Feature, closest_feature};
 use crate::split_mix::mix;
 use std::collections::HashSet;
@@ -36,82 +38,9 @@ pub(super) const SIDE: usize = 16;
 const SUB: usize = 4;
 const LAYER: usize = SIDE + 1;
 const VERTICES: usize = LAYER * LAYER * LAYER;
-/// Value of a vertex not evaluated yet.
-const UNKNOWN: f64 = f64::NAN;
-/// Value of a vertex so near to a site that it covers every tetrahedron there.
-const DEEP: f64 = f64::NEG_INFINITY;
-/// Value of a vertex that no site covers.
-const FAR: f64 = f64::INFINITY;
-
 /// On which side of the surface a vertex is; both where a gap was closed there.
 const OPEN: u8 = 1;
 const COVERED: u8 = 2;
-
-/// The four vertices of a tetrahedron in the order of their numbers.
-pub(super) struct Frame {
-    pub(super) numbers: [Number; 4],
-    pub(super) positions: [Point; 4],
-    pub(super) values: [Value; 4],
-    /// Which vertices are covered: their least squared distance is below theta.
-    pub(super) covered: u8,
-    /// A point beyond the surface over every vertex, and its squared distance from the sites, or a smaller number.
-    pub(super) witnesses: [(Point, f64); 4],
-    /// The finer level of the two cubes.
-    pub(super) level: u32,
-    /// Whether the order turned the tetrahedron inside out.
-    mirrored: bool,
-}
-
-impl Frame {
-    /// Whether the tetrahedron is so small that what is filled of it is within `outer`.
-    ///
-    /// Where the interpolant of squares d(v)^2 with weights w is at most s^2, the mean of d(v) is at most s, and that of |x - v| at most R, the radius of a ball around the
-    /// tetrahedron: d(x) <= s + R, the distance growing by no more than the way. s is r, or r + gap where the value of a vertex in a gap was lowered. All that holds for
-    /// the distance whose square is less by the least deficit of the nearest sites, too, among sites with no smaller deficit, and r in space.
-    fn is_close(&self, setting: &Setting, tree: &Tree<'_>) -> bool {
-        if self.is_around_a_site(setting, tree) {
-            return true;
-        }
-        let deficit = self.values.iter().filter(|value| value.square.is_finite()).map(|value| tree.site(value.site).deficit);
-        let deficit = deficit.fold(f64::INFINITY, f64::min);
-        let close = if self.values.iter().all(|value| value.square.is_finite()) && deficit > 0.0 {
-            in_space(setting.outer, deficit) - in_space(setting.reach, deficit)
-        } else {
-            setting.close
-        };
-        let edges = (0..4).flat_map(|p| (0..p).map(move |q| (p, q)));
-        let longest = edges.map(|(p, q)| distance_squared(&self.positions[p], &self.positions[q])).fold(0.0, f64::max).sqrt();
-        let is_filled = |value: &Value| value.least < 0 && value.square > setting.reach * setting.reach;
-        let gap = if self.values.iter().any(is_filled) { setting.gap } else { 0.0 };
-        // At level 0 the lattice's own bound is sharper.
-        let around = (JUNG * longest).min(ENCLOSING * setting.lattice.pitch);
-        around + gap + setting.slack < close
-    }
-
-    /// Whether the nearest site of some vertex is so near to it that the whole tetrahedron is close to that site in space: the distance grows by no more than the way.
-    fn is_around_a_site(&self, setting: &Setting, tree: &Tree<'_>) -> bool {
-        (0..4).filter(|&k| self.values[k].square.is_finite()).any(|k| {
-            let site = tree.site(self.values[k].site);
-            let beyond = site.in_space(self.values[k].square.sqrt()) - site.in_space(setting.reach);
-            let way = self.positions.iter().map(|x| distance_squared(x, &self.positions[k])).fold(0.0, f64::max).sqrt();
-            beyond + way + setting.slack < setting.close_in_space
-        })
-    }
-
-    /// The cubes of its level that have their centres among its vertices.
-    fn cubes(&self) -> impl Iterator<Item = Cube> {
-        let edge = UNITS >> self.level;
-        self.numbers
-            .into_iter()
-            .filter(move |number| number.iter().all(|&x| i64::from(x).rem_euclid(edge) == edge / 2))
-            .map(move |number| Cube { level: self.level, index: number.map(|x| i64::from(x).div_euclid(edge)) })
-    }
-
-    /// The values of V of a simplex.
-    pub(super) fn values_of(&self, simplex: u8) -> [i64; 4] {
-        std::array::from_fn(|k| if simplex >> k & 1 == 1 { self.values[k].least } else { self.values[k].far })
-    }
-}
 
 /// A site that matters in a tetrahedron.
 #[derive(Clone, Copy)]
@@ -123,6 +52,7 @@ pub(super) struct Nearby {
 /// Working memory of a thread, reused from block to block.
 pub(super) struct Workshop<'a> {
     attractor: &'a Attractor,
+    cancel: &'a CancelToken,
     tree: Tree<'a>,
     /// Squared distances at the vertices of level 0, corners and centres, and their nearest sites.
     values: [Vec<Value>; 2],
@@ -138,7 +68,7 @@ pub(super) struct Workshop<'a> {
     polygon: Vec<u16>,
     corners: Vec<u32>,
     numbers: Vec<u32>,
-    critical: Critical,
+    critical: Critical<'a>,
     /// Cubes to subdivide that the search in the block's tetrahedra has noted.
     to_subdivide: HashSet<Cube, BuildHasherDefault<NameHasher>>,
     stars: Stars,
@@ -148,29 +78,11 @@ pub(super) struct Workshop<'a> {
     names: NameMap<VertexName, u32>,
 }
 
-/// What is known of a vertex.
-#[derive(Clone, Copy)]
-pub(super) struct Value {
-    /// f, or [`DEEP`] or [`FAR`].
-    pub(super) square: f64,
-    /// The nearest site, and its closest point.
-    pub(super) site: SiteId,
-    pub(super) closest: Point,
-    node: NodeId,
-    /// f less theta as V has it, never 0: see `smooth`.
-    pub(super) least: i64,
-    /// W less theta.
-    pub(super) far: i64,
-    /// The squared distance of the witness from the sites, once it was asked for.
-    witness: f64,
-}
-
-const NOTHING: Value = Value { square: UNKNOWN, site: SiteId::Listed(0), closest: [0.0; 3], node: 0, least: 1, far: 1, witness: UNKNOWN };
-
 impl<'a> Workshop<'a> {
-    pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting) -> Self {
+    pub(super) fn new(rule: &'a SiteRule<'a>, setting: &Setting, cancel: &'a CancelToken) -> Self {
         Self {
             attractor: rule.attractor(),
+            cancel,
             tree: Tree::of(rule, setting),
             values: [vec![NOTHING; VERTICES], vec![NOTHING; VERTICES]],
             fine: NameMap::default(),
@@ -183,7 +95,7 @@ impl<'a> Workshop<'a> {
             polygon: Vec::new(),
             corners: Vec::new(),
             numbers: Vec::new(),
-            critical: Critical::default(),
+            critical: Critical::new(cancel),
             to_subdivide: HashSet::default(),
             stars: Stars::default(),
             cubes: Vec::new(),
@@ -193,6 +105,8 @@ impl<'a> Workshop<'a> {
     }
 
     /// Completes the surface in a block, of which all is there but the tetrahedra that the task is about; `open` lists the solids whose surface meets it.
+    ///
+    /// Where the token is fired meanwhile the surface is incomplete: a block may hold so many sites that it takes minutes.
     pub(super) fn complete(
         &mut self,
         setting: &Setting,
@@ -341,6 +255,9 @@ impl<'a> Workshop<'a> {
         });
         let mut at = u32::MAX;
         for index in 0..self.stars.listed.len() {
+            if self.cancel.reason().is_some() {
+                return;
+            }
             let (sub_block, vertex) = self.stars.listed[index];
             if sub_block != at {
                 at = sub_block;
@@ -532,6 +449,9 @@ impl<'a> Workshop<'a> {
 
     /// Emits the surface in a tetrahedron; notes the cubes to subdivide if a critical point of the distance may be on the wrong side.
     fn tetrahedron(&mut self, setting: &Setting, numbers: [Number; 4], level: u32, surface: &mut BlockSurface) {
+        if self.cancel.reason().is_some() {
+            return;
+        }
         let Some(mut frame) = self.frame(setting, numbers, level, surface) else { return };
         if setting.dense {
             return self.dense_tetrahedron(setting, &frame, surface);
@@ -726,7 +646,7 @@ impl<'a> Workshop<'a> {
         found.clear();
         self.tree.collect(&centre, &self.near, setting.outer + radius, &mut found);
         for &id in &found {
-            if smooth::smooth(served) >> WHOLE & 1 == 1 {
+            if smooth::smooth(served) >> WHOLE & 1 == 1 || self.cancel.reason().is_some() {
                 break;
             }
             let site = self.tree.site(id);
@@ -757,7 +677,8 @@ impl<'a> Workshop<'a> {
         self.tree.collect(&centre, &self.near, setting.outer + radius, &mut found);
         let mut cut = Cut::Changed;
         for &site in &found {
-            if self.nearby[..first].iter().all(|nearby| nearby.site != site) && self.consider(setting, frame, site) == Cut::Empty {
+            let is_new = self.nearby[..first].iter().all(|nearby| nearby.site != site);
+            if self.cancel.reason().is_some() || is_new && self.consider(setting, frame, site) == Cut::Empty {
                 cut = Cut::Empty;
                 break;
             }

@@ -17,8 +17,9 @@
 //! (A) is shown here, tetrahedron by tetrahedron, (B) in `star`, vertex by vertex of the mesh, for all of the surface.
 
 use super::affine::{Affine, range};
-use super::block::{Frame, Nearby};
+use super::block::Nearby;
 use super::convex::{Convex, SiteSearch};
+use super::frame::Frame;
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
 use super::parting::{avoids_origin, farthest};
@@ -27,6 +28,7 @@ use super::smooth::{self, MOST_NOISE};
 use super::surface::BlockSurface;
 use super::tree::{Tree, highest};
 use crate::attractor::cell::{Point, Site, cross, distance_squared, dot, subtract};
+use crate::budget::CancelToken;
 use crate::measure::triangle::closest_feature;
 
 /// Boxes that the search in a tetrahedron may look at.
@@ -49,8 +51,8 @@ struct View {
 }
 
 /// Working memory of the search.
-#[derive(Default)]
-pub(super) struct Critical {
+pub(super) struct Critical<'a> {
+    cancel: &'a CancelToken,
     /// Points whose hull holds the closest points of active sites.
     closest: Vec<Point>,
     /// Functions of sites, then of V's, at the corners of what is left.
@@ -77,7 +79,21 @@ struct Open {
     first: usize,
 }
 
-impl Critical {
+impl<'a> Critical<'a> {
+    pub(super) fn new(cancel: &'a CancelToken) -> Self {
+        Self {
+            cancel,
+            closest: Vec::new(),
+            heights: Vec::new(),
+            views: Vec::new(),
+            sites: Vec::new(),
+            functions: Vec::new(),
+            weights: Vec::new(),
+            open: Vec::new(),
+            active: Vec::new(),
+        }
+    }
+
     /// Looks for critical points on the wrong side in what the sites leave of a tetrahedron, of which the corners and their places, `rest`, are given, and notes the cubes that must be
     /// subdivided to bring them to the right one.
     #[allow(clippy::too_many_arguments)]
@@ -129,6 +145,9 @@ impl Critical {
         let affine = |values: [i64; 4]| Affine::new(&frame.positions, values.map(|value| value as f64));
         let mut band = inner;
         for simplex in smooth::largest(smooth, frame.covered) {
+            if self.cancel.reason().is_some() {
+                break;
+            }
             let values = frame.values_of(simplex);
             let start = heights.len();
             add(heights, &values);
@@ -194,6 +213,9 @@ impl Critical {
         while let Some(Open { middle, half, first, end }) = open.pop() {
             work += 1;
             self.active.truncate(end);
+            if self.cancel.reason().is_some() {
+                break;
+            }
             if self.is_settled(setting, tree, frame, nearby, &middle, &half, first) {
                 continue;
             }

@@ -33,6 +33,7 @@ mod critical;
 mod drawn;
 mod dust;
 mod error;
+mod frame;
 mod lattice;
 mod octree;
 mod outside;

@@ -277,6 +277,7 @@ impl<'a> Pass<'a> {
         brackets: &mut Vec<(f64, f64)>,
         to: &mut Candidates,
     ) -> Result<(), DilationError> {
+        self.budget.cancel.check()?;
         if to.cells.len() >= self.setting.cells {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }
@@ -343,7 +344,7 @@ impl<'a> Pass<'a> {
     }
 
     pub(super) fn block(&self, node: Node, candidates: &Candidates, open: &[u32]) -> Result<Option<BlockSurface>, DilationError> {
-        let workshop = || Workshop::new(self.rule, self.setting);
+        let workshop = || Workshop::new(self.rule, self.setting, &self.budget.cancel);
         self.workshops.with(workshop, |workshop| self.surface(workshop, node, candidates, open))
     }
 
@@ -357,6 +358,7 @@ impl<'a> Pass<'a> {
         let mut surface = self.task.begun(node.first_block);
         let kept = surface.triangles.len();
         workshop.complete(self.setting, self.grading, self.task, &mut surface, candidates, open);
+        self.budget.cancel.check()?;
         if workshop.is_exhausted() {
             return Err(DilationError::Cells { allowed: self.setting.cells });
         }

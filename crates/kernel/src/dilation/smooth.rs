@@ -12,8 +12,8 @@
 //!
 //! Values of f in V are an integer below those of sites, another one at every vertex, so that ties between V's and sites do not follow from their definition.
 
-use super::block::Frame;
 use super::convex::{Convex, SiteSearch};
+use super::frame::Frame;
 use super::lattice::{Number, UNITS};
 use super::plan::Setting;
 use super::tree::Tree;
