@@ -394,7 +394,7 @@ impl Attractor {
                 first_order.min(if rational {
                     rational_chord_error(precision, points, measured, ends)
                 } else {
-                    chord_error(precision, measured, &start, &end)
+                    self.chord_error(cell.state, precision, (points, measured), (&start, &end))
                 })
             }
             // Points of the cell, and segments between them, are in the ball too.
@@ -406,10 +406,61 @@ impl Attractor {
                 let Some(precision) = self.precision(cell.state) else { return first_order };
                 let mut buffer = [[0.0; 4]; PAIR];
                 let measured = measured(precision, points, &mut buffer);
-                first_order.min(if rational { rational_polygon_error(precision, measured) } else { polygon_error(precision, measured) })
+                first_order.min(if rational {
+                    rational_polygon_error(precision, measured)
+                } else {
+                    self.polygon_error(cell.state, precision, points, measured)
+                })
             }
             LeafPrimitive::Drawn(drawing) => matrix_norm(&frame_columns(points)) * drawing.defect,
         }
+    }
+
+    /// eta for the affine map that takes a curve's parameters to its chord; see `precision`.
+    #[inline]
+    fn chord_error(
+        &self,
+        state: StateId,
+        precision: &LinearPrecision,
+        (points, measured): (&[ControlPoint], &[ControlPoint]),
+        (start, end): (&Point, &Point),
+    ) -> f64 {
+        let chord = subtract(end, start);
+        let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
+            let linear: Point = std::array::from_fn(|i| start[i] + parameter[0] * chord[i]);
+            distance_squared(&[point[0], point[1], point[2]], &linear)
+        };
+        let mut eta = (1.0 + 2.0 * precision.margin) * measured.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
+        if precision.margin > 0.0
+            && let Some(deviation) = self.deviation(state)
+        {
+            eta = eta.min(deviation.of_curve(precision, points, start, &chord));
+        }
+        eta + precision.residual * dot(&chord, &chord).sqrt()
+    }
+
+    /// 2 eta for the affine map that fits a face's control points best; see `precision`.
+    #[inline]
+    fn polygon_error(&self, state: StateId, precision: &LinearPrecision, points: &[ControlPoint], measured: &[ControlPoint]) -> f64 {
+        let mut map = [[0.0; 3]; 3];
+        for (point, fit) in measured.iter().zip(&precision.fit) {
+            for (column, weight) in map.iter_mut().zip(fit) {
+                (0..3).for_each(|i| column[i] += weight * point[i]);
+            }
+        }
+        let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
+            let linear: Point = std::array::from_fn(|i| map[0][i] + parameter[0] * map[1][i] + parameter[1] * map[2][i]);
+            distance_squared(&[point[0], point[1], point[2]], &linear)
+        };
+        let largest = measured.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
+        let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
+        let mut eta = (1.0 + 2.0 * precision.margin) * largest;
+        if precision.margin > 0.0
+            && let Some(deviation) = self.deviation(state)
+        {
+            eta = eta.min(deviation.of_face(precision, points, [&map[1], &map[2]]));
+        }
+        2.0 * eta + precision.residual * slope
     }
 
     /// The child of a face as [`Attractor::child_cell`] gives it, and its error. Where the bound of second order is within
@@ -420,7 +471,7 @@ impl Attractor {
         let smooth = match (self.precision(state), &self.automaton().state(state).leaf) {
             (Some(precision), LeafPrimitive::Polygon(_)) if !self.roots()[cell.root as usize].rational => {
                 let mut buffer = [[0.0; 4]; PAIR];
-                polygon_error(precision, measured(precision, points, &mut buffer))
+                self.polygon_error(state, precision, points, measured(precision, points, &mut buffer))
             }
             _ => f64::INFINITY,
         };
@@ -505,37 +556,7 @@ impl Attractor {
     }
 }
 
-/// eta for the affine map that takes a curve's parameters to its chord; see `precision`.
-#[inline]
-fn chord_error(precision: &LinearPrecision, points: &[ControlPoint], start: &Point, end: &Point) -> f64 {
-    let chord = subtract(end, start);
-    let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
-        let linear: Point = std::array::from_fn(|i| start[i] + parameter[0] * chord[i]);
-        distance_squared(&[point[0], point[1], point[2]], &linear)
-    };
-    let largest = points.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
-    (1.0 + 2.0 * precision.margin) * largest + precision.residual * dot(&chord, &chord).sqrt()
-}
-
-/// 2 eta for the affine map that fits a face's control points best; see `precision`.
-#[inline]
-fn polygon_error(precision: &LinearPrecision, points: &[ControlPoint]) -> f64 {
-    let mut map = [[0.0; 3]; 3];
-    for (point, fit) in points.iter().zip(&precision.fit) {
-        for (column, weight) in map.iter_mut().zip(fit) {
-            (0..3).for_each(|i| column[i] += weight * point[i]);
-        }
-    }
-    let off = |(point, parameter): (&ControlPoint, &[f64; 2])| {
-        let linear: Point = std::array::from_fn(|i| map[0][i] + parameter[0] * map[1][i] + parameter[1] * map[2][i]);
-        distance_squared(&[point[0], point[1], point[2]], &linear)
-    };
-    let largest = points.iter().zip(&precision.measured).map(off).fold(0.0, f64::max).sqrt();
-    let slope = (dot(&map[1], &map[1]) + dot(&map[2], &map[2])).sqrt();
-    2.0 * (1.0 + 2.0 * precision.margin) * largest + precision.residual * slope
-}
-
-/// As [`chord_error`] for weights; see [`homogeneous_error`].
+/// As [`Attractor::chord_error`] for weights; see [`homogeneous_error`].
 fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], measured: &[ControlPoint], ends: &Ends) -> f64 {
     let place = |weights: &[f64]| -> ControlPoint { std::array::from_fn(|i| points.iter().zip(weights).map(|(p, w)| w * p[i]).sum()) };
     let (start, end) = (place(&ends.start), place(&ends.end));
@@ -543,7 +564,7 @@ fn rational_chord_error(precision: &LinearPrecision, points: &[ControlPoint], me
     homogeneous_error(precision, measured, &linear)
 }
 
-/// As [`polygon_error`] for weights; see [`homogeneous_error`].
+/// As [`Attractor::polygon_error`] for weights; see [`homogeneous_error`].
 fn rational_polygon_error(precision: &LinearPrecision, points: &[ControlPoint]) -> f64 {
     let mut linear = [[0.0; 4]; 3];
     for (point, fit) in points.iter().zip(&precision.fit) {

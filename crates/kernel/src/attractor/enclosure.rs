@@ -13,6 +13,7 @@
 //! *Intervals.* The largest value of a row over the attractor is bounded best cell first, by the margins, until those of the best cell say it to a
 //! hundredth: whenever this ends, no cell may be higher. Of curves that contract slowly it ends before, and the interval is wide.
 
+use super::cell::Point;
 use super::{Attractor, StateBound};
 use crate::automaton::{LeafPrimitive, StateId, SubdivisionOperator};
 use crate::order::ordered_by;
@@ -42,6 +43,44 @@ pub(crate) struct Enclosure {
 }
 
 impl Enclosure {
+    /// The product of boxes and hulls; none where there are too many points of the latter.
+    fn of(parts: Vec<Part>) -> Option<Self> {
+        let (mut factors, mut places, mut groups, mut sizes) = (Vec::new(), vec![(0, true)], 1, [1.0; 2]);
+        for Part { columns, is_box, size, miss } in parts {
+            let count = columns.columns();
+            let pair = |&(group, is_middle): &(u32, bool), k: usize| {
+                if is_box { (group, is_middle && k == 0) } else { (group * count as u32 + k as u32, is_middle) }
+            };
+            places = places.iter().flat_map(|first| (0..count).map(move |k| pair(first, k))).collect();
+            groups *= if is_box { 1 } else { count };
+            if groups > MOST_GROUPS {
+                return None;
+            }
+            sizes = [sizes[0] * size, sizes[1] * (size + miss)];
+            factors.push(columns);
+        }
+        let columns = if factors.len() == 1 { factors.pop()? } else { SubdivisionOperator::product(factors) };
+        Some(Self { columns, places, groups, miss: sizes[1] - sizes[0] })
+    }
+
+    /// A box of the vectors that an affine map takes the attractor to, given by those that it takes the columns to.
+    pub(super) fn box_of(&self, seen: &[Point]) -> [Point; 2] {
+        let (mut middles, mut reaches) = ([[0.0; 3]; MOST_GROUPS], [[0.0; 3]; MOST_GROUPS]);
+        for (&(group, is_middle), value) in self.places.iter().zip(seen) {
+            if is_middle {
+                middles[group as usize] = *value;
+            } else {
+                reaches[group as usize].iter_mut().zip(value).for_each(|(reach, x)| *reach += x.abs());
+            }
+        }
+        let [mut low, mut high] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for (middle, reach) in middles.iter().zip(&reaches).take(self.groups) {
+            low = std::array::from_fn(|k| low[k].min(middle[k] - reach[k]));
+            high = std::array::from_fn(|k| high[k].max(middle[k] + reach[k]));
+        }
+        [low, high]
+    }
+
     /// Bounds of c . x over the attractor, c being given by its values at the columns.
     pub(crate) fn range(&self, seen: impl Iterator<Item = f64>) -> [f64; 2] {
         if self.groups == 1 {
@@ -68,38 +107,34 @@ impl Enclosure {
 /// The box of a curve, or the product of those of its factors and of the hulls of others; none for states that are frames or in the hull of their control
 /// points, and for those of which no parameters are known.
 pub(super) fn enclosure(attractor: &Attractor, id: StateId) -> Option<Enclosure> {
-    let automaton = attractor.automaton();
     if attractor.bound(id).margin() == 0.0 {
         return None;
     }
-    let own = [id];
-    let parts = if automaton.factors(id).is_empty() { &own } else { automaton.factors(id) };
-    let (mut factors, mut places, mut groups, mut sizes) = (Vec::new(), vec![(0, true)], 1, [1.0; 2]);
-    for &part in parts {
-        let is_box = attractor.bound(part).margin() > 0.0;
-        let (columns, miss) = match (is_box, part == id) {
-            (true, true) => (coordinate_box(attractor, part)?, 0.0),
-            // Kept: all products that a curve is a factor of see it by the same box.
-            (true, false) => (attractor.enclosure(part)?.columns.clone(), 0.0),
-            (false, _) => hull(attractor, part),
-        };
-        let count = columns.columns();
-        let more = if is_box { 1 } else { count };
-        let pair = |&(group, is_middle): &(u32, bool), k: usize| {
-            if is_box { (group, is_middle && k == 0) } else { (group * count as u32 + k as u32, is_middle) }
-        };
-        places = places.iter().flat_map(|first| (0..count).map(move |k| pair(first, k))).collect();
-        groups *= more;
-        if groups > MOST_GROUPS {
-            return None;
-        }
-        // |x|_1 of points of the factor, and of those that are taken for them.
-        let size = 1.0 + 2.0 * attractor.bound(part).margin();
-        sizes = [sizes[0] * size, sizes[1] * (size + miss)];
-        factors.push(columns);
+    match attractor.automaton().factors(id) {
+        [] => Enclosure::of(vec![Part { columns: coordinate_box(attractor, id)?, is_box: true, size: 1.0, miss: 0.0 }]),
+        factors => of_product(attractor, factors),
     }
-    let columns = if factors.len() == 1 { factors.pop()? } else { SubdivisionOperator::product(factors) };
-    Some(Enclosure { columns, places, groups, miss: sizes[1] - sizes[0] })
+}
+
+/// The product of the boxes of curves and the hulls of others, whether or not it is a state.
+pub(super) fn of_product(attractor: &Attractor, factors: &[StateId]) -> Option<Enclosure> {
+    let part = |&factor: &StateId| {
+        let margin = attractor.bound(factor).margin();
+        let is_box = margin > 0.0;
+        // Kept: all products that a curve is a factor of see it by the same box.
+        let (columns, miss) = if is_box { (attractor.enclosure(factor)?.columns.clone(), 0.0) } else { hull(attractor, factor) };
+        Some(Part { columns, is_box, size: 1.0 + 2.0 * margin, miss })
+    };
+    Enclosure::of(factors.iter().map(part).collect::<Option<_>>()?)
+}
+
+/// What holds the attractor of a factor.
+struct Part {
+    columns: SubdivisionOperator,
+    is_box: bool,
+    /// |x|_1 of its points, and how far these may be outside, in the sum of coordinates.
+    size: f64,
+    miss: f64,
 }
 
 /// Points in whose hull the attractor of a factor lies, and by how much it may be outside, in the sum of coordinates.

@@ -9,6 +9,7 @@ mod complex;
 mod connected;
 mod cover;
 mod defect;
+mod deviation;
 mod early;
 mod enclosure;
 mod hull;
@@ -39,6 +40,7 @@ pub(crate) use attained::AttainedPoint;
 pub use bound::StateBound;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
+use deviation::Deviation;
 pub(crate) use enclosure::Enclosure;
 use glam::DVec3;
 use hull::Hulls;
@@ -102,6 +104,8 @@ pub struct Attractor {
     enclosures: Vec<OnceLock<Option<Enclosure>>>,
     /// Of every state, when first asked for.
     enclosed_children: Vec<OnceLock<Vec<Option<SubdivisionOperator>>>>,
+    /// Of every state, when first asked for.
+    deviations: Vec<OnceLock<Option<Deviation>>>,
     /// Widest gap of every frame state that is proven connected; see `connected`.
     connected: Vec<Option<f64>>,
     precisions: Vec<Option<LinearPrecision>>,
@@ -267,6 +271,7 @@ impl Attractor {
             state_hulls: vec![OnceLock::new(); count],
             enclosures: vec![OnceLock::new(); count],
             enclosed_children: vec![OnceLock::new(); count],
+            deviations: vec![OnceLock::new(); count],
             connected,
             precisions,
             contraction,
@@ -485,6 +490,11 @@ impl Attractor {
             let transitions = &self.automaton.state(state).transitions;
             transitions.iter().map(|transition| Some(transition.operator.times(&self.enclosure(transition.to)?.columns))).collect()
         })
+    }
+
+    /// What is known of the parts of a product with rough factors.
+    fn deviation(&self, state: StateId) -> Option<&Deviation> {
+        self.deviations[state.index()].get_or_init(|| deviation::deviation(self, state)).as_ref()
     }
 
     /// Parameters of a state's points, where its curves or faces are proven to have linear precision.
