@@ -140,6 +140,8 @@ fn combine<const N: usize, const M: usize>(parent: &[ControlPoint], entries: &[f
 
 /// Control points of a pair of factors that are combined without another buffer.
 const PAIR: usize = 128;
+/// The same where a smaller buffer is enough.
+const FEW: usize = 24;
 /// Points at most that measure the error of a cell, as a buffer holds them.
 pub(super) const MOST_MEASURED: usize = PAIR;
 
@@ -162,13 +164,20 @@ fn combine_pair(parent: &[ControlPoint], u: &SubdivisionOperator, v: &Subdivisio
     match (size(u), size(v)) {
         ((3, 3), (3, 3)) => combine_square::<3, 9>(parent, u.entries(), v.entries(), child),
         ((4, 4), (4, 4)) => combine_square::<4, 16>(parent, u.entries(), v.entries(), child),
-        ((_, columns), (rows, _)) if columns * rows <= PAIR => {
-            let mut half = [[0.0; 4]; PAIR];
-            combine_direction(parent, u, rows, &mut half[..columns * rows]);
-            combine_direction(&half[..columns * rows], v, 1, child);
-        }
+        // What holds more than is needed takes longer to clear than to fill.
+        ((_, columns), (rows, _)) if columns * rows <= FEW => combine_through::<FEW>(parent, u, v, child),
+        ((_, columns), (rows, _)) if columns * rows <= PAIR => combine_through::<PAIR>(parent, u, v, child),
         _ => combine_factors(parent, &[u.clone(), v.clone()], child),
     }
+}
+
+/// As [`combine_pair`] by way of at most `N` points.
+#[inline]
+fn combine_through<const N: usize>(parent: &[ControlPoint], u: &SubdivisionOperator, v: &SubdivisionOperator, child: &mut [ControlPoint]) {
+    let count = u.columns() * v.rows();
+    let mut half = [[0.0; 4]; N];
+    combine_direction(parent, u, v.rows(), &mut half[..count]);
+    combine_direction(&half[..count], v, 1, child);
 }
 
 /// As [`combine_pair`] for n x n operators, with the size known: `M` is n^2.

@@ -37,7 +37,7 @@ struct Word {
 }
 
 /// Words of one length in the transitions of a curve: their operators, and where they lead to.
-type Steps = Vec<(SubdivisionOperator, StateId)>;
+pub(super) type Steps = Vec<(SubdivisionOperator, StateId)>;
 
 /// The longest words that are few enough of a rough curve, or a product with such, that has precision; none of others, or where nothing encloses them.
 pub(super) fn deviation(attractor: &Attractor, id: StateId) -> Option<Deviation> {
@@ -48,28 +48,27 @@ pub(super) fn deviation(attractor: &Attractor, id: StateId) -> Option<Deviation>
     let own = [id];
     let curves = if attractor.automaton().factors(id).is_empty() { &own } else { attractor.automaton().factors(id) };
     let of_length = |length: usize| {
-        let steps: Vec<Steps> = curves.iter().map(|&curve| steps(attractor, curve, length)).collect();
-        words(attractor, &steps, precision)
+        let length = |curve: StateId| if attractor.bound(curve).margin() > 0.0 { length } else { 0 };
+        let steps: Option<Vec<Steps>> = curves.iter().map(|&curve| steps(attractor, curve, length(curve), MOST_COLUMNS)).collect();
+        words(attractor, &steps?, precision)
     };
     (0..=LONGEST).map_while(of_length).last()
 }
 
-/// All words of a length in a curve that is rough; the empty one alone in others.
-fn steps(attractor: &Attractor, curve: StateId, length: usize) -> Steps {
+/// All words of a length in a curve; none where there are more than `most`.
+pub(super) fn steps(attractor: &Attractor, curve: StateId, length: usize, most: usize) -> Option<Steps> {
     let state = |id: StateId| attractor.automaton().state(id);
     let mut steps = vec![(SubdivisionOperator::identity(state(curve).dimension), curve)];
-    if attractor.bound(curve).margin() > 0.0 {
-        for _ in 0..length {
-            let longer = |(operator, id): &(SubdivisionOperator, StateId)| {
-                state(*id).transitions.iter().map(|step| (operator.times(&step.operator), step.to)).collect::<Steps>()
-            };
-            steps = steps.iter().flat_map(longer).collect();
-            if steps.len() > MOST_COLUMNS {
-                break;
-            }
+    for _ in 0..length {
+        if steps.iter().map(|(_, id)| state(*id).transitions.len()).sum::<usize>() > most {
+            return None;
         }
+        let longer = |(operator, id): &(SubdivisionOperator, StateId)| {
+            state(*id).transitions.iter().map(|step| (operator.times(&step.operator), step.to)).collect::<Steps>()
+        };
+        steps = steps.iter().flat_map(longer).collect();
     }
-    steps
+    Some(steps)
 }
 
 /// The words that one of each curve makes; none where they are too many, or nothing encloses one.

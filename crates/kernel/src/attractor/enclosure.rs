@@ -21,8 +21,9 @@ use std::collections::BinaryHeap;
 
 /// Control points at most of a curve that is examined.
 const MOST_POINTS: usize = 16;
-/// Points of a product's hulls at most.
+/// Points of a product's hulls at most, and as many as most have.
 const MOST_GROUPS: usize = 64;
+const FEW_GROUPS: usize = 8;
 /// Intervals are as wide as they need be and this share more, of the row's largest entry.
 const ACCURACY: f64 = 0.01;
 /// Cells that are split at most, for each end of an interval.
@@ -65,7 +66,13 @@ impl Enclosure {
 
     /// A box of the vectors that an affine map takes the attractor to, given by those that it takes the columns to.
     pub(super) fn box_of(&self, seen: &[Point]) -> [Point; 2] {
-        let (mut middles, mut reaches) = ([[0.0; 3]; MOST_GROUPS], [[0.0; 3]; MOST_GROUPS]);
+        if self.groups <= FEW_GROUPS { self.box_of_groups::<FEW_GROUPS>(seen) } else { self.box_of_groups::<MOST_GROUPS>(seen) }
+    }
+
+    /// The same, with as many groups as `N` at most.
+    #[inline]
+    fn box_of_groups<const N: usize>(&self, seen: &[Point]) -> [Point; 2] {
+        let (mut middles, mut reaches) = ([[0.0; 3]; N], [[0.0; 3]; N]);
         for (&(group, is_middle), value) in self.places.iter().zip(seen) {
             if is_middle {
                 middles[group as usize] = *value;
@@ -138,7 +145,7 @@ struct Part {
 }
 
 /// Points in whose hull the attractor of a factor lies, and by how much it may be outside, in the sum of coordinates.
-fn hull(attractor: &Attractor, id: StateId) -> (SubdivisionOperator, f64) {
+pub(super) fn hull(attractor: &Attractor, id: StateId) -> (SubdivisionOperator, f64) {
     let own = attractor.hull(id).and_then(|own| Some((own.points.clone()?, own.miss)));
     own.unwrap_or_else(|| (SubdivisionOperator::identity(attractor.automaton().state(id).dimension), 0.0))
 }
@@ -190,7 +197,15 @@ fn half_width(interval: &[f64; 2], scale: f64) -> f64 {
 /// Bounds of a row's values over the attractor of a state.
 fn interval(attractor: &Attractor, id: StateId, row: &[f64]) -> Option<[f64; 2]> {
     let opposite: Vec<f64> = row.iter().map(|value| -value).collect();
-    Some([-highest(attractor, id, &opposite)?, highest(attractor, id, row)?])
+    let wanted = ACCURACY * row.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    Some([-highest(attractor, id, &opposite, wanted)?.0, highest(attractor, id, row, wanted)?.0])
+}
+
+/// The same, each within a slack of a value that is there; none where that would take too long.
+pub(super) fn attained(attractor: &Attractor, id: StateId, row: &[f64], slack: f64) -> Option<[f64; 2]> {
+    let opposite: Vec<f64> = row.iter().map(|value| -value).collect();
+    let found = |row: &[f64]| highest(attractor, id, row, slack).filter(|(_, is_near)| *is_near).map(|(high, _)| high);
+    Some([-found(&opposite)?, found(row)?])
 }
 
 struct Cell {
@@ -202,27 +217,27 @@ struct Cell {
 
 ordered_by!(Cell, |this, other| this.high.total_cmp(&other.high));
 
-/// Bounds a row's largest value from above.
-fn highest(attractor: &Attractor, id: StateId, row: &[f64]) -> Option<f64> {
+/// Bounds a row's largest value from above, and tells whether some value is as near to that as wanted.
+fn highest(attractor: &Attractor, id: StateId, row: &[f64], wanted: f64) -> Option<(f64, bool)> {
     let cell = |state: StateId, values: Vec<f64>, most: f64| {
         let StateBound::Hull { margin, .. } = attractor.bound(state) else { return None };
         let [least, largest] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)]);
         let beyond = margin * (largest - least);
         Some(Cell { low: least - beyond, high: most.min(largest + beyond), state, values })
     };
-    let wanted = ACCURACY * row.iter().map(|x| x.abs()).fold(0.0, f64::max);
     let mut heap = BinaryHeap::from([cell(id, row.to_vec(), f64::INFINITY)?]);
     for _ in 0..SPLITS {
         let best = heap.pop()?;
         let transitions = &attractor.automaton().state(best.state).transitions;
-        if best.high - best.low <= wanted || transitions.is_empty() {
-            return Some(best.high);
+        let is_near = best.high - best.low <= wanted;
+        if is_near || transitions.is_empty() {
+            return Some((best.high, is_near));
         }
         for transition in transitions {
             heap.push(cell(transition.to, transition.operator.pull_back(&best.values), best.high)?);
         }
     }
-    heap.pop().map(|best| best.high)
+    heap.pop().map(|best| (best.high, false))
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ pub(crate) mod sites;
 mod tangent;
 pub(crate) mod trim;
 mod walk;
+mod zigzag;
 
 use crate::automaton::topology::{Topology, TopologyError};
 use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, State, StateId, SubdivisionOperator, convergence};
@@ -54,6 +55,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 pub use tangent::{NoTangentPlane, TangentPlanes};
 use trim::TrimmedSurface;
+pub(crate) use zigzag::Zigzag;
 
 /// Where a shape begins: a state and its control points.
 #[derive(Clone, Debug, PartialEq)]

@@ -17,6 +17,7 @@
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
 //! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`).
+//! Of graphs that are rough along one of two axes another graph is dilated that is as near to them with far fewer triangles (`zigzag` in `attractor`).
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
 //!
 //! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
@@ -178,9 +179,20 @@ impl Order<'_> {
                     Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)
                 };
                 let whole = plan(attractor)?;
-                match whole.split(budget)? {
+                let zigzag = if simplify { Drawn::zigzag(attractor, radius, tolerance, budget)? } else { None };
+                // Two triangles for each cell.
+                let fewer = zigzag.as_ref().map_or(usize::MAX, |zigzag| zigzag.triangles() / 2);
+                match whole.split(fewer, budget)? {
                     Some(split) => work(&plan(&split)?),
-                    None => work(&whole),
+                    None => match zigzag {
+                        Some(zigzag)
+                            if whole.leaves(fewer, budget)?.is_none()
+                                && let Some(drawn) = Drawn::graph(&zigzag, attractor, radius, tolerance, budget)? =>
+                        {
+                            work(&drawn.plan(simplify, coarseness, budget)?)
+                        }
+                        _ => work(&whole),
+                    },
                 }
             }
         }

@@ -344,19 +344,24 @@ impl<'a> Plan<'a> {
         Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, meant, clean_only: !simplify })
     }
 
-    /// The attractor with as many roots as there are leaf cells, where it is made of products that have fewer when they are split along one factor at a time.
-    pub(super) fn split(&self, budget: &Budget) -> Result<Option<Attractor>, Stopped> {
+    /// The attractor with as many roots as there are leaf cells, no more than `most`, where it is made of products that have fewer when they are split along one factor at a time.
+    pub(super) fn split(&self, most: usize, budget: &Budget) -> Result<Option<Attractor>, Stopped> {
         if self.rule.is_dense() || self.rule.is_exact() {
             return Ok(None);
         }
         let attractor = self.rule.attractor();
         let controls = attractor.roots().iter().map(|root| root.points.len()).max().unwrap_or(0) as u64;
         let room = budget.limits.memory_bytes / (SPLIT_SHARE * (BYTES_PER_CELL + BYTES_PER_CONTROL_POINT * controls));
-        let most = room.min(budget.limits.cells).min(MOST_SPLIT) as usize;
+        let most = most.min(room.min(budget.limits.cells).min(MOST_SPLIT) as usize);
         let is_leaf = |cell: &Cell, points: &[ControlPoint]| self.rule.leaf(cell, points).is_some();
         let Some(split) = attractor.split_along_factors(most, is_leaf, budget)? else { return Ok(None) };
         let is_fewer = self.rule.leaves(split.roots().len(), &budget.cancel)?.is_none();
         Ok(is_fewer.then_some(split))
+    }
+
+    /// How many leaf cells there are, if no more than `most`.
+    pub(super) fn leaves(&self, most: usize, budget: &Budget) -> Result<Option<usize>, Stopped> {
+        self.rule.leaves(most, &budget.cancel)
     }
 
     /// The same for an attractor that stands for another one, within what is left of the tolerance.
