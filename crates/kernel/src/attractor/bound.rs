@@ -13,6 +13,7 @@
 //! subdivisions are independent, and |x_A x x_B|_1 = |x_A|_1 |x_B|_1. As 1 + 2 m = sup |x|_1, the margins obey
 //! 1 + 2 m = (1 + 2 m_A)(1 + 2 m_B), exactly; with products of the factors' centres as centres, these too.
 
+use super::cell::{Point, dot};
 use crate::automaton::{Automaton, Contraction, LeafPrimitive, State, StateId};
 use crate::order::ordered_by;
 use std::collections::BinaryHeap;
@@ -57,12 +58,55 @@ impl StateBound {
         }
     }
 
+    /// Bounds of values . x over the attractor.
+    pub(crate) fn range(&self, values: &[f64]) -> [f64; 2] {
+        match self {
+            Self::Hull { margin, .. } => {
+                let [least, most] = extremes_of(values);
+                let beyond = if *margin > 0.0 { margin * (most - least) } else { 0.0 };
+                [least - beyond, most + beyond]
+            }
+            Self::Frame { low, high, centre, reach, .. } => {
+                let slopes: Point = std::array::from_fn(|j| values[j + 1] - values[0]);
+                let (mut least, mut most) = (values[0], values[0]);
+                for j in 0..3 {
+                    let (a, b) = (slopes[j] * low[j], slopes[j] * high[j]);
+                    least += a.min(b);
+                    most += a.max(b);
+                }
+                // The ellipsoid's support: the image of the unit ball under its matrix.
+                let middle = values[0] + dot(&slopes, centre);
+                let radius = reach.iter().map(|column| dot(&slopes, column).powi(2)).sum::<f64>().sqrt();
+                [least.max(middle - radius), most.min(middle + radius)]
+            }
+        }
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         match self {
             Self::Hull { centre, margin } => margin.is_finite() && centre.iter().all(|x| x.is_finite()),
             Self::Frame { centre, reach, .. } => centre.iter().chain(reach.as_flattened()).all(|x| x.is_finite()),
         }
     }
+}
+
+/// The least and the largest of some values.
+pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(value), most.max(value)])
+}
+
+/// The same, of four at a time: one alone would wait for every comparison.
+fn extremes_of(values: &[f64]) -> [f64; 2] {
+    let (parts, rest) = values.as_chunks::<4>();
+    let (mut least, mut most) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
+    for part in parts {
+        for k in 0..4 {
+            least[k] = if part[k] < least[k] { part[k] } else { least[k] };
+            most[k] = if part[k] > most[k] { part[k] } else { most[k] };
+        }
+    }
+    let [low, high] = extremes(rest.iter().copied());
+    [least.into_iter().fold(low, f64::min), most.into_iter().fold(high, f64::max)]
 }
 
 /// Bounds all states of a convergent automaton.

@@ -255,7 +255,7 @@ mod tests {
         assert!(smooth.deviation(smooth.roots()[0].state).is_none());
     }
 
-    /// By the margins these take 6, 10 and 4 times as many.
+    /// By the margins these take 67, 188 and 28,377.
     #[test]
     fn rough_shapes_take_few_cells() {
         let mut random = Random(7);

@@ -220,10 +220,9 @@ ordered_by!(Cell, |this, other| this.high.total_cmp(&other.high));
 /// Bounds a row's largest value from above, and tells whether some value is as near to that as wanted.
 fn highest(attractor: &Attractor, id: StateId, row: &[f64], wanted: f64) -> Option<(f64, bool)> {
     let cell = |state: StateId, values: Vec<f64>, most: f64| {
-        let StateBound::Hull { margin, .. } = attractor.bound(state) else { return None };
-        let [least, largest] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)]);
-        let beyond = margin * (largest - least);
-        Some(Cell { low: least - beyond, high: most.min(largest + beyond), state, values })
+        let bound @ StateBound::Hull { .. } = attractor.bound(state) else { return None };
+        let [low, high] = bound.range(&values);
+        Some(Cell { low, high: most.min(high), state, values })
     };
     let mut heap = BinaryHeap::from([cell(id, row.to_vec(), f64::INFINITY)?]);
     for _ in 0..SPLITS {

@@ -39,6 +39,7 @@ pub(crate) use address::rounding;
 pub use address::{Address, AddressError, Location, MOST_LETTERS, point_at, ranges};
 pub(crate) use attained::AttainedPoint;
 pub use bound::StateBound;
+pub(crate) use bound::extremes;
 pub use complex::{CellAddress, CellComplex, Gluing, Step};
 pub use cover::{Halo, PointCover};
 use deviation::Deviation;

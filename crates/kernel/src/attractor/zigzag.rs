@@ -349,21 +349,17 @@ impl Strip {
 
     /// e + o / 2 over a column.
     fn off(&self, attractor: &Attractor, column: &Part) -> f64 {
-        let (margin, enclosure) = (attractor.bound(column.state).margin(), attractor.enclosure(column.state));
+        let (bound, enclosure) = (attractor.bound(column.state), attractor.enclosure(column.state));
         let range = |values: &[f64]| {
             let values = column.operator.pull_back(values);
             match enclosure {
                 Some(enclosure) => enclosure.range(enclosure.columns.pull_back(&values).into_iter()),
-                None => {
-                    let ends = [f64::INFINITY, f64::NEG_INFINITY];
-                    let [low, high] = values.iter().fold(ends, |[low, high], &x| [low.min(x), high.max(x)]);
-                    [low - margin * (high - low), high + margin * (high - low)]
-                }
+                None => bound.range(&values),
             }
         };
         let [low, high] = range(&self.difference);
         let bent = self.bent.iter().map(|values| range(values).map(f64::abs)).map(|[low, high]| low.max(high)).fold(0.0, f64::max);
-        0.5 * (high - low) + bent + (1.0 + 2.0 * margin) * self.missed
+        0.5 * (high - low) + bent + (1.0 + 2.0 * bound.margin()) * self.missed
     }
 }
 

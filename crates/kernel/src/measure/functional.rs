@@ -1,7 +1,7 @@
 //! Functionals on the barycentric spaces of states, and their bounds on the attractors.
 
 use crate::attractor::cell::{ControlPoint, Point, dot};
-use crate::attractor::{AttainedPoint, StateBound};
+use crate::attractor::{AttainedPoint, StateBound, extremes};
 use crate::automaton::{PullBack, SubdivisionOperator};
 use crate::de_casteljau::halves;
 
@@ -71,7 +71,7 @@ impl Functional {
         match (&self.weights, &other.weights) {
             (None, None) => {
                 difference.extend(other.values.iter().zip(&self.values).map(|(other, own)| other - own));
-                let lower = range(bound, difference)[0];
+                let lower = bound.range(difference)[0];
                 (lower >= -allowed).then_some((-lower).max(0.0))
             }
             // With t = max(reached, h(other) + e) for e = `allowed`, suppose h > t, which is between `reached` and `ceiling`: somewhere
@@ -125,7 +125,7 @@ impl Functional {
     /// Bounds of its values on a state's attractor.
     pub(super) fn range(&self, bound: &StateBound) -> [f64; 2] {
         match &self.weights {
-            None => range(bound, &self.values),
+            None => bound.range(&self.values),
             // Operators without negative entries, and positive weights: a mean of the control points' quotients.
             Some(weights) => extremes(self.values.iter().zip(weights).map(|(value, weight)| value / weight)),
         }
@@ -142,47 +142,5 @@ impl<'a> ForChildren<'a> {
     /// As seen from the child with this operator.
     pub(super) fn pulled_back(&mut self, operator: &'a SubdivisionOperator) -> Functional {
         Functional { values: self.values.by(operator), weights: self.weights.as_mut().map(|weights| weights.by(operator)) }
-    }
-}
-
-fn extremes(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(value), most.max(value)])
-}
-
-/// The same, of four at a time: one alone would wait for every comparison.
-fn extremes_of(values: &[f64]) -> [f64; 2] {
-    let (parts, rest) = values.as_chunks::<4>();
-    let (mut least, mut most) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
-    for part in parts {
-        for k in 0..4 {
-            least[k] = if part[k] < least[k] { part[k] } else { least[k] };
-            most[k] = if part[k] > most[k] { part[k] } else { most[k] };
-        }
-    }
-    let [low, high] = extremes(rest.iter().copied());
-    [least.into_iter().fold(low, f64::min), most.into_iter().fold(high, f64::max)]
-}
-
-/// Bounds of values . x over the attractor of a state with that bound.
-fn range(bound: &StateBound, values: &[f64]) -> [f64; 2] {
-    match bound {
-        StateBound::Hull { margin, .. } => {
-            let [least, most] = extremes_of(values);
-            let beyond = if *margin > 0.0 { margin * (most - least) } else { 0.0 };
-            [least - beyond, most + beyond]
-        }
-        StateBound::Frame { low, high, centre, reach, .. } => {
-            let slopes: Point = std::array::from_fn(|j| values[j + 1] - values[0]);
-            let (mut least, mut most) = (values[0], values[0]);
-            for j in 0..3 {
-                let (a, b) = (slopes[j] * low[j], slopes[j] * high[j]);
-                least += a.min(b);
-                most += a.max(b);
-            }
-            // The ellipsoid's support: the image of the unit ball under its matrix.
-            let middle = values[0] + dot(&slopes, centre);
-            let radius = reach.iter().map(|column| dot(&slopes, column).powi(2)).sum::<f64>().sqrt();
-            [least.max(middle - radius), most.min(middle + radius)]
-        }
     }
 }
