@@ -37,7 +37,7 @@ struct Word {
 }
 
 /// Words of one length in the transitions of a curve: their operators, and where they lead to.
-pub(super) type Steps = Vec<(SubdivisionOperator, StateId)>;
+type Steps = Vec<(SubdivisionOperator, StateId)>;
 
 /// The longest words that are few enough of a rough curve, or a product with such, that has precision; none of others, or where nothing encloses them.
 pub(super) fn deviation(attractor: &Attractor, id: StateId) -> Option<Deviation> {
@@ -56,7 +56,7 @@ pub(super) fn deviation(attractor: &Attractor, id: StateId) -> Option<Deviation>
 }
 
 /// All words of a length in a curve; none where there are more than `most`.
-pub(super) fn steps(attractor: &Attractor, curve: StateId, length: usize, most: usize) -> Option<Steps> {
+fn steps(attractor: &Attractor, curve: StateId, length: usize, most: usize) -> Option<Steps> {
     let state = |id: StateId| attractor.automaton().state(id);
     let mut steps = vec![(SubdivisionOperator::identity(state(curve).dimension), curve)];
     for _ in 0..length {

@@ -198,14 +198,7 @@ fn half_width(interval: &[f64; 2], scale: f64) -> f64 {
 fn interval(attractor: &Attractor, id: StateId, row: &[f64]) -> Option<[f64; 2]> {
     let opposite: Vec<f64> = row.iter().map(|value| -value).collect();
     let wanted = ACCURACY * row.iter().map(|x| x.abs()).fold(0.0, f64::max);
-    Some([-highest(attractor, id, &opposite, wanted)?.0, highest(attractor, id, row, wanted)?.0])
-}
-
-/// The same, each within a slack of a value that is there; none where that would take too long.
-pub(super) fn attained(attractor: &Attractor, id: StateId, row: &[f64], slack: f64) -> Option<[f64; 2]> {
-    let opposite: Vec<f64> = row.iter().map(|value| -value).collect();
-    let found = |row: &[f64]| highest(attractor, id, row, slack).filter(|(_, is_near)| *is_near).map(|(high, _)| high);
-    Some([-found(&opposite)?, found(row)?])
+    Some([-highest(attractor, id, &opposite, wanted)?, highest(attractor, id, row, wanted)?])
 }
 
 struct Cell {
@@ -217,8 +210,8 @@ struct Cell {
 
 ordered_by!(Cell, |this, other| this.high.total_cmp(&other.high));
 
-/// Bounds a row's largest value from above, and tells whether some value is as near to that as wanted.
-fn highest(attractor: &Attractor, id: StateId, row: &[f64], wanted: f64) -> Option<(f64, bool)> {
+/// Bounds a row's largest value from above.
+fn highest(attractor: &Attractor, id: StateId, row: &[f64], wanted: f64) -> Option<f64> {
     let cell = |state: StateId, values: Vec<f64>, most: f64| {
         let bound @ StateBound::Hull { .. } = attractor.bound(state) else { return None };
         let [low, high] = bound.range(&values);
@@ -228,15 +221,14 @@ fn highest(attractor: &Attractor, id: StateId, row: &[f64], wanted: f64) -> Opti
     for _ in 0..SPLITS {
         let best = heap.pop()?;
         let transitions = &attractor.automaton().state(best.state).transitions;
-        let is_near = best.high - best.low <= wanted;
-        if is_near || transitions.is_empty() {
-            return Some((best.high, is_near));
+        if best.high - best.low <= wanted || transitions.is_empty() {
+            return Some(best.high);
         }
         for transition in transitions {
             heap.push(cell(transition.to, transition.operator.pull_back(&best.values), best.high)?);
         }
     }
-    heap.pop().map(|best| (best.high, false))
+    heap.pop().map(|best| best.high)
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ mod defect;
 mod deviation;
 mod early;
 mod enclosure;
+pub(crate) mod graph;
 mod hull;
 mod invariant;
 mod near;
@@ -26,7 +27,6 @@ pub(crate) mod sites;
 mod tangent;
 pub(crate) mod trim;
 mod walk;
-mod zigzag;
 
 use crate::automaton::topology::{Topology, TopologyError};
 use crate::automaton::{Automaton, AutomatonError, Contraction, LeafPrimitive, State, StateId, SubdivisionOperator, convergence};
@@ -45,6 +45,7 @@ pub use cover::{Halo, PointCover};
 use deviation::Deviation;
 pub(crate) use enclosure::Enclosure;
 use glam::DVec3;
+pub(crate) use graph::{Column, Graph};
 use hull::Hulls;
 pub(crate) use hull::StateHull;
 pub use near::{NearQuery, Nearby, Nearest, Neighbourhood, addresses_near};
@@ -56,7 +57,6 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 pub use tangent::{NoTangentPlane, TangentPlanes};
 use trim::TrimmedSurface;
-pub(crate) use zigzag::Zigzag;
 
 /// Where a shape begins: a state and its control points.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,7 +18,7 @@ use super::frame::{DEEP, FAR, Frame, NOTHING, UNKNOWN, Value};
 use super::lattice::{Cube, Grading, Number, Plain, UNITS, is_mirrored};
 use super::octree::Task;
 use super::outside::{Corner, Cut, FACES, HalfSpace, Outside};
-use super::plan::Setting;
+use super::setting::Setting;
 use super::smooth::{self, MOST_NOISE, WHOLE};
 use super::star::{Star, Stars, note};
 use super::surface::{BlockSurface, NameHasher, NameMap, Seam, UNNAMED, VertexName};

@@ -23,7 +23,7 @@ use super::frame::Frame;
 use super::lattice::{Cube, LEVELS};
 use super::outside::Corner;
 use super::parting::{avoids_origin, farthest};
-use super::plan::Setting;
+use super::setting::Setting;
 use super::smooth::{self, MOST_NOISE};
 use super::surface::BlockSurface;
 use super::tree::{Tree, highest};

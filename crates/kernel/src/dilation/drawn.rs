@@ -3,7 +3,7 @@
 use super::DilationError;
 use super::plan::{Balls, Meant, Plan};
 use super::unfold::unfolded;
-use crate::attractor::{Attractor, RefineError, Zigzag};
+use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Limits};
 use crate::measure::bounds::{bounding_box, dilated_box};
 use crate::tolerance::{Radius, Tolerance};
@@ -20,15 +20,6 @@ const SMOOTH_SHARE: f64 = 0.2;
 
 /// Share of it by which they may move where they turn back.
 const UNFOLDED_SHARE: f64 = 0.2;
-
-/// Share of the tolerance that triangles which stand for rough graphs may use.
-const ROUGH_SHARE: f64 = 0.5;
-
-/// Triangles of these at most.
-const MOST_OF_GRAPH: u64 = 2_000_000;
-
-/// Bytes that sheets along one of them take at most.
-const BYTES_PER_TRIANGLE: u64 = 2_000;
 
 /// Cells of a smooth surface at most: in any case, and for each square of the radius times the tolerance in half of the box around. With no radius of curvature below that of the ball a cell that is off by a fifth of the tolerance has about one such square; rough surfaces have more.
 const FEW_CELLS: f64 = 10_000.0;
@@ -110,33 +101,6 @@ impl Drawn {
         let Ok(rest) = Tolerance::new(aimed - deviation_mm) else { return Ok(None) };
         let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius) };
         Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest }))
-    }
-
-    /// A graph near one that is rough along one of two axes, before it is drawn; `None` where it is none, or needs very many triangles.
-    pub(super) fn zigzag<'a>(
-        attractor: &'a Attractor,
-        radius: Radius,
-        tolerance: Tolerance,
-        budget: &Budget,
-    ) -> Result<Option<Zigzag<'a>>, DilationError> {
-        let most = (budget.limits.memory_bytes / BYTES_PER_TRIANGLE).min(budget.limits.cells).min(MOST_OF_GRAPH);
-        Ok(attractor.zigzag(ROUGH_SHARE * tolerance.mm().min(0.5 * radius.mm()), most as usize, budget)?)
-    }
-
-    /// Draws such a graph; `None` where that does not come out.
-    pub(super) fn graph(
-        zigzag: &Zigzag<'_>,
-        attractor: &Attractor,
-        radius: Radius,
-        tolerance: Tolerance,
-        budget: &Budget,
-    ) -> Result<Option<Self>, DilationError> {
-        let radius = radius.mm();
-        let Some((mesh, deviation_mm)) = zigzag.drawn(budget)? else { return Ok(None) };
-        let Some(drawn) = Attractor::of_triangles(&mesh) else { return Ok(None) };
-        let Ok(rest) = Tolerance::new(tolerance.mm().min(0.5 * radius) - deviation_mm) else { return Ok(None) };
-        let meant = Meant { off: f64::INFINITY, deviation_mm, bounds: bounding_box(attractor, budget)?.grown(radius) };
-        Ok(Some(Self { attractor: drawn, balls: Balls { least: radius, most: radius }, meant, rest }))
     }
 
     /// The plan of its dilation, as that of the other one.

@@ -12,7 +12,7 @@
 //! of D(r) it would have held a critical point of the distance, which has two sites at one distance at least; where there is one site alone, there was none.
 
 use super::convex::SiteSearch;
-use super::plan::Setting;
+use super::setting::Setting;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Tree};
 use crate::attractor::cell::{Point, cross, distance_squared, dot};

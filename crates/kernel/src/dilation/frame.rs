@@ -2,7 +2,8 @@
 
 use super::convex::{Convex, SiteSearch};
 use super::lattice::{Cube, ENCLOSING, Number, UNITS};
-use super::plan::{JUNG, Setting};
+use super::plan::JUNG;
+use super::setting::Setting;
 use super::tree::{NodeId, SiteId, Tree, in_space};
 use crate::attractor::cell::{Point, distance_squared};
 

@@ -17,7 +17,7 @@
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
 //! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`).
-//! Of graphs that are rough along one of two axes another graph is dilated that is as near to them with far fewer triangles (`zigzag` in `attractor`).
+//! For graphs over a convex part of a plane that have very many cells, as rough ones do, rays stand that lead down and up from a few of their places (`peaks`): between two sheets is all that is near to these.
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
 //!
 //! Parts may have radii of their own (`deficit` in `attractor::sites`). Walls and closings are made of dilations of surfaces (`wall`).
@@ -35,15 +35,18 @@ mod drawn;
 mod dust;
 mod error;
 mod frame;
+mod half_ball;
 mod lattice;
 mod octree;
 mod outside;
 mod parting;
 mod patches;
+mod peaks;
 mod plan;
 mod pool;
 mod sample;
 mod seam;
+mod setting;
 mod simplify;
 mod slivers;
 mod smooth;
@@ -55,7 +58,7 @@ mod tree;
 mod unfold;
 mod wall;
 
-use crate::attractor::Attractor;
+use crate::attractor::{Attractor, Graph};
 use crate::budget::{Budget, Limits};
 use crate::measure::bounds::AxisBox;
 use crate::solid::Solid;
@@ -122,12 +125,19 @@ pub fn dilate_unsimplified(
 const COARSE: f64 = 1.0;
 const FINER: [f64; 2] = [0.35, 0.125];
 
+/// Few cells of a graph; few are those of products, too, that are split along one factor at a time.
+const FEW_CELLS: usize = 20_000;
+
 /// Cells that finer sites are made of at most, for each of the first: along curves and surfaces that are smooth they are three to eight times as many.
 const MORE_CELLS: u64 = 10;
 
 fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
     let order = Order { attractor, radius, tolerance, simplify };
     if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
+        return Ok(dilation);
+    }
+    let by_rays = |cells: Cells| order.over_graph(cells, budget, |plan, graph| plan.run_over(graph, budget));
+    if let Some(dilation) = by_rays(Cells::Many)? {
         return Ok(dilation);
     }
     let finer = |cells: u64| {
@@ -141,7 +151,14 @@ fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Bud
         }
         Ok(None)
     };
-    order.planned(COARSE, budget, |plan| plan.run(finer, budget))
+    order.planned(COARSE, budget, |plan| plan.run(finer, || by_rays(Cells::Few), budget))
+}
+
+/// Cells of a graph. Many are left to rays at once; few serve better themselves, unless they need a lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cells {
+    Few,
+    Many,
 }
 
 /// What is asked for.
@@ -164,6 +181,22 @@ impl Order<'_> {
         unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
     }
 
+    /// What comes of the plan for a graph over a convex part of a plane that is made of few cells, or of many; none where it is none, or where rays do not serve it.
+    fn over_graph<T>(
+        &self,
+        cells: Cells,
+        budget: &Budget,
+        work: impl FnOnce(&Plan<'_>, &Graph) -> Result<Option<T>, DilationError>,
+    ) -> Result<Option<T>, DilationError> {
+        let Self { attractor, radius, tolerance, simplify } = *self;
+        let graph = if simplify { attractor.graph() } else { None };
+        let Some(graph) = graph else { return Ok(None) };
+        let balls = Balls { least: radius.mm(), most: radius.mm() };
+        let plan = Plan::new(attractor, balls, tolerance, simplify, COARSE, budget)?;
+        let are_few = plan.leaves(FEW_CELLS, budget)?.is_some() || (graph.has_smooth_curves() && plan.split(budget)?.is_some());
+        if are_few == (cells == Cells::Few) { work(&plan, &graph) } else { Ok(None) }
+    }
+
     /// What comes of the plan with sites of some coarseness.
     fn planned<T>(
         &self,
@@ -179,20 +212,9 @@ impl Order<'_> {
                     Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)
                 };
                 let whole = plan(attractor)?;
-                let zigzag = if simplify { Drawn::zigzag(attractor, radius, tolerance, budget)? } else { None };
-                // Two triangles for each cell.
-                let fewer = zigzag.as_ref().map_or(usize::MAX, |zigzag| zigzag.triangles() / 2);
-                match whole.split(fewer, budget)? {
+                match whole.split(budget)? {
                     Some(split) => work(&plan(&split)?),
-                    None => match zigzag {
-                        Some(zigzag)
-                            if whole.leaves(fewer, budget)?.is_none()
-                                && let Some(drawn) = Drawn::graph(&zigzag, attractor, radius, tolerance, budget)? =>
-                        {
-                            work(&drawn.plan(simplify, coarseness, budget)?)
-                        }
-                        _ => work(&whole),
-                    },
+                    None => work(&whole),
                 }
             }
         }
@@ -236,8 +258,12 @@ pub fn predict(
     budget: &Budget,
 ) -> Result<Prediction, DilationError> {
     let order = Order { attractor, radius, tolerance, simplify };
-    match order.in_sheets(budget, |plan| plan.predict_in_sheets(budget))? {
+    if let Some(prediction) = order.in_sheets(budget, |plan| plan.predict_in_sheets(budget))? {
+        return Ok(prediction);
+    }
+    let by_rays = |cells: Cells| order.over_graph(cells, budget, |plan, graph| plan.predict_over(graph, budget));
+    match by_rays(Cells::Many)? {
         Some(prediction) => Ok(prediction),
-        None => order.planned(COARSE, budget, |plan| plan.predict(budget)),
+        None => order.planned(COARSE, budget, |plan| plan.predict(|| by_rays(Cells::Few), budget)),
     }
 }

@@ -4,8 +4,8 @@
 use super::DilationError;
 use super::block::{SIDE, Workshop, signed_side};
 use super::lattice::{Cube, Grading, around};
-use super::plan::Setting;
 use super::pool::Pool;
+use super::setting::Setting;
 use super::surface::{BlockSurface, Blocks, NameHasher};
 use super::tree::{Candidate, Candidates, with_deficit};
 use crate::attractor::Attractor;

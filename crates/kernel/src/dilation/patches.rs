@@ -4,8 +4,8 @@
 //! their numbers.
 
 use super::arrangement::Index;
-use super::plan::Setting;
 use super::pool::Pool;
+use super::setting::Setting;
 use super::simplify::{Core, OF_POLYTOPES, Simplifier};
 use super::surface::BlockSurface;
 use super::tree::NodeId;

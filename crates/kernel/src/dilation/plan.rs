@@ -1,23 +1,25 @@
 //! Pitch, thresholds and bounds of a dilation.
 
-use super::arrangement::{self, Arranged, Arrangement, Copies};
+use super::arrangement::height_field::between_rays;
+use super::arrangement::{self, Arranged, Arrangement, Copies, Flat};
 use super::assemble::Assembly;
-use super::block::{self, WITNESS};
+use super::block;
 use super::dust;
-use super::lattice::{Cube, ENCLOSING, Grading, LEVELS, Lattice};
+use super::lattice::{Cube, ENCLOSING, Grading};
 use super::octree::{Changed, Node, Pass, Task};
-use super::outside::MOST;
 use super::patches;
+use super::peaks::{self, Stand};
 use super::pool::Pool;
 use super::seam;
+use super::setting::{Setting, extent, least};
 use super::simplify::Core;
 use super::smooth::MOST_NOISE;
 use super::surface::{BlockSurface, Blocks};
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
-use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint};
 use crate::attractor::sites::{SiteError, SiteRule};
+use crate::attractor::{Attractor, Graph};
 use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
 use crate::measure::bounds::{AxisBox, bounding_box};
@@ -27,63 +29,6 @@ use crate::tolerance::Tolerance;
 use glam::DVec3;
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Mutex;
-
-/// Numbers that all blocks share, in mm or mm^2.
-#[derive(Clone, Debug)]
-pub(crate) struct Setting {
-    pub(super) lattice: Lattice,
-    /// sqrt(theta) = r: sites nearer than this cover a vertex.
-    pub(super) reach: f64,
-    /// Sites farther than this from all vertices of a tetrahedron do not matter in it: sqrt(outer^2 + R^2).
-    pub(super) near: f64,
-    /// Vertices farther than this from all sites have no covered neighbour: r + a, or r + gap + a.
-    pub(super) horizon: f64,
-    /// Sites are known this far around places whose distance from the sites is asked.
-    pub(super) sight: f64,
-    /// (r + a)^2 less theta as an integer, rounded up.
-    pub(super) far: i64,
-    /// The surface is nowhere nearer to a site than this: sqrt(theta - R^2) or less, what simplification may use of the tolerance.
-    pub(super) least: f64,
-    /// `least` in space, for the sites whose balls are the smallest.
-    pub(super) thinnest: f64,
-    /// The surface is nowhere farther from the sites than this: what simplification may use of the tolerance.
-    pub(super) outer: f64,
-    /// f less theta where a gap was closed: the surface passes near the vertex.
-    pub(super) filled_value: i64,
-    /// outer^2 + R^2 less theta by level, as an integer.
-    pub(super) bands: [i64; LEVELS as usize + 1],
-    /// R^2 by level.
-    pub(super) inner_bands: [i64; LEVELS as usize + 1],
-    /// A site nearer than this to a vertex covers all tetrahedra there.
-    pub(super) deep: f64,
-    /// 1 / q, with q the unit in which squared distances are compared.
-    inverse_unit: f64,
-    /// The largest value of a site that matters.
-    pub(super) most: i64,
-    /// Rounding of positions and distances: far above what double precision loses, far below everything else.
-    pub(super) slack: f64,
-    /// How far a position moves when it becomes a single-precision number.
-    pub(super) rounding: f64,
-    /// A power of two: coordinates in single precision may be multiples of it, and those at the shape's extent are.
-    pub(super) unit: f64,
-    /// Whether sites are too many to be told apart: all tetrahedra are marched, and refined where what that fills is not near a site, see `block`.
-    pub(super) dense: bool,
-    /// Radius of the ball that closes gaps among dense sites, and how wide a neck the lattice sees there.
-    pub(super) gap: f64,
-    pub(super) neck: f64,
-    /// outer - r.
-    pub(super) close: f64,
-    /// How far beyond the balls in space the solid may reach, whatever their radii: at least `close`.
-    pub(super) close_in_space: f64,
-    /// Whether simplification only removes what cannot be a solid.
-    pub(super) clean_only: bool,
-    /// What was asked, of the smallest balls.
-    pub(super) tolerance: f64,
-    /// How far places of the shape that sites stand for are from these, and sites from it, at most: 0 where sites are the shape.
-    pub(super) off: f64,
-    /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
-    pub(super) cells: usize,
-}
 
 /// A pitch above this share of the least r would not see the shape.
 const COARSEST: f64 = 1.0;
@@ -110,7 +55,7 @@ const MOST_REFINED: usize = 2_000;
 /// Leaf cells of a shape of which some times as many are looked at to tell its topology.
 const FEW_LEAVES: u64 = 2_000;
 /// Cells at most of products that are split along one factor at a time.
-const MOST_SPLIT: u64 = 300_000;
+const MOST_SPLIT: u64 = 100_000;
 /// One in so many bytes may hold them.
 const SPLIT_SHARE: u64 = 8;
 const BYTES_PER_CONTROL_POINT: u64 = 32;
@@ -118,72 +63,6 @@ const BYTES_PER_CONTROL_POINT: u64 = 32;
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
 pub(super) const BYTES_PER_TRIANGLE: f64 = 120.0;
-
-impl Setting {
-    pub(super) fn new(radius: f64, outer: f64, tolerance: f64, pitch: f64, cells: usize, bounds: &AxisBox) -> Self {
-        let extent = extent(bounds, radius + 2.0 * pitch);
-        let margin = radius + 2.5 * pitch;
-        // An origin that no model's own planes are likely to meet: ties are legal, but cost time.
-        let origin = std::array::from_fn(|axis| bounds.low[axis].low - margin - pitch * [0.137, 0.291, 0.413][axis]);
-        let (theta, enclosing) = (radius * radius, (ENCLOSING * pitch).powi(2));
-        let near = (outer * outer + enclosing).sqrt();
-        let horizon = near.max(radius + 1.001 * pitch);
-        // Beside larger cubes there are tetrahedra on half a face: the ball around the face's diagonal holds them.
-        let enclosing_of = |level: usize| if level == 0 { enclosing } else { 0.5 * pitch * pitch * 0.25_f64.powi(level as i32) };
-        // Values of sites that matter are within -theta and (near + a)^2 - theta.
-        let largest = ((near + 1.001 * pitch).powi(2) - theta).max(theta);
-        let inverse_unit = (MOST - 2 * MOST_NOISE) as f64 / largest;
-        let integer = |square: f64| (square * inverse_unit).ceil() as i64;
-        Self {
-            lattice: Lattice { origin, pitch },
-            reach: radius,
-            near,
-            horizon,
-            sight: (2.0 * WITNESS * radius).max(horizon + radius) * 1.001,
-            far: integer((radius + 1.001 * pitch).powi(2) - theta),
-            least: least(radius, pitch),
-            thinnest: least(radius, pitch),
-            outer,
-            filled_value: -1,
-            bands: std::array::from_fn(|level| integer(outer * outer - theta + enclosing_of(level))),
-            inner_bands: std::array::from_fn(|level| integer(enclosing_of(level))),
-            deep: (radius - pitch * 1.000_1).max(0.0),
-            inverse_unit,
-            most: integer(largest),
-            slack: 1e-13 * extent,
-            rounding: rounding(self::extent(bounds, 3.0 * radius)),
-            unit: unit(self::extent(bounds, 3.0 * radius)),
-            dense: false,
-            gap: 0.0,
-            neck: 0.0,
-            close: outer - radius,
-            close_in_space: outer - radius,
-            clean_only: false,
-            tolerance,
-            off: 0.0,
-            cells,
-        }
-    }
-
-    /// The same for sites no place of which is farther than `moved` from those that are meant, nor one of these from them, with more slack for rounding. Tetrahedra do not fit it.
-    pub(super) fn narrower(&self, moved: f64, slack: f64) -> Self {
-        Self { least: self.least + moved, outer: self.outer - moved, off: self.off + moved, slack, ..self.clone() }
-    }
-
-    /// What the surface may be off d = r at least, inwards and outwards.
-    pub(super) fn half_band(&self) -> f64 {
-        (self.outer - self.reach).min(self.reach - self.least)
-    }
-
-    /// A squared distance less theta as an integer, never 0.
-    #[inline]
-    pub(super) fn integer(&self, distance_squared: f64) -> i64 {
-        let scaled = (distance_squared - self.reach * self.reach) * self.inverse_unit;
-        // Saturates; far sites cover nothing.
-        let value = (scaled + 0.5_f64.copysign(scaled)) as i64;
-        if value == 0 { 1 } else { value }
-    }
-}
 
 /// How much longer the radius s of a ball in space is when the one in four dimensions, r of which is a section with radius s, is longer by e.
 fn in_space_between(radius: f64, e: f64, section: f64) -> f64 {
@@ -194,22 +73,6 @@ fn in_space_between(radius: f64, e: f64, section: f64) -> f64 {
 fn coarsened(edge: f64, most: f64) -> f64 {
     let doubled = (0..COARSER).fold(edge, |edge, _| if 2.0 * edge <= most { 2.0 * edge } else { edge });
     doubled.min(most)
-}
-
-/// sqrt(theta - R^2), rounded down.
-fn least(radius: f64, pitch: f64) -> f64 {
-    (radius * radius - (ENCLOSING * pitch).powi(2)).max(0.0).sqrt() * (1.0 - 1e-12)
-}
-
-/// Largest coordinate of the box grown by `margin`.
-fn extent(bounds: &AxisBox, margin: f64) -> f64 {
-    (0..3).map(|axis| bounds.low[axis].low.abs().max(bounds.high[axis].high.abs()) + margin).fold(0.0, f64::max)
-}
-
-/// The largest step between single-precision numbers below the least power of two above an extent, which is a normal number: half of it is no more than the extent's half unit in the last place.
-fn unit(extent: f64) -> f64 {
-    let power = f64::from_bits((extent.to_bits() >> 52) << 52);
-    2.0 * power / f64::from(1 << f32::MANTISSA_DIGITS)
 }
 
 /// Refuses maps that contract so slowly that leaves would have longer addresses than allowed: the largest root
@@ -344,15 +207,15 @@ impl<'a> Plan<'a> {
         Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, meant, clean_only: !simplify })
     }
 
-    /// The attractor with as many roots as there are leaf cells, no more than `most`, where it is made of products that have fewer when they are split along one factor at a time.
-    pub(super) fn split(&self, most: usize, budget: &Budget) -> Result<Option<Attractor>, Stopped> {
+    /// The attractor with as many roots as there are leaf cells, where it is made of products that have fewer when they are split along one factor at a time.
+    pub(super) fn split(&self, budget: &Budget) -> Result<Option<Attractor>, Stopped> {
         if self.rule.is_dense() || self.rule.is_exact() {
             return Ok(None);
         }
         let attractor = self.rule.attractor();
         let controls = attractor.roots().iter().map(|root| root.points.len()).max().unwrap_or(0) as u64;
         let room = budget.limits.memory_bytes / (SPLIT_SHARE * (BYTES_PER_CELL + BYTES_PER_CONTROL_POINT * controls));
-        let most = most.min(room.min(budget.limits.cells).min(MOST_SPLIT) as usize);
+        let most = room.min(budget.limits.cells).min(MOST_SPLIT) as usize;
         let is_leaf = |cell: &Cell, points: &[ControlPoint]| self.rule.leaf(cell, points).is_some();
         let Some(split) = attractor.split_along_factors(most, is_leaf, budget)? else { return Ok(None) };
         let is_fewer = self.rule.leaves(split.roots().len(), &budget.cancel)?.is_none();
@@ -412,8 +275,12 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Predicts from a sample of the lattice's blocks, or of polytopes; what lies in a plane takes less to make.
-    pub(super) fn predict(&self, budget: &Budget) -> Result<Prediction, DilationError> {
+    /// Predicts from a sample of polytopes, or from what is told by what may be made `instead` of a lattice, or from a sample of its blocks; what lies in a plane takes less to make.
+    pub(super) fn predict(
+        &self,
+        instead: impl FnOnce() -> Result<Option<Prediction>, DilationError>,
+        budget: &Budget,
+    ) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
             limits: crate::budget::Limits { cells: u64::MAX, triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
             progress: None,
@@ -423,6 +290,9 @@ impl<'a> Plan<'a> {
         let (space, grading) = (self.space(&setting), Grading::default());
         if let Some(arrangement) = Arrangement::new(&setting, &self.rule, &space.candidates, budget)? {
             return Ok(self.predicted(&arrangement));
+        }
+        if let Some(prediction) = instead()? {
+            return Ok(prediction);
         }
         let pass = self.pass(&setting, &grading, Task::Whole, &unlimited, space.blocks);
         let expected = pass.expected(space.blocks, &space.candidates, !self.clean_only)?;
@@ -450,12 +320,16 @@ impl<'a> Plan<'a> {
 
     /// What an arrangement tells of what will be made of it.
     fn predicted(&self, arrangement: &Arrangement) -> Prediction {
-        let triangles = arrangement.triangles;
+        self.without_lattice(arrangement.triangles, arrangement.memory_bytes(), arrangement.leaves() as f64)
+    }
+
+    /// What is made without a lattice: so many triangles of as many leaf cells.
+    fn without_lattice(&self, triangles: f64, memory_bytes: f64, leaf_cells: f64) -> Prediction {
         Prediction {
             counted_triangles: triangles,
             triangles,
-            memory_bytes: arrangement.memory_bytes(),
-            leaf_cells: arrangement.leaves() as f64,
+            memory_bytes,
+            leaf_cells,
             simplifying_bytes: 0.0,
             looked_at_bytes: 0.0,
             searched: 0.0,
@@ -470,10 +344,11 @@ impl<'a> Plan<'a> {
         2.0 * (self.balls.least - self.aimed - self.meant.deviation_mm).max(0.0)
     }
 
-    /// The dilation. Where sites that stand for a few leaf cells leave the topology in doubt, it is what `finer` ones make of it, given the number of those cells, if they tell it.
+    /// The dilation. Where sites that stand for a few leaf cells leave the topology in doubt, it is what `finer` ones make of it, given the number of those cells, if they tell it. Before all is left to a lattice, it is asked whether something may be made `instead`.
     pub(super) fn run(
         &self,
         finer: impl FnOnce(u64) -> Result<Option<Dilation>, DilationError>,
+        instead: impl FnOnce() -> Result<Option<Dilation>, DilationError>,
         budget: &Budget,
     ) -> Result<Dilation, DilationError> {
         let setting = self.setting(self.pitch, budget);
@@ -489,6 +364,7 @@ impl<'a> Plan<'a> {
         {
             return Ok(finer);
         }
+        let made = if made.is_some() { made } else { instead()? };
         made.map_or_else(|| self.on_lattice(&setting, &space, budget), Ok)
     }
 
@@ -513,6 +389,46 @@ impl<'a> Plan<'a> {
         let space = self.space(&setting);
         let arrangement = Arrangement::of_sheets(&setting, &self.rule, &space.candidates, budget)?;
         self.of_arrangement(arrangement, &setting, &space, budget)
+    }
+
+    /// The dilation of a graph over a convex part of a plane, by rays that stand for it; none where that does not come out.
+    ///
+    /// It is exactly a ball: see `height_field` in `arrangement`.
+    pub(super) fn run_over(&self, graph: &Graph, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+        let Some((setting, surface, _)) = self.over(graph, budget)? else { return Ok(None) };
+        let triangles = surface.triangles.len() as u64;
+        if triangles > budget.limits.triangles {
+            return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+        }
+        self.prove(&setting, surface.site_error, triangles, budget);
+        self.certify(&setting, Mended { surface, uncertain: 0, crossings: 0 }, true, None, budget).map(Some)
+    }
+
+    /// The same as a prediction: all of it is made for that.
+    pub(super) fn predict_over(&self, graph: &Graph, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
+        let made = self.over(graph, budget)?;
+        Ok(made.map(|(_, surface, bytes)| {
+            let triangles = surface.triangles.len() as f64;
+            self.without_lattice(triangles, bytes.max(BYTES_PER_TRIANGLE * triangles), surface.leaves as f64)
+        }))
+    }
+
+    /// The surface around a graph, and bytes that were held at most.
+    fn over(&self, graph: &Graph, budget: &Budget) -> Result<Option<(Setting, BlockSurface, f64)>, DilationError> {
+        // Less what sums of such lengths lose to rounding.
+        let within = self.tolerance - self.extra - graph.off - 1e-12 * self.radius;
+        let Some(stand) = peaks::stand(graph, self.radius, within, budget)? else { return Ok(None) };
+        let Stand { rays, least, outer, inward, outward, columns, bytes } = stand;
+        let setting = Setting { least, outer, dense: false, ..self.setting(self.pitch, budget) };
+        let surface = match between_rays(rays, &setting, budget)? {
+            Some(Flat::Made(surface) | Flat::Steady(surface)) => surface,
+            Some(Flat::Beyond(_)) => {
+                return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+            }
+            None => return Ok(None),
+        };
+        let site_error = SiteError { inner: inward + graph.off, outer: outward + graph.off, ..SiteError::default() };
+        Ok(Some((setting, BlockSurface { site_error, leaves: columns, ..*surface }, bytes)))
     }
 
     /// The dilation on a lattice. Where the distance may have critical points with values that it does not tell from r, it is refined until it does.

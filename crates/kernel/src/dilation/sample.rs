@@ -9,7 +9,7 @@
 use super::DilationError;
 use super::lattice::Grading;
 use super::octree::{Changed, Node, Pass, Task};
-use super::plan::Setting;
+use super::setting::Setting;
 use super::simplify::{OF_LATTICE, Simplifier};
 use super::surface::Blocks;
 use super::tree::Candidates;

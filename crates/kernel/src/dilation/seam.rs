@@ -1,7 +1,7 @@
 //! Stars that have triangles in several blocks, looked at when all blocks are there.
 
 use super::lattice::{Cube, Grading, around};
-use super::plan::Setting;
+use super::setting::Setting;
 use super::star::{Incident, Star, note};
 use super::surface::{BlockSurface, Blocks, Seam};
 use crate::budget::{Budget, Stopped};

@@ -15,7 +15,7 @@
 
 use super::certificate::{Nearby, Places};
 use super::convex::SiteSearch;
-use super::plan::Setting;
+use super::setting::Setting;
 use super::slivers;
 use super::surface::BlockSurface;
 use super::tree::{Tree, in_space};

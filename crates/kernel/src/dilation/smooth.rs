@@ -15,7 +15,7 @@
 use super::convex::{Convex, SiteSearch};
 use super::frame::Frame;
 use super::lattice::{Number, UNITS};
-use super::plan::Setting;
+use super::setting::Setting;
 use super::tree::Tree;
 use crate::attractor::cell::distance_squared;
 

@@ -11,7 +11,7 @@ use super::convex::Convex;
 use super::critical::add_closest;
 use super::lattice::{Cube, Grading};
 use super::parting::{avoids_origin, farthest, parting};
-use super::plan::Setting;
+use super::setting::Setting;
 use super::surface::BlockSurface;
 use super::tree::{SiteId, Weighted};
 use crate::attractor::cell::{Point, Site, distance_squared, dot, subtract, unit};

@@ -7,7 +7,7 @@
 //! So blocks agree on shared lattice vertices, and results do not depend on the number of threads.
 
 use super::convex::{Ball, Convex, SiteSearch};
-use super::plan::Setting;
+use super::setting::Setting;
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared, dot};
 use crate::attractor::sites::{SiteError, SiteRule};

@@ -8,7 +8,7 @@ use super::figure::Figure;
 use super::polytopes::{self, Plane, Polytopes, height, normal};
 use crate::attractor::cell::{Point, dot, subtract, unit};
 use crate::dilation::convex::Convex;
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use crate::solid::Inside;
 
 /// Steps towards a common point, and how deep in all bodies it is sought, at first and at last, in units of the radius.

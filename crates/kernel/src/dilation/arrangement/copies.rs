@@ -11,7 +11,7 @@ use super::pieces::are_apart;
 use crate::attractor::cell::{Point, distance_squared, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
 use crate::solid::box_tree::{Box32, BoxTree};

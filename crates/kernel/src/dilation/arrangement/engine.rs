@@ -14,7 +14,7 @@ use super::{Arranged, Arrangement, Copies};
 use super::{facets, hull};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use crate::dilation::surface::BlockSurface;
 use crate::solid::Inside;
 use rayon::prelude::*;

@@ -5,7 +5,7 @@ use super::cubes::Cube;
 use super::ellipsoid::is_empty;
 use super::figure::Polygon;
 use crate::attractor::cell::{Point, between, cross, dot, subtract, unit};
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use glam::DVec3;
 
 /// What bodies are taken for.

@@ -18,7 +18,7 @@ mod faces;
 mod facets;
 mod figure;
 mod form;
-mod height_field;
+pub(super) mod height_field;
 mod hidden;
 mod hinges;
 mod hull;
@@ -43,7 +43,8 @@ mod tests;
 mod triangulate;
 mod tubes;
 
-use super::plan::{self, Setting};
+use super::plan;
+use super::setting::Setting;
 use super::surface::BlockSurface;
 use super::tree::{Candidates, Weighted};
 use crate::attractor::cell::{Cell, ControlPoint, Point};
@@ -122,7 +123,7 @@ pub(super) struct Arrangement {
 }
 
 /// What comes of figures that need no polytopes.
-enum Flat {
+pub(super) enum Flat {
     Made(Box<BlockSurface>),
     /// The same, and it is shown to have the topology of what the sites stand for, too.
     Steady(Box<BlockSurface>),

@@ -1,16 +1,14 @@
 //! How high the dilation of a graph is over a place.
 
-use super::super::faces::Faces;
 use super::Place;
-use super::ground::Ground;
-use super::parts::{Part, Top, parts};
+use super::parts::{Part, Top};
 use super::squares::Squares;
 
-/// How wide squares are that parts are sorted into, in units of the largest distance, and how many there are at most for each triangle.
+/// How wide squares are that parts are sorted into, in units of the largest distance, and how many there are at most for each triangle, or tip.
 const PITCH: f64 = 0.2;
 pub(super) const MOST: f64 = 4.0;
 /// In how many squares a part may be at most, as a mean, and all together in any case.
-const MOST_OF_PART: usize = 64;
+const MOST_OF_PART: usize = 256;
 const FEW: usize = 1 << 20;
 /// The least difference of slopes on both sides of a crease.
 const CREASE: f64 = 0.25;
@@ -29,14 +27,13 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// What is above a graph with such faces, between two distances; none where parts are so large beside most that there is no room for their lists.
-    pub(super) fn new(ground: &Ground, faces: &Faces, distances: [f64; 2]) -> Option<Self> {
-        let parts = parts(&ground.mesh, faces, distances);
+    /// What is above parts of so many triangles, or tips, between two distances; none where some are so large beside most that there is no room for their lists.
+    pub(super) fn new(parts: Vec<Part>, count: usize, distances: [f64; 2]) -> Option<Self> {
         let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for Part { bounds: [low, high], .. } in &parts {
             bounds = [[0, 1].map(|axis| bounds[0][axis].min(low[axis])), [0, 1].map(|axis| bounds[1][axis].max(high[axis]))];
         }
-        let squares = Squares::new(bounds, PITCH * distances[1], MOST * ground.len() as f64);
+        let squares = Squares::new(bounds, PITCH * distances[1], MOST * count as f64);
         let mut order: Vec<u32> = (0..parts.len() as u32).collect();
         order.sort_unstable_by(|&a, &b| parts[b as usize].highest.total_cmp(&parts[a as usize].highest).then(a.cmp(&b)));
         let (starts, items) =

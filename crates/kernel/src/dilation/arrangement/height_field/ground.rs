@@ -15,7 +15,11 @@ const MOST_CORNERS: usize = 2_048;
 pub(super) struct Ground {
     /// The triangles, counter-clockwise from above.
     pub(super) mesh: HalfEdges,
-    /// The corners of the part, counter-clockwise, but for those at which it goes straight on.
+    pub(super) base: Base,
+}
+
+/// A convex part of the plane: its corners, counter-clockwise, but for those at which it goes straight on.
+pub(super) struct Base {
     pub(super) corners: Vec<Place>,
 }
 
@@ -61,7 +65,7 @@ impl Ground {
         tree.build(triangles.len(), |triangle| Some(Box32::of(&of(triangle))), false);
         let sorted: Vec<[u32; 3]> =
             (0..tree.leaves()).flat_map(|leaf| tree.items(leaf)).map(|&triangle| triangles[triangle as usize]).collect();
-        Some(Self { mesh: HalfEdges::new(places, &sorted), corners })
+        Some(Self { mesh: HalfEdges::new(places, &sorted), base: Base { corners } })
     }
 
     /// The number of its triangles.
@@ -74,15 +78,17 @@ impl Ground {
         let triangles = (0..self.mesh.triangles()).filter_map(|triangle| self.mesh.triangle(triangle));
         triangles.map(|corners| corners.map(|corner| self.mesh.points[corner as usize]))
     }
+}
 
-    /// A place, or one between it and the closest of the part below the surface, no farther from that than a distance.
+impl Base {
+    /// A place, or one between it and the closest of the part, no farther from that than a distance.
     pub(super) fn inward(&self, at: Place, most: f64) -> Place {
         let (distance, foot) = self.away(at);
         let share = most / distance;
         if share < 1.0 { [0, 1].map(|axis| foot[axis] + share * (at[axis] - foot[axis])) } else { at }
     }
 
-    /// How far a place is from the part below the surface, and the closest place of that.
+    /// How far a place is from the part, and the closest place of that.
     pub(super) fn away(&self, at: Place) -> (f64, Place) {
         let count = self.corners.len();
         let (mut best, mut is_inside) = ((f64::INFINITY, at), true);

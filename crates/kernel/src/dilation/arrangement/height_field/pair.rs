@@ -4,8 +4,8 @@
 
 use super::super::Flat;
 use super::super::between::Memory;
-use super::super::faces::{Faces, Fault};
-use super::ground::{Ground, border, turned_left};
+use super::super::faces::Fault;
+use super::ground::{border, turned_left};
 use super::sheet::{Found, Sheet};
 use super::{Limits, Place};
 use crate::attractor::cell::Point;
@@ -18,11 +18,11 @@ use std::f64::consts::TAU;
 
 /// Rounds in which places are added.
 const ROUNDS: usize = 48;
-/// How far out in the band the rim is, along straight sides, and at most around corners.
+/// How far out the rim is between the inner distance and the farthest that it may be, along straight sides, and at most around corners.
 const RIM: [f64; 2] = [0.4, 0.7];
 /// Sides of the rim around a corner at most.
 const MOST_STEPS: f64 = 10_000.0;
-/// How far the border is from the inner distance, as a share of it, and in units of rounding.
+/// How far the border is from where it may be at most, as a share of that, and in units of rounding.
 const BORDER: f64 = 1e-4;
 const ROUNDINGS: f64 = 4.0;
 /// The rim is bent no nearer to posts than by this share of the way between them.
@@ -53,7 +53,7 @@ pub(super) struct Pair<'a> {
 
 /// A polygon around a convex one, between two distances from it: its sides touch what is as far as the first. None where it would have very many sides.
 pub(super) fn rim(corners: &[Place], limits: &Limits<'_>) -> Option<Vec<Place>> {
-    let [near, far] = RIM.map(|share| limits.at(share));
+    let [near, far] = RIM.map(|share| limits.inner + share * (limits.rim - limits.inner));
     let widest = 2.0 * (near / far).acos();
     let count = corners.len();
     let mut rim = Vec::new();
@@ -73,10 +73,9 @@ pub(super) fn rim(corners: &[Place], limits: &Limits<'_>) -> Option<Vec<Place>> 
 }
 
 impl<'a> Pair<'a> {
-    /// Both sheets without places, given the faces seen from above; none where there is no room for what is known of the graph.
-    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &'a Limits<'a>) -> Option<Self> {
-        let (above, below) = rayon::join(|| Sheet::new(ground, faces, limits), || Sheet::new(ground, Faces::of(ground, -1.0), limits));
-        Some(Self { sheets: [above?, below?], posts: Vec::new(), next: Vec::new(), limits })
+    /// Both sheets, which have no places yet.
+    pub(super) fn new(sheets: [Sheet<'a>; 2], limits: &'a Limits<'a>) -> Self {
+        Self { sheets, posts: Vec::new(), next: Vec::new(), limits }
     }
 
     /// The surface in the frame of the graph, once all of it is between the distances; none where places do not make it so, or there is no room for it.
@@ -86,8 +85,8 @@ impl<'a> Pair<'a> {
     pub(super) fn run(mut self, budget: &Budget) -> Result<Option<Flat>, Stopped> {
         let limits = self.limits;
         let most = 2.0 * budget.limits.triangles as f64;
-        let (room, ground) = (budget.limits.memory_bytes as f64, self.sheets[0].ground);
-        let most_vertices = (room - BYTES_PER_FACE * ground.len() as f64) / BYTES_PER_VERTEX;
+        let faces = self.sheets.iter().map(|sheet| sheet.faces.all.len()).max().unwrap_or(0);
+        let most_vertices = (budget.limits.memory_bytes as f64 - BYTES_PER_FACE * faces as f64) / BYTES_PER_VERTEX;
         if self.begin().is_none() {
             return Ok(None);
         }
@@ -133,7 +132,7 @@ impl<'a> Pair<'a> {
 
     /// Makes the first posts.
     fn begin(&mut self) -> Option<()> {
-        let rim = rim(&self.sheets[0].ground.corners, self.limits)?;
+        let rim = rim(&self.sheets[0].base.corners, self.limits)?;
         for &at in &rim {
             self.post(at)?;
         }
@@ -144,12 +143,12 @@ impl<'a> Pair<'a> {
     /// Adds a post at a place.
     fn post(&mut self, at: Place) -> Option<u32> {
         let limits = self.limits;
-        let at = at.map(limits.round);
+        let at = at.map(|x| limits.rounded(x));
         let [above, below] = self.sheets.each_ref().map(|sheet| sheet.field.top(at, limits.outer));
         // In the middle of what is over the place.
-        let rim = [at[0], at[1], (limits.round)(0.5 * (above?.height - below?.height))];
+        let rim = [at[0], at[1], limits.rounded(0.5 * (above?.height - below?.height))];
         let post = self.posts.len() as u32;
-        let border = self.sheets[0].ground.inward(at, limits.inner * (1.0 - BORDER) - ROUNDINGS * limits.rounding);
+        let border = self.sheets[0].base.inward(at, limits.border * (1.0 - BORDER) - ROUNDINGS * limits.rounding);
         let mut ends = [NONE; 2];
         for (sheet, end) in self.sheets.iter_mut().zip(&mut ends) {
             *end = sheet.raise_post(border, post, limits)?;
@@ -228,15 +227,17 @@ impl<'a> Pair<'a> {
         let count = rim.len() as u32;
         for (side, sheet) in self.sheets.iter().enumerate() {
             let mut numbers = vec![NONE; sheet.len()];
-            let mut is_above = false;
+            let (mut is_above, sign) = (false, [1.0, -1.0][side]);
+            let mut lowest = rim.iter().map(|place| sign * place[2]).fold(f64::INFINITY, f64::min);
             let highest = sheet.faces.highest();
             let mut number = |corner: u32| {
                 let number = &mut numbers[corner as usize];
                 if *number == NONE {
                     let [x, y, height] = sheet.point(corner);
                     is_above |= height > highest;
+                    lowest = lowest.min(height);
                     *number = surface.vertices.len() as u32;
-                    surface.vertices.push([x, y, [height, -height][side]]);
+                    surface.vertices.push([x, y, sign * height]);
                 }
                 *number
             };
@@ -246,9 +247,10 @@ impl<'a> Pair<'a> {
                 let [c, d] = [order[next as usize], post].map(|post| number(self.posts[post as usize].ends[side]));
                 own.extend([[k, next, c], [k, c, d]]);
             }
+            is_above &= lowest > sheet.floor;
             // The sheet is within its border, and so as near to the part, which is convex, as that.
             let mut border = self.posts.iter().map(|post| sheet.point(post.ends[side]));
-            let is_inside = border.all(|[x, y, _]| sheet.ground.away([x, y]).0 < self.limits.inner);
+            let is_inside = border.all(|[x, y, _]| sheet.base.away([x, y]).0 < self.limits.border);
             (is_above && is_inside && is_plane(&surface.vertices, &own, &rim)).then_some(())?;
             if side == 1 {
                 own.iter_mut().for_each(|triangle| triangle.swap(1, 2));

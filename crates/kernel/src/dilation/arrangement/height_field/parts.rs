@@ -215,3 +215,12 @@ impl Cone {
         true
     }
 }
+
+/// Tips alone, each of which has a triangle with its number.
+pub(super) fn tips(all: &[Point], distances: [f64; 2]) -> Vec<Part> {
+    let mut maker = Maker { distances, parts: Vec::with_capacity(all.len()) };
+    for (number, tip) in (0..).zip(all) {
+        maker.add(Shape::Tip(*tip), number, &[*tip], &[]);
+    }
+    maker.parts
+}

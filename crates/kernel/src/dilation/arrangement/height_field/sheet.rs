@@ -6,7 +6,7 @@ use super::super::between::{Memory, middle};
 use super::super::faces::{Faces, Fault};
 use super::super::plane::{self, Mesh, corners, handle, inside, key};
 use super::field::Field;
-use super::ground::Ground;
+use super::ground::Base;
 use super::samples::Samples;
 use super::{Limits, Place};
 use crate::attractor::cell::{Point, distance_squared};
@@ -22,7 +22,9 @@ const SAMPLED: usize = 48;
 const OFF: f64 = 0.9;
 /// How far out in the band a place is added where the sheet is too near, and where it is too far.
 const OUT: [f64; 2] = [0.7, 0.55];
-/// Places that are added are no farther out than this in units of the inner distance, but at the border.
+/// How far out vertices of the border are: what is closest to them there is to be near to the strip beside them, too.
+const POST: f64 = 0.3;
+/// Places that are added are no farther out than this in units of the border's distance, but at the border.
 const INSIDE: f64 = 0.99;
 /// How much farther from what is close a place is added at most than the fault is.
 const FARTHEST: f64 = 2.0;
@@ -53,9 +55,11 @@ pub(super) struct Found {
 
 /// A sheet, with the graph and what is known of it.
 pub(super) struct Sheet<'a> {
-    pub(super) ground: &'a Ground,
+    pub(super) base: &'a Base,
     pub(super) field: Field,
     pub(super) faces: Faces,
+    /// Places that are not higher may be nearer to what faces stand for than these tell.
+    pub(super) floor: f64,
     mesh: Mesh<Vertex>,
     numbers: NameMap<[u64; 2], u32>,
     /// Triangles that were found to be as they should be.
@@ -67,18 +71,19 @@ pub(super) struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    /// One without places; none where there is no room for what is known of the graph.
-    pub(super) fn new(ground: &'a Ground, faces: Faces, limits: &Limits<'_>) -> Option<Self> {
-        Some(Self {
-            ground,
-            field: Field::new(ground, &faces, [limits.inner, limits.outer])?,
+    /// One without places over a part of the plane, above some faces, which tell nothing of what is below a floor.
+    pub(super) fn new(base: &'a Base, field: Field, faces: Faces, floor: f64) -> Self {
+        Self {
+            base,
+            field,
             faces,
+            floor,
             mesh: Mesh::new(),
             numbers: NameMap::default(),
             known: NameMap::default(),
             posts: Vec::new(),
             fresh: Vec::new(),
-        })
+        }
     }
 
     /// The number of its vertices.
@@ -93,12 +98,12 @@ impl<'a> Sheet<'a> {
 
     /// Adds a vertex over a place, next to another if one is known; none where there is one, or no graph is below.
     pub(super) fn raise(&mut self, at: Place, out: f64, hint: Option<u32>, limits: &Limits<'_>) -> Option<u32> {
-        let at = at.map(limits.round);
+        let at = at.map(|x| limits.rounded(x));
         if self.numbers.contains_key(&at.map(f64::to_bits)) {
             return None;
         }
         let top = self.field.top(at, limits.at(out)).filter(|top| top.height.is_finite())?;
-        let vertex = Vertex { at, height: (limits.round)(top.height), owner: top.owner };
+        let vertex = Vertex { at, height: limits.rounded(top.height), owner: top.owner };
         let inserted = match hint {
             Some(hint) => self.mesh.insert_with_hint(vertex, handle(hint)),
             None => self.mesh.insert(vertex),
@@ -112,7 +117,7 @@ impl<'a> Sheet<'a> {
 
     /// Adds a vertex of the border.
     pub(super) fn raise_post(&mut self, at: Place, post: u32, limits: &Limits<'_>) -> Option<u32> {
-        let number = self.raise(at, OUT[0], None, limits)?;
+        let number = self.raise(at, POST, None, limits)?;
         self.posts[number as usize] = post;
         Some(number)
     }
@@ -177,7 +182,7 @@ impl<'a> Sheet<'a> {
     /// [`Stopped`].
     pub(super) fn sample(&mut self, most: usize, limits: &Limits<'_>, budget: &Budget) -> Result<(), Stopped> {
         let half = 0.5 * (limits.outer - limits.inner);
-        let samples = Samples::new(&self.field, limits.inner + half, self.ground.len(), budget)?;
+        let samples = Samples::new(&self.field, limits.inner + half, self.faces.all.len(), budget)?;
         for round in 0..SAMPLED {
             budget.cancel.check()?;
             let new = self.unknown(round == 0);
@@ -257,13 +262,13 @@ impl<'a> Sheet<'a> {
             }
             Fault::Far(x) => ([x[0], x[1]], OUT[1]),
         };
-        if self.ground.away(at).0 > INSIDE * limits.inner
+        if self.base.away(at).0 > INSIDE * limits.border
             && let Some(post) = self.post_before(triangle, next)
         {
             return Some((post, at));
         }
         let [x, y, _] = middle(&triangle.map(|corner| self.point(corner)));
-        let at = self.ground.inward(at, INSIDE * limits.inner);
+        let at = self.base.inward(at, INSIDE * limits.border);
         let is_beyond = self.mesh.intersects_constraint(Point2::new(x, y), Point2::new(at[0], at[1]));
         // A neighbour's fault may have been there, too.
         if is_beyond || self.raise(at, out, Some(triangle[0]), limits).is_none() {

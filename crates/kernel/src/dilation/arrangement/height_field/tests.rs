@@ -6,6 +6,7 @@ use super::super::testing::{
 use super::field::Field;
 use super::ground::Ground;
 use super::pair::{is_plane, rim};
+use super::parts::parts;
 use super::sheet::Sheet;
 use super::squares::Squares;
 use super::{Limits, Place};
@@ -129,6 +130,14 @@ fn ground(triangles: &[[Point; 3]]) -> Option<Ground> {
     Ground::new(triangles.iter().copied())
 }
 
+fn field(ground: &Ground, faces: &Faces, distances: [f64; 2]) -> Field {
+    Field::new(parts(&ground.mesh, faces, distances), ground.len(), distances).unwrap()
+}
+
+fn limits(inner: f64, outer: f64) -> Limits<'static> {
+    Limits { inner, outer, border: inner, rim: outer, rounding: 0.0, round: &|x| x }
+}
+
 #[test]
 fn graphs_keep_their_bounds_and_are_balls() {
     let mut random = Random(13);
@@ -164,7 +173,7 @@ fn triangles_are_held_against_their_bounds() {
     let ground = ground(&triangles).unwrap();
     let faces = Faces::of(&ground, 1.0);
     let (inner, outer) = (1.1, 1.4);
-    let field = Field::new(&ground, &faces, [inner, outer]).unwrap();
+    let field = field(&ground, &faces, [inner, outer]);
     let distance = |x: &Point| faces.all.iter().map(|face| face.distance_squared(x)).fold(f64::INFINITY, f64::min).sqrt();
     let (mut counts, mut memory) = ([0; 3], Memory::default());
     for _ in 0..3_000 {
@@ -208,12 +217,12 @@ fn what_is_above_a_graph_is_as_far_from_it_as_is_asked() {
         let ground = ground(&triangles).unwrap();
         for sign in [1.0, -1.0] {
             let faces = Faces::of(&ground, sign);
-            let field = Field::new(&ground, &faces, [1.2, 1.5]).unwrap();
+            let field = field(&ground, &faces, [1.2, 1.5]);
             for _ in 0..200 {
                 let at = [13.0 * random.share() - 1.5, 13.0 * random.share() - 1.5];
                 let asked = 1.2 + 0.3 * random.share();
                 // Nothing is over what is farther from the part.
-                assert_eq!(field.top(at, asked).is_some(), ground.away(at).0 <= asked, "{round} {at:?}");
+                assert_eq!(field.top(at, asked).is_some(), ground.base.away(at).0 <= asked, "{round} {at:?}");
                 let Some(top) = field.top(at, asked) else { continue };
                 let x = [at[0], at[1], top.height];
                 let squares = faces.all.iter().map(|face| face.distance_squared(&x));
@@ -232,8 +241,10 @@ fn what_is_above_a_graph_is_as_far_from_it_as_is_asked() {
 fn sheets_are_known_only_where_all_triangles_are_right() {
     let mut random = Random(37);
     let triangles = Part::rectangle(10, &mut random).graph(height(0, &mut random));
-    let (ground, limits) = (ground(&triangles).unwrap(), Limits { inner: 1.1, outer: 1.4, rounding: 0.0, round: &|x| x });
-    let mut sheet = Sheet::new(&ground, Faces::of(&ground, 1.0), &limits).unwrap();
+    let (ground, limits) = (ground(&triangles).unwrap(), limits(1.1, 1.4));
+    let faces = Faces::of(&ground, 1.0);
+    let field = field(&ground, &faces, [limits.inner, limits.outer]);
+    let mut sheet = Sheet::new(&ground.base, field, faces, f64::NEG_INFINITY);
     let corners = (0..40).map(|k| f64::from(k % 10) * 1.15).map(|x| x - 0.75).zip(0..);
     let border = corners.map(|(x, k)| [[x, -0.75], [10.75, x], [10.0 - x, 10.75], [-0.75, 10.0 - x]][k / 10]);
     let posts: Vec<u32> = (0..).zip(border).map(|(k, at)| sheet.raise_post(at, k, &limits).unwrap()).collect();
@@ -321,7 +332,7 @@ fn what_is_no_graph_over_a_convex_part_is_none() {
     let twice: Vec<[Point; 3]> = (0..10).map(|k| [[0.0; 3], around(k), around(k + 1)]).collect();
     assert!(!is_graph(&twice));
     // A corner of a border that goes straight on does not count.
-    assert_eq!(ground(&flat).unwrap().corners.len(), 4);
+    assert_eq!(ground(&flat).unwrap().base.corners.len(), 4);
 }
 
 #[test]
@@ -353,17 +364,17 @@ fn only_sheets_that_cover_the_inside_of_a_rim_once_are_planes() {
 
 #[test]
 fn rims_are_between_their_distances_from_convex_polygons() {
-    let limits = Limits { inner: 1.0, outer: 1.2, rounding: 0.0, round: &|x| x };
+    let limits = limits(1.0, 1.2);
     for count in [3, 4, 7, 60] {
         let part = Part::disc(count, 1);
         let triangles = part.graph(|_, _| 0.0);
         let ground = ground(&triangles).unwrap();
-        let rim = rim(&ground.corners, &limits).unwrap();
+        let rim = rim(&ground.base.corners, &limits).unwrap();
         for (k, from) in rim.iter().enumerate() {
             let to = rim[(k + 1) % rim.len()];
             for share in 0..=20 {
                 let at = [0, 1].map(|axis| from[axis] + f64::from(share) / 20.0 * (to[axis] - from[axis]));
-                let (distance, _) = ground.away(at);
+                let (distance, _) = ground.base.away(at);
                 assert!(distance > limits.inner && distance < limits.outer, "{count}: {distance}");
             }
         }

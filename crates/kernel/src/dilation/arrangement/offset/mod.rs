@@ -27,7 +27,7 @@ use super::sum::is_embedded;
 use super::{BYTES_PER_TRIANGLE, Flat};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use crate::dilation::surface::BlockSurface;
 use crate::groups::Groups;
 use crate::solid::half_edges::NONE;

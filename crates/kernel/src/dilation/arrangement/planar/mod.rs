@@ -20,7 +20,7 @@ use super::figure::{Figure, Outline};
 use super::{BYTES_PER_TRIANGLE, Flat};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use crate::dilation::surface::BlockSurface;
 use contour::{Contour, contour};
 use rings::{Band, Corner, Ring, rings};

@@ -31,7 +31,7 @@ use super::{BYTES_PER_TRIANGLE, Flat};
 use crate::attractor::cell::{Point, distance_squared};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
-use crate::dilation::plan::Setting;
+use crate::dilation::setting::Setting;
 use crate::dilation::surface::BlockSurface;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::{Crossings, SolidError, Topology, TriMesh};
