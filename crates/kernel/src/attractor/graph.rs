@@ -4,23 +4,26 @@
 //! function over a parallelogram; several of these whose sides match are one over all of them.
 //!
 //! A functional grows along a curve if it is one of those with linear precision (see `precision`), and the curve's parts lie one behind the other; or if its values at the control points do not fall from one to the next, and operators keep that: in column k + 1 of each, the entries from any row on have no
-//! smaller sum than in column k. The same is asked of the ends of a curve: then its value is no less at the end of any part than where that starts, and these are dense.
+//! smaller sum than in column k. The same is asked of the ends of a curve, and that its parts lead from one to the other in their order: then its value is no less at the end of any part than where that starts, and these are dense.
 //!
 //! A *column* is the part of the graph over a smaller parallelogram: that of a word in the transitions of each curve. Columns are split along whichever side is longer, so that they stay about as wide as they are long, whatever the curves' own transitions.
 
-use super::cell::Point;
+use super::cell::{Point, closest_on_segment, distance_squared};
 use super::enclosure::{Enclosure, of_product};
 use super::sites::reachable;
 use super::{Attractor, Root};
 use crate::automaton::{Ends, LeafPrimitive, StateId, SubdivisionOperator, Transition};
 use crate::order::ordered_by;
 use std::collections::{BinaryHeap, HashMap};
+use std::f64::consts::TAU;
 
 /// A place in the plane.
 type Place = [f64; 2];
 
 /// Coordinates, and parameters, may miss what they should be by this much, relative to all.
 const MISS: f64 = 1e-10;
+/// How far the polygon may be off, relative to all.
+const MOST_OFF: f64 = 1e-6;
 /// How often a column is split at most until it is narrow.
 const DEEPEST: usize = 400;
 /// Roots at most: each of their sides is held against all.
@@ -42,8 +45,9 @@ struct Part {
     operator: SubdivisionOperator,
     own: SubdivisionOperator,
     kind: usize,
-    /// The columns of its enclosure as points of the pair: what tells its heights.
+    /// The columns of its enclosure as points of the pair: what tells its heights; and by how much these may be off, in the sum of coordinates.
     seen: SubdivisionOperator,
+    miss: f64,
 }
 
 /// The part of a graph over a parallelogram.
@@ -165,25 +169,44 @@ impl Attractor {
         let keeps = |operator: &SubdivisionOperator| (1..operator.columns()).all(|k| is_ahead(operator.column(k), operator.column(k - 1)));
         let is_kept = |index: usize| {
             let Some(ends) = self.curve_ends(StateId::new(index)) else { return false };
-            is_ahead(&ends.end, &ends.start) && state(index).transitions.iter().all(|transition| keeps(&transition.operator))
+            let transitions = &state(index).transitions;
+            let part = |transition: &Transition| {
+                let own = self.curve_ends(transition.to)?;
+                Some([&own.start, &own.end].map(|end| transition.operator.apply(end)))
+            };
+            let parts: Option<Vec<[Vec<f64>; 2]>> = transitions.iter().map(part).collect();
+            is_ahead(&ends.end, &ends.start)
+                && parts.is_some_and(|parts| is_chain(ends, &parts))
+                && transitions.iter().all(|transition| keeps(&transition.operator))
         };
         values.windows(2).all(|pair| pair[0] < pair[1]) && reachable(&self.automaton, curve).into_iter().all(is_kept)
     }
 
-    /// Whether the parts of a curve lie one behind the other along its parameter.
+    /// Whether the parts of a curve lie one behind the other along its parameter, whichever way each goes, and meet there.
     fn is_in_a_row(&self, curve: StateId) -> bool {
-        let Some(precision) = self.precision(curve) else { return false };
-        let place = |transition: &Transition| {
-            let ends = self.curve_ends(transition.to)?;
-            let [from, to] = [&ends.start, &ends.end].map(|end| precision.parameter(&transition.operator.apply(end))[0]);
-            Some([from.min(to), from.max(to)])
+        let (Some(precision), Some(ends)) = (self.precision(curve), self.curve_ends(curve)) else { return false };
+        let parameter = |point: &[f64]| precision.parameter(point)[0];
+        let part = |transition: &Transition| {
+            let own = self.curve_ends(transition.to)?;
+            let mut part = [&own.start, &own.end].map(|end| transition.operator.apply(end));
+            if parameter(&part[1]) < parameter(&part[0]) {
+                part.swap(0, 1);
+            }
+            Some(part)
         };
-        let parts: Option<Vec<[f64; 2]>> = self.automaton.state(curve).transitions.iter().map(place).collect();
+        let parts: Option<Vec<[Vec<f64>; 2]>> = self.automaton.state(curve).transitions.iter().map(part).collect();
         let Some(mut parts) = parts else { return false };
-        parts.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let last = parts.iter().try_fold(0.0, |at: f64, [low, high]| ((low - at).abs() <= MISS && *high > at).then_some(*high));
-        last.is_some_and(|last| (last - 1.0).abs() <= MISS)
+        parts.sort_by(|a, b| parameter(&a[0]).total_cmp(&parameter(&b[0])));
+        let are_long = parts.iter().all(|[start, end]| parameter(end) - parameter(start) > MISS);
+        are_long && (parameter(&ends.end) - 1.0).abs() <= MISS && is_chain(ends, &parts)
     }
+}
+
+/// Whether parts lead from one end of a curve to the other, each from where the one before it ends.
+fn is_chain(ends: &Ends, parts: &[[Vec<f64>; 2]]) -> bool {
+    let is_same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= MISS);
+    let last = parts.iter().try_fold(&ends.start, |at, [start, end]| is_same(at, start).then_some(end));
+    !parts.is_empty() && last.is_some_and(|last| is_same(last, &ends.end))
 }
 
 /// Whether the entries of a column from any row on have no smaller sum than those of another.
@@ -230,20 +253,23 @@ impl Kinds<'_> {
         let enclosures: Vec<Enclosure> = all.iter().map(|pair| of_product(attractor, pair)).collect::<Option<_>>()?;
         let kind = |pair: &[StateId; 2]| {
             let identity = |curve: StateId| SubdivisionOperator::identity(attractor.automaton.state(curve).dimension);
-            let parts = |along: usize| -> Option<Vec<Part>> {
+            let parts = |along: usize| -> Vec<Part> {
                 let part = |transition: &Transition| {
                     let mut to = *pair;
                     to[along] = transition.to;
                     let (mut factors, own) = ([identity(pair[0]), identity(pair[1])], transition.operator.clone());
                     factors[along] = own.clone();
                     let operator = SubdivisionOperator::product(factors.to_vec());
-                    let seen = operator.times(&enclosures[numbers[&to]].columns);
-                    Some(Part { operator, own, kind: numbers[&to], seen })
+                    let Enclosure { columns, miss, .. } = &enclosures[numbers[&to]];
+                    let norm = |k: usize| operator.column(k).iter().map(|entry| entry.abs()).sum::<f64>();
+                    let miss = miss * (0..operator.columns()).map(norm).fold(1.0, f64::max);
+                    let seen = operator.times(columns);
+                    Part { operator, own, kind: numbers[&to], seen, miss }
                 };
                 attractor.automaton.state(pair[along]).transitions.iter().map(part).collect()
             };
             let ends = [attractor.curve_ends(pair[0])?.clone(), attractor.curve_ends(pair[1])?.clone()];
-            Some(Kind { enclosure: enclosures[numbers[pair]].clone(), ends, parts: [parts(0)?, parts(1)?] })
+            Some(Kind { enclosure: enclosures[numbers[pair]].clone(), ends, parts: [parts(0), parts(1)] })
         };
         all.iter().map(kind).collect()
     }
@@ -367,7 +393,7 @@ fn outline(attractor: &Attractor, roots: &[Sheet], extent: f64) -> Option<(Vec<P
     };
     let own = 0.5 * double(&ring);
     ((own - area).abs() <= 1e-6 * area).then_some(())?;
-    let mut corners = Vec::new();
+    let (mut corners, mut turned) = (Vec::new(), 0.0);
     for k in 0..count {
         let [a, b, c] = [k + count - 1, k, k + 1].map(|k| ring[k % count]);
         let (before, after) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
@@ -376,11 +402,23 @@ fn outline(attractor: &Attractor, roots: &[Sheet], extent: f64) -> Option<(Vec<P
         if turn < -straight {
             return None;
         }
+        turned += turn.max(0.0).atan2(before[0] * after[0] + before[1] * after[1]);
         if turn > straight {
             corners.push(b);
         }
     }
-    (corners.len() > 2).then_some((corners, 8.0 * unit * count as f64))
+    // Corners that are left out are off the sides of what is left, and so are sides that turn right by no more than rounding.
+    let off = ring.iter().map(|place| from_sides(*place, &corners)).fold(0.0, f64::max) + 8.0 * unit;
+    (corners.len() > 2 && turned < 1.5 * TAU && off <= MOST_OFF * extent).then_some((corners, off))
+}
+
+/// How far a place is from the sides of a polygon.
+fn from_sides([x, y]: Place, corners: &[Place]) -> f64 {
+    let side = |k: usize| {
+        let [a, b] = [corners[k], corners[(k + 1) % corners.len()]].map(|[x, y]| [x, y, 0.0]);
+        distance_squared(&[x, y, 0.0], &closest_on_segment(&[x, y, 0.0], &a, &b))
+    };
+    (0..corners.len()).map(side).fold(f64::INFINITY, f64::min).sqrt()
 }
 
 /// The value of a functional at a point.
@@ -409,6 +447,11 @@ impl Graph {
         self.roots.iter().all(|sheet| sheet.is_smooth)
     }
 
+    /// Numbers that a column has, at most.
+    pub(crate) fn numbers(&self) -> usize {
+        self.roots.iter().map(|sheet| sheet.heights.len() + sheet.shares[0].len() + sheet.shares[1].len()).max().unwrap_or(0)
+    }
+
     /// The columns over the roots' parallelograms, upside down if `sign` is -1.
     pub(crate) fn columns(&self, sign: f64) -> Vec<Column> {
         let column = |(root, sheet): (usize, &Sheet)| {
@@ -424,7 +467,7 @@ impl Graph {
         let own = [0, 1].map(|k| [dot_of(&shares[k], &ends[k].start), dot_of(&shares[k], &ends[k].end)]);
         let corner = [0, 1].map(|axis| corner[axis] + own[0][0] * sides[0][axis] + own[1][0] * sides[1][axis]);
         let sides = [0, 1].map(|k| sides[k].map(|x| (own[k][1] - own[k][0]) * x));
-        let [low, high] = range(enclosure, &enclosure.columns, &heights);
+        let [low, high] = range(enclosure, &enclosure.columns, enclosure.miss, &heights);
         Column { kind, heights, shares, root, corner, sides, high, low }
     }
 
@@ -432,7 +475,7 @@ impl Graph {
     fn split(&self, column: &Column) -> (usize, &[Part]) {
         let parts = &self.kinds[column.kind].parts;
         let [p, q] = column.sides.map(|side| side[0] * side[0] + side[1] * side[1]);
-        let along = usize::from((q > p && !parts[1].is_empty()) || parts[0].is_empty());
+        let along = usize::from(q > p);
         (along, &parts[along])
     }
 
@@ -452,42 +495,36 @@ impl Graph {
         (0..self.split(column).1.len()).map(move |number| self.part(column, number))
     }
 
-    /// A narrow column near a place: no corner is farther than a width from its middle, and it is no higher than that. None where columns do not become as small.
-    pub(crate) fn narrow_at(&self, at: Place, width: f64) -> Option<Column> {
+    /// A narrow column over a place, given those over the roots: no corner is farther than a width from its middle, nor is the place, and it is no higher than that. None where columns do not become as small.
+    pub(crate) fn narrow_at(&self, roots: &[Column], at: Place, width: f64) -> Option<Column> {
         let closest = |columns: Vec<Column>| columns.into_iter().min_by(|a, b| a.beyond(at).total_cmp(&b.beyond(at)));
-        let mut column = closest(self.columns(1.0))?;
+        let mut column = closest(roots.to_vec())?;
         for _ in 0..DEEPEST {
             if column.reach() <= width && column.high - column.low <= width {
-                return Some(column);
+                let middle = column.middle();
+                return ((middle[0] - at[0]).hypot(middle[1] - at[1]) <= width).then_some(column);
             }
             column = closest(self.parts(&column).collect())?;
         }
         None
     }
 
-    /// A place as high as any of a column, but for a slack, and whether its height is no less than that of all: if not, as that would take too many splits, it is the highest that was found, and no higher than the graph.
+    /// A place as high as any of a column, but for a slack, and a height that no place of it exceeds, which is that of the first one. If to tell it would take too many splits, it is the highest place that was found, which is no higher than the graph, and the bound is higher.
     pub(crate) fn peak(&self, column: &Column, slack: f64, splits: usize) -> (Point, f64) {
         let mut wider: Vec<Column> = Vec::new();
         let mut heap: BinaryHeap<Glimpse> = BinaryHeap::new();
-        let (mut best, mut most) = ((column.low, None), column.high);
-        let place = |wider: &[Column], best: Option<(usize, usize)>| match best {
-            Some((parent, number)) => self.part(&wider[parent], number).middle(),
-            None => column.middle(),
-        };
-        for _ in 0..splits {
-            let parent = wider.len();
+        let mut best = (column.low, None);
+        for parent in 0..splits {
             let next = if parent == 0 {
                 column.clone()
             } else {
-                let Some(Glimpse { high, parent, number }) = heap.pop() else { break };
-                most = high;
-                if most - best.0 <= slack {
-                    break;
-                }
+                // What is not split stays among those that the bound is told by.
+                let is_told = heap.peek().is_none_or(|top| top.high - best.0 <= slack);
+                let Some(Glimpse { parent, number, .. }) = (if is_told { None } else { heap.pop() }) else { break };
                 self.part(&wider[parent], number)
             };
             for (number, part) in self.split(&next).1.iter().enumerate() {
-                let [low, high] = range(&self.kinds[part.kind].enclosure, &part.seen, &next.heights);
+                let [low, high] = range(&self.kinds[part.kind].enclosure, &part.seen, part.miss, &next.heights);
                 if low > best.0 {
                     best = (low, Some((parent, number)));
                 }
@@ -495,17 +532,19 @@ impl Graph {
             }
             wider.push(next);
         }
-        most = heap.peek().map_or(most, |next| next.high.max(best.0).min(most));
-        let is_highest = most - best.0 <= slack;
-        let [x, y] = place(&wider, best.1);
-        ([x, y, if is_highest { most } else { best.0 }], most)
+        let high = heap.peek().map_or(column.high, |top| top.high.max(best.0));
+        let [x, y] = match best.1 {
+            Some((parent, number)) => self.part(&wider[parent], number).middle(),
+            None => column.middle(),
+        };
+        ([x, y, if high - best.0 <= slack { high } else { best.0 }], high)
     }
 }
 
-/// Bounds of the heights of what an enclosure holds, given its columns as points of what has such heights.
-fn range(enclosure: &Enclosure, columns: &SubdivisionOperator, heights: &[f64]) -> [f64; 2] {
+/// Bounds of the heights of what an enclosure holds, given its columns as points of what has such heights, and by how much these may be off, in the sum of coordinates.
+fn range(enclosure: &Enclosure, columns: &SubdivisionOperator, miss: f64, heights: &[f64]) -> [f64; 2] {
     let [low, high] = enclosure.range(columns.pull_back(heights).into_iter());
-    let beyond = enclosure.miss * heights.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let beyond = miss * heights.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     [low - beyond, high + beyond]
 }
 
@@ -586,7 +625,7 @@ pub(crate) mod tests {
                     assert!(column.low <= at[2] + 1e-6 && column.high >= at[2] - 1e-6, "{number}: {column:?} {at:?}");
                     column = graph.parts(&column).min_by(|a, b| a.beyond([at[0], at[1]]).total_cmp(&b.beyond([at[0], at[1]]))).unwrap();
                 }
-                let narrow = graph.narrow_at([at[0], at[1]], 0.05).unwrap();
+                let narrow = graph.narrow_at(&graph.columns(1.0), [at[0], at[1]], 0.05).unwrap();
                 assert!(narrow.reach() <= 0.05 && narrow.high - narrow.low <= 0.05);
                 assert!((narrow.low - 0.05..=narrow.high + 0.05).contains(&at[2]), "{number}");
             }
@@ -610,7 +649,7 @@ pub(crate) mod tests {
                 let own: Vec<&Point> = places.iter().filter(|place| column.has([place[0], place[1]])).collect();
                 let most = own.iter().map(|place| place[2]).fold(f64::NEG_INFINITY, f64::max);
                 assert!(high >= most - 1e-6 && column.has([peak[0], peak[1]]), "{number}: {high} {most}");
-                let there = graph.narrow_at([peak[0], peak[1]], 0.01).unwrap();
+                let there = graph.narrow_at(&graph.columns(1.0), [peak[0], peak[1]], 0.01).unwrap();
                 assert!(peak[2] <= there.high + 0.051 && peak[2] <= high, "{number}: {peak:?} {there:?}");
                 if peak[2] == high {
                     highest += 1;
@@ -619,6 +658,24 @@ pub(crate) mod tests {
                 open.extend(graph.parts(&column));
             }
             assert!(highest > 30, "{number}: {highest}");
+        }
+    }
+
+    /// With any number of splits, and any slack, the bound holds: what is told to be highest is no lower than what more splits find.
+    #[test]
+    fn bounds_of_peaks_hold_however_early_a_search_ends() {
+        for (number, attractor) in graphs().iter().enumerate() {
+            let graph = attractor.graph().unwrap();
+            let mut open = graph.columns(-1.0);
+            for _ in 0..40 {
+                let column = open.remove(0);
+                let (found, _) = graph.peak(&column, 1e-6, 4_000);
+                for (splits, slack) in [(1, 0.5), (2, 0.5), (3, 1.0), (8, 0.3), (40, 0.1), (400, 0.03)] {
+                    let (peak, high) = graph.peak(&column, slack, splits);
+                    assert!(high >= found[2] - 1e-6 && high >= peak[2], "{number}: {splits} {slack}: {high} {found:?}");
+                }
+                open.extend(graph.parts(&column));
+            }
         }
     }
 

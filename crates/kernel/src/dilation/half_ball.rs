@@ -150,7 +150,10 @@ impl HalfBall {
                     Meet::Nothing => {}
                     // Directions on the equator are rounded to either side of it.
                     Meet::At(both) => self.left.extend(both.into_iter().filter(|u| u[2] >= -WITHIN)),
-                    Meet::Unclear => return false,
+                    Meet::Unclear => {
+                        self.left.push(u);
+                        return false;
+                    }
                 }
             }
             self.caps.push(cap);
@@ -168,7 +171,8 @@ impl Cap {
         if rest <= 0.0 {
             return None;
         }
-        let up: Point = std::array::from_fn(|k| f64::from(u8::from(k == 2)) - way[k] * way[2] / square);
+        let flat = way[0] * way[0] + way[1] * way[1];
+        let up = [-way[0] * way[2], -way[1] * way[2], flat].map(|part| part / square);
         let length = dot(&up, &up).sqrt();
         // Around the axis all are as high.
         let up = if length > WITHIN { up.map(|part| part / length) } else { [1.0, 0.0, 0.0] };

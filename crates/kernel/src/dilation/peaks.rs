@@ -23,14 +23,17 @@ const SLACK: f64 = 0.05;
 const EDGE: f64 = 0.01;
 const BETWEEN: f64 = 0.02;
 const BORDER: f64 = 0.06;
+/// Places along the border at most.
+const MOST_ENDS: f64 = 200_000.0;
 /// In how many rounds the columns of a level are looked at, so that peaks of one hide columns of the next.
 const ROUNDS: usize = 8;
 /// Columns that are split at most to find the highest place of one: more take longer than they save, unless it is very narrow.
 const SPLITS: [usize; 2] = [12, 200];
 /// How narrow columns are, in units of how narrow they need be, whose highest places are sought longer, and of which these should be known.
 const NARROWEST: [f64; 2] = [0.1, 1e-4];
-/// Bytes of a column that waits, and of a ray with what is made of it.
-const BYTES_PER_COLUMN: f64 = 700.0;
+/// Bytes of a column that waits, for each of its numbers, too, and of a ray with what is made of it.
+const BYTES_PER_COLUMN: f64 = 500.0;
+const BYTES_PER_NUMBER: f64 = 16.0;
 const BYTES_PER_RAY: f64 = 4_000.0;
 
 /// Rays that stand for a graph.
@@ -62,7 +65,8 @@ pub(super) fn stand(graph: &Graph, radius: f64, within: f64, budget: &Budget) ->
     let (apart, inward, outward) = (APART * within, (APART + 2.0 * NARROW) * within, SLACK * within);
     let (least, outer) = (held + inward, radius + within - outward);
     let Some(Border { ends, border, rim }) = at_border(graph, within, [least, outer], budget)? else { return Ok(None) };
-    let most = (budget.limits.memory_bytes as f64 / BYTES_PER_COLUMN).min(budget.limits.cells as f64) as usize;
+    let bytes_per_column = BYTES_PER_COLUMN + BYTES_PER_NUMBER * graph.numbers() as f64;
+    let most = (budget.limits.memory_bytes as f64 / bytes_per_column).min(budget.limits.cells as f64) as usize;
     let (mut peaks, mut columns, mut bytes) = ([Vec::new(), Vec::new()], 0, 0.0_f64);
     for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
         let mut search =
@@ -71,7 +75,7 @@ pub(super) fn stand(graph: &Graph, radius: f64, within: f64, budget: &Budget) ->
             return Ok(None);
         }
         columns += search.looked as u64;
-        bytes = bytes.max(BYTES_PER_COLUMN * search.waiting as f64);
+        bytes = bytes.max(bytes_per_column * search.waiting as f64);
         peaks[side] = search.cover.ends();
         peaks[side].extend(ends.iter().map(|&[x, y, low, high]| [x, y, if side == 0 { low } else { -high }]));
     }
@@ -97,14 +101,17 @@ struct Border {
 fn at_border(graph: &Graph, within: f64, [least, outer]: [f64; 2], budget: &Budget) -> Result<Option<Border>, Stopped> {
     let edge = EDGE * within;
     let step = (8.0 * least * BETWEEN * within).sqrt();
-    let mut ends = Vec::new();
+    let (mut ends, roots) = (Vec::new(), graph.columns(1.0));
     for (k, a) in graph.corners.iter().enumerate() {
         let b = graph.corners[(k + 1) % graph.corners.len()];
         let steps = ((b[0] - a[0]).hypot(b[1] - a[1]) / step).ceil();
+        if ends.len() as f64 + steps > MOST_ENDS {
+            return Ok(None);
+        }
         for share in (0..steps as u64).map(|number| number as f64 / steps) {
             budget.cancel.check()?;
             let at = [0, 1].map(|axis| a[axis] + share * (b[axis] - a[axis]));
-            let Some(column) = graph.narrow_at(at, edge) else { return Ok(None) };
+            let Some(column) = graph.narrow_at(&roots, at, edge) else { return Ok(None) };
             let [x, y] = column.middle();
             ends.push([x, y, column.low, column.high]);
         }
@@ -247,6 +254,7 @@ mod tests {
         for (number, attractor) in graphs().iter().enumerate() {
             let graph = attractor.graph().unwrap();
             let stand = stand(&graph, RADIUS, WITHIN, &Budget::default()).unwrap().unwrap();
+            let roots = graph.columns(1.0);
             let Stand { rays, least, outer, inward, outward, .. } = &stand;
             assert!((least - inward - (RADIUS - WITHIN)).abs() < 1e-12 && (outer + outward - (RADIUS + WITHIN)).abs() < 1e-12);
             let all = places(attractor, &graph, 3_000);
@@ -262,7 +270,7 @@ mod tests {
             assert!(farthest.iter().all(|&far| far <= least + 1e-6 && far > least - inward), "{number}: {farthest:?} {least}");
             for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                 for peak in &rays.peaks[side] {
-                    let there = graph.narrow_at([peak[0], peak[1]], 0.01).unwrap();
+                    let there = graph.narrow_at(&roots, [peak[0], peak[1]], 0.01).unwrap();
                     let height = if side == 0 { there.high } else { -there.low };
                     assert!(peak[2] <= height + outward + 0.01, "{number} {sign}: {peak:?} {there:?}");
                 }

@@ -395,40 +395,42 @@ impl<'a> Plan<'a> {
     ///
     /// It is exactly a ball: see `height_field` in `arrangement`.
     pub(super) fn run_over(&self, graph: &Graph, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
-        let Some((setting, surface, _)) = self.over(graph, budget)? else { return Ok(None) };
+        let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles };
+        let Some(Over { setting, made, .. }) = self.over(graph, budget)? else { return Ok(None) };
+        let (Flat::Made(surface) | Flat::Steady(surface)) = made else { return Err(too_many()) };
         let triangles = surface.triangles.len() as u64;
         if triangles > budget.limits.triangles {
-            return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
+            return Err(too_many());
         }
         self.prove(&setting, surface.site_error, triangles, budget);
-        self.certify(&setting, Mended { surface, uncertain: 0, crossings: 0 }, true, None, budget).map(Some)
+        self.certify(&setting, Mended { surface: *surface, uncertain: 0, crossings: 0 }, true, None, budget).map(Some)
     }
 
     /// The same as a prediction: all of it is made for that.
     pub(super) fn predict_over(&self, graph: &Graph, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
         let made = self.over(graph, budget)?;
-        Ok(made.map(|(_, surface, bytes)| {
-            let triangles = surface.triangles.len() as f64;
-            self.without_lattice(triangles, bytes.max(BYTES_PER_TRIANGLE * triangles), surface.leaves as f64)
+        Ok(made.map(|Over { made, columns, bytes, .. }| {
+            let triangles = match made {
+                Flat::Made(surface) | Flat::Steady(surface) => surface.triangles.len() as f64,
+                Flat::Beyond(triangles) => triangles,
+            };
+            self.without_lattice(triangles, bytes.max(BYTES_PER_TRIANGLE * triangles), columns as f64)
         }))
     }
 
-    /// The surface around a graph, and bytes that were held at most.
-    fn over(&self, graph: &Graph, budget: &Budget) -> Result<Option<(Setting, BlockSurface, f64)>, DilationError> {
+    /// The surface around a graph, if rays serve it.
+    fn over(&self, graph: &Graph, budget: &Budget) -> Result<Option<Over>, DilationError> {
         // Less what sums of such lengths lose to rounding.
         let within = self.tolerance - self.extra - graph.off - 1e-12 * self.radius;
         let Some(stand) = peaks::stand(graph, self.radius, within, budget)? else { return Ok(None) };
         let Stand { rays, least, outer, inward, outward, columns, bytes } = stand;
         let setting = Setting { least, outer, dense: false, ..self.setting(self.pitch, budget) };
-        let surface = match between_rays(rays, &setting, budget)? {
-            Some(Flat::Made(surface) | Flat::Steady(surface)) => surface,
-            Some(Flat::Beyond(_)) => {
-                return Err(DilationError::Triangles { tolerance_mm: self.aimed, allowed: budget.limits.triangles });
-            }
-            None => return Ok(None),
-        };
-        let site_error = SiteError { inner: inward + graph.off, outer: outward + graph.off, ..SiteError::default() };
-        Ok(Some((setting, BlockSurface { site_error, leaves: columns, ..*surface }, bytes)))
+        let Some(mut made) = between_rays(rays, &setting, budget)? else { return Ok(None) };
+        if let Flat::Made(surface) | Flat::Steady(surface) = &mut made {
+            surface.site_error = SiteError { inner: inward + graph.off, outer: outward + graph.off, ..SiteError::default() };
+            surface.leaves = columns;
+        }
+        Ok(Some(Over { setting, made, columns, bytes }))
     }
 
     /// The dilation on a lattice. Where the distance may have critical points with values that it does not tell from r, it is refined until it does.
@@ -695,6 +697,14 @@ impl<'a> Plan<'a> {
             topology_exact: is_exact && !setting.dense && uncertain == 0 && crossings == 0,
         })
     }
+}
+
+/// What comes of rays: the surface, columns that were looked at, and bytes that were held at most.
+struct Over {
+    setting: Setting,
+    made: Flat,
+    columns: u64,
+    bytes: f64,
 }
 
 /// A surface that was mended.

@@ -29,7 +29,7 @@ const ROUNDINGS: f64 = 4.0;
 const LEAST_SHARE: f64 = 0.1;
 /// Triangles for each vertex of a sheet, about.
 const PER_VERTEX: f64 = 2.0;
-/// Bytes held at most for each triangle of the graph, and for each vertex of a sheet.
+/// Bytes held at most for each triangle of the graph, or ray, and for each vertex of a sheet.
 pub(super) const BYTES_PER_FACE: f64 = 1_600.0;
 const BYTES_PER_VERTEX: f64 = 400.0;
 

@@ -35,7 +35,7 @@ const IN_A_ROW: usize = 32;
 pub(super) struct Vertex {
     at: Place,
     height: f64,
-    /// A triangle of the graph that is closest.
+    /// A triangle of the graph, or a ray, that is closest.
     owner: u32,
 }
 
