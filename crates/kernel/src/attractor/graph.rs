@@ -158,6 +158,15 @@ impl Attractor {
         }
     }
 
+    /// Where the parts of a curve start and end, in their order; none where they are no curves.
+    fn ends_of_parts(&self, curve: StateId) -> Option<Vec<[Vec<f64>; 2]>> {
+        let part = |transition: &Transition| {
+            let own = self.curve_ends(transition.to)?;
+            Some([&own.start, &own.end].map(|end| transition.operator.apply(end)))
+        };
+        self.automaton.state(curve).transitions.iter().map(part).collect()
+    }
+
     /// Whether a functional grows along a curve, given its values at the control points.
     fn grows_along(&self, curve: StateId, values: &[f64]) -> bool {
         if self.bound(curve).margin() > 0.0 {
@@ -169,15 +178,9 @@ impl Attractor {
         let keeps = |operator: &SubdivisionOperator| (1..operator.columns()).all(|k| is_ahead(operator.column(k), operator.column(k - 1)));
         let is_kept = |index: usize| {
             let Some(ends) = self.curve_ends(StateId::new(index)) else { return false };
-            let transitions = &state(index).transitions;
-            let part = |transition: &Transition| {
-                let own = self.curve_ends(transition.to)?;
-                Some([&own.start, &own.end].map(|end| transition.operator.apply(end)))
-            };
-            let parts: Option<Vec<[Vec<f64>; 2]>> = transitions.iter().map(part).collect();
             is_ahead(&ends.end, &ends.start)
-                && parts.is_some_and(|parts| is_chain(ends, &parts))
-                && transitions.iter().all(|transition| keeps(&transition.operator))
+                && self.ends_of_parts(StateId::new(index)).is_some_and(|parts| is_chain(ends, &parts))
+                && state(index).transitions.iter().all(|transition| keeps(&transition.operator))
         };
         values.windows(2).all(|pair| pair[0] < pair[1]) && reachable(&self.automaton, curve).into_iter().all(is_kept)
     }
@@ -186,16 +189,12 @@ impl Attractor {
     fn is_in_a_row(&self, curve: StateId) -> bool {
         let (Some(precision), Some(ends)) = (self.precision(curve), self.curve_ends(curve)) else { return false };
         let parameter = |point: &[f64]| precision.parameter(point)[0];
-        let part = |transition: &Transition| {
-            let own = self.curve_ends(transition.to)?;
-            let mut part = [&own.start, &own.end].map(|end| transition.operator.apply(end));
+        let Some(mut parts) = self.ends_of_parts(curve) else { return false };
+        for part in &mut parts {
             if parameter(&part[1]) < parameter(&part[0]) {
                 part.swap(0, 1);
             }
-            Some(part)
-        };
-        let parts: Option<Vec<[Vec<f64>; 2]>> = self.automaton.state(curve).transitions.iter().map(part).collect();
-        let Some(mut parts) = parts else { return false };
+        }
         parts.sort_by(|a, b| parameter(&a[0]).total_cmp(&parameter(&b[0])));
         let are_long = parts.iter().all(|[start, end]| parameter(end) - parameter(start) > MISS);
         are_long && (parameter(&ends.end) - 1.0).abs() <= MISS && is_chain(ends, &parts)

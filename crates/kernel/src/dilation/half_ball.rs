@@ -3,6 +3,7 @@
 //! All of it is below a half-ball, and so is what is within a distance of the others below their own. So the half-ball alone is held against balls around places of these: each has a cap of it, of directions u with u way >= least. Nothing is left of the half-ball if each direction where the circles around two caps meet, one of
 //! each circle, and one at all, are in some cap: what is left has a corner, or all of a circle as its border, or none. So caps are added one after the other: for a direction that is left that of the ray that is closest there, until nothing is left, or none is close enough.
 
+use super::squares::Squares;
 use crate::attractor::cell::{Point, cross, dot};
 
 /// How far rays are at first that may be close, in units of their distance.
@@ -20,10 +21,9 @@ const PITCH: f64 = 0.5;
 /// Upper ends of rays that lead down, in squares of the plane.
 pub(super) struct Cover {
     radius: f64,
-    low: [f64; 2],
-    pitch: f64,
-    size: [usize; 2],
-    squares: Vec<Vec<Point>>,
+    squares: Squares,
+    /// Those in each square.
+    ends: Vec<Vec<Point>>,
 }
 
 impl Cover {
@@ -31,25 +31,19 @@ impl Cover {
     pub(super) fn new(places: &[[f64; 2]], radius: f64) -> Self {
         let side = |axis: usize| places.iter().map(move |place| place[axis]);
         let low = [0, 1].map(|axis| side(axis).fold(f64::INFINITY, f64::min));
-        let wide = [0, 1].map(|axis| side(axis).fold(f64::NEG_INFINITY, f64::max) - low[axis]);
-        let pitch = (PITCH * radius).max((wide[0] * wide[1] / MOST_SQUARES).sqrt()).max(wide[0].max(wide[1]) / MOST_SQUARES);
-        let size = wide.map(|wide| (wide / pitch) as usize + 1);
-        Self { radius, low, pitch, size, squares: vec![Vec::new(); size[0] * size[1]] }
-    }
-
-    /// Where a coordinate is along an axis: the first or the last, where it is beyond all.
-    fn place(&self, x: f64, axis: usize) -> usize {
-        (((x - self.low[axis]) / self.pitch).max(0.0) as usize).min(self.size[axis] - 1)
+        let high = [0, 1].map(|axis| side(axis).fold(f64::NEG_INFINITY, f64::max));
+        let squares = Squares::new([low, high], PITCH * radius, MOST_SQUARES);
+        let count = squares.size[0] * squares.size[1];
+        Self { radius, squares, ends: vec![Vec::new(); count] }
     }
 
     pub(super) fn add(&mut self, end: Point) {
-        let square = self.place(end[1], 1) * self.size[0] + self.place(end[0], 0);
-        self.squares[square].push(end);
+        self.ends[self.squares.of([end[0], end[1]])].push(end);
     }
 
     /// The rays' ends, square by square.
     pub(super) fn ends(self) -> Vec<Point> {
-        self.squares.concat()
+        self.ends.concat()
     }
 
     /// Whether all within a distance of the ray below a place is within the radius of the rays. Cost: about a microsecond.
@@ -60,9 +54,10 @@ impl Cover {
         let mut ball = HalfBall::new(distance, self.radius);
         for within in [NEXT * self.radius, self.radius + distance] {
             ball.near.clear();
-            let [columns, rows] = [0, 1].map(|axis| self.place(place[axis] - within, axis)..=self.place(place[axis] + within, axis));
-            for first in rows.map(|row| row * self.size[0]) {
-                for end in self.squares[first + columns.start()..=first + columns.end()].iter().flatten() {
+            let [columns, rows] =
+                [0, 1].map(|axis| self.squares.place(place[axis] - within, axis)..=self.squares.place(place[axis] + within, axis));
+            for first in rows.map(|row| row * self.squares.size[0]) {
+                for end in self.ends[first + columns.start()..=first + columns.end()].iter().flatten() {
                     let way: Point = std::array::from_fn(|k| end[k] - place[k]);
                     let (flat, down) = (way[0] * way[0] + way[1] * way[1], way[2].min(0.0));
                     if flat < within * within && flat + down * down < (self.radius + distance).powi(2) {

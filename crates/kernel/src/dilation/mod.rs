@@ -50,6 +50,7 @@ mod setting;
 mod simplify;
 mod slivers;
 mod smooth;
+mod squares;
 mod stability;
 mod star;
 mod stitch;

@@ -2,7 +2,7 @@
 
 use super::Place;
 use super::parts::{Part, Top};
-use super::squares::Squares;
+use crate::dilation::squares::Squares;
 
 /// How wide squares are that parts are sorted into, in units of the largest distance, and how many there are at most for each triangle, or tip.
 const PITCH: f64 = 0.2;

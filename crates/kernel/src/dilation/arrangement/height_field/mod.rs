@@ -23,7 +23,6 @@ mod pair;
 mod parts;
 mod samples;
 mod sheet;
-mod squares;
 #[cfg(test)]
 mod tests;
 

@@ -2,9 +2,9 @@
 
 use super::Place;
 use super::field::{Field, MOST};
-use super::squares::Squares;
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
+use crate::dilation::squares::Squares;
 use rayon::prelude::*;
 
 /// How wide squares are that have a sample, in units of the distance.

@@ -1,6 +1,7 @@
 //! Squares of a plane, and what is in each of them.
 
-use super::Place;
+/// A place in the plane.
+type Place = [f64; 2];
 
 /// Squares that cover a box.
 pub(super) struct Squares {
