@@ -1,16 +1,11 @@
 //! The address function both ways, against closed forms and against itself.
-#![allow(clippy::unwrap_used)]
 
-// Its other half is for certificates.
-#[allow(dead_code)]
-mod oracle;
-
+use crate::oracle::Random;
 use glam::{DMat3, DVec2, DVec3};
 use lacuna_kernel::attractor::{Address, AddressError, Attractor, Location, NearQuery, Neighbourhood, addresses_near, point_at};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{AffineMap, BezierCurve, CornerCutting, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::Tolerance;
-use oracle::Random;
 
 fn attractor(shape: Shape) -> Attractor {
     Model { name: None, shape }.lower().unwrap().attractor

@@ -1,8 +1,6 @@
 //! Areas of smooth surfaces: closed forms, quadrature of high order, and finer and finer polyhedra.
-#![allow(clippy::unwrap_used)]
 
-mod cages;
-
+use crate::cages;
 use glam::{DQuat, DVec3};
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::{Budget, CancelToken, Limits, StopReason};

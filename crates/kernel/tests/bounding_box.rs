@@ -1,14 +1,11 @@
 //! Boxes of shapes: against closed forms whose extremes are attained along lines, faces and Cantor sets, and against fine samples of random systems.
-#![allow(clippy::unwrap_used)]
 
-mod schemes;
-
+use crate::schemes::{Random, curve, lower, product, project, size};
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::measure::{Interval, bounding_box, extent_along};
 use lacuna_kernel::model::{AffineMap, ControlNet, CurveScheme, Ifs, Parametrization, Shape};
-use schemes::{Random, curve, lower, product, project, size};
 
 fn ifs(maps: Vec<AffineMap>) -> Attractor {
     lower(Shape::Ifs(Ifs { maps, primitive: None, graph: None })).attractor

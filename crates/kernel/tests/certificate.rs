@@ -1,8 +1,6 @@
 //! What a result certifies, against brute force that shares no code with the kernel.
-#![allow(clippy::unwrap_used)]
 
-mod oracle;
-
+use crate::oracle::{Oracle, Random, distance, winding};
 use glam::{DMat3, DQuat, DVec3};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::Budget;
@@ -11,7 +9,6 @@ use lacuna_kernel::measure::bounding_box;
 use lacuna_kernel::measure::mass::{dilated_area, dilated_volume, mesh_measures, volume_within};
 use lacuna_kernel::model::{AffineMap, BezierCurve, CornerCutting, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
-use oracle::{Oracle, Random, distance, winding};
 
 fn attractor(shape: Shape) -> Attractor {
     Model { name: None, shape }.lower().unwrap().attractor

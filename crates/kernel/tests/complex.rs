@@ -1,9 +1,7 @@
 //! Evaluations of shapes with a B-rep: conforming, counted, addressed. Expected counts come from combinatorics:
 //! Euler numbers of discs, tori and Sierpinski triangles.
 
-mod agreement;
-
-use agreement::agreed;
+use crate::agreement::agreed;
 use glam::{DVec3, DVec4};
 use lacuna_kernel::attractor::{Attractor, refine};
 use lacuna_kernel::budget::{Budget, Limits};

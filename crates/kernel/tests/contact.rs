@@ -1,10 +1,6 @@
 //! Intersections and Hausdorff distances against closed forms, brute force and fine samples.
-#![allow(clippy::unwrap_used)]
 
-// Its other half is for certificates.
-#[allow(dead_code)]
-mod oracle;
-
+use crate::oracle::Random;
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::{Address, Attractor, point_at};
 use lacuna_kernel::budget::{Budget, StopReason};
@@ -13,7 +9,6 @@ use lacuna_kernel::measure::{
 };
 use lacuna_kernel::model::{AffineMap, BezierCurve, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::Tolerance;
-use oracle::Random;
 
 fn attractor(shape: Shape) -> Attractor {
     Model { name: None, shape }.lower().unwrap().attractor

@@ -1,9 +1,6 @@
 //! Bounds of the joint spectral radius against radii known in closed form or from the literature.
-#![allow(clippy::unwrap_used)]
 
-mod automata;
-
-use automata::{Columns, Numbers, automaton, catmull_clark, corner_cutting, cubic, extended, fifty_states, iterated, nurbs, tensor};
+use crate::automata::{Columns, Numbers, automaton, catmull_clark, corner_cutting, cubic, extended, fifty_states, iterated, nurbs, tensor};
 use lacuna_kernel::automaton::{Automaton, Contraction, convergence::contraction};
 
 /// Asserts that the bounds hold the radius and are within `share` of it.

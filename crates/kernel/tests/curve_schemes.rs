@@ -1,12 +1,9 @@
 //! Schemes of curves against their defining properties, and what they refuse. Expected values are closed forms.
 
-mod agreement;
-mod schemes;
-
-use agreement::agreed;
+use crate::agreement::agreed;
+use crate::schemes::*;
 use glam::{DMat3, DVec3};
 use lacuna_kernel::model::{AffineMap, ControlNet, Curve, CurveScheme, Model, Parametrization, Shape, Sum};
-use schemes::*;
 
 fn near(scheme: CurveScheme, points: Vec<DVec3>, tolerance: f64) -> Vec<DVec3> {
     evaluated(&lower(curve(scheme, points, None)).attractor, tolerance).vertices

@@ -1,9 +1,7 @@
 //! Volumes that surfaces enclose, from their control points alone: closed forms, published digits, and polyhedra.
-#![allow(clippy::unwrap_used)]
 
-mod cages;
-
-use cages::{attractor, cube, grid, head, tetrahedron, torus};
+use crate::cages;
+use crate::cages::{attractor, cube, grid, head, tetrahedron, torus};
 use glam::{DMat3, DQuat, DVec3};
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};

@@ -1,7 +1,5 @@
 //! Half-edges: adjacency against brute force on the faces, and every kind of mesh that has none.
 
-#![allow(clippy::unwrap_used)]
-
 use lacuna_kernel::model::{HalfEdgeMesh, MeshFault};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,10 +1,6 @@
 //! Hausdorff distances of shapes that share surface: closed forms within few nodes, and random sets against fine samples.
-#![allow(clippy::unwrap_used)]
 
-// Its other half is for certificates.
-#[allow(dead_code)]
-mod oracle;
-
+use crate::oracle::Random;
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::{Budget, Limits};
@@ -12,7 +8,6 @@ use lacuna_kernel::measure::triangle::closest_on_triangle;
 use lacuna_kernel::measure::{Directed, Hausdorff, Interval, hausdorff};
 use lacuna_kernel::model::{Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::Tolerance;
-use oracle::Random;
 
 type Triangle = [DVec3; 3];
 

@@ -1,15 +1,12 @@
 //! Parts joined along borders. Expected values: Euler numbers of unions, B-splines in closed form, polynomials.
 
-mod agreement;
-mod schemes;
-
-use agreement::agreed;
+use crate::agreement::agreed;
+use crate::schemes::*;
 use glam::DVec3;
 use lacuna_kernel::model::{
     Border, BorderPath, BoundaryRule, ControlNet, CurveScheme, Finding, Group, Join, Part, Scheme, Shape, Subdivision,
 };
 use lacuna_kernel::tessellation::Tessellation;
-use schemes::*;
 
 /// A uniform spline surface; `points[i][j]`.
 fn uniform(degree: usize, points: &[Vec<DVec3>]) -> Shape {

@@ -1,9 +1,6 @@
 //! Errors of what stands for leaf cells, needles and smooth cells, against much finer evaluations, and their cost.
-#![allow(clippy::unwrap_used)]
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod oracle;
-
+use crate::oracle::{Oracle, Random, distance};
 use glam::{DMat3, DVec3, DVec4};
 use lacuna_kernel::attractor::{Attractor, count_cells, refine};
 use lacuna_kernel::budget::Budget;
@@ -13,7 +10,6 @@ use lacuna_kernel::model::{
 };
 use lacuna_kernel::tessellation::Tessellation;
 use lacuna_kernel::tolerance::{Radius, Tolerance};
-use oracle::{Oracle, Random, distance};
 
 fn attractor(shape: Shape) -> Attractor {
     Model { name: None, shape }.lower().unwrap().attractor

@@ -1,5 +1,4 @@
 //! The limit of leaf cells of a dilation: it counts what the result says that it expanded, on a lattice and without one, and for any number of threads.
-#![allow(clippy::unwrap_used)]
 
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::Attractor;

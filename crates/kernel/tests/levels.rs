@@ -1,7 +1,5 @@
 //! Levels of systems as solids: closed forms of volume, area and genus, the exactness of what is joined, refusals.
 
-#![allow(clippy::unwrap_used)]
-
 use glam::{DMat3, DVec3};
 use lacuna_kernel::budget::{Budget, CancelToken, Limits, StopReason};
 use lacuna_kernel::levels::{LevelError, LevelPrimitive, SolidLevel, predict, solid_level};

@@ -1,14 +1,9 @@
 //! The smallest box: closed forms, and random points against boxes turned at random.
 
-#![allow(clippy::unwrap_used)]
-
-#[allow(dead_code)] // each test file uses a part
-mod oracle;
-
+use crate::oracle::Random;
 use glam::{DMat3, DQuat, DVec3};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::measure::{OrientedBox, oriented_box};
-use oracle::Random;
 
 fn found(points: &[DVec3], grown: f64, relative: f64) -> OrientedBox {
     oriented_box(points, grown, 0.0, relative, &Budget::default()).unwrap().unwrap()

@@ -1,11 +1,10 @@
 //! Products of curves: what is drawn of them keeps its bound, whatever the factors.
 
-mod schemes;
-
+use crate::schemes;
+use crate::schemes::{Random, evaluated, lower, product};
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::model::{ControlNet, CurveScheme, Parametrization};
-use schemes::{Random, evaluated, lower, product};
 
 fn nurbs(degree: usize, knots: Vec<f64>) -> CurveScheme {
     CurveScheme::Nurbs { degree, knots }

@@ -1,5 +1,4 @@
 //! The error bound that is told with the progress: none before there is one, true of what has been made, and in the end that of the result.
-#![allow(clippy::unwrap_used)]
 
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::{Attractor, refine, stream};

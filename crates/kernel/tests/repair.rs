@@ -1,7 +1,5 @@
 //! Meshes that are no solids, repaired: closed forms, and random damage of closed meshes, which must be undone.
 
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::TAU;
 
 use glam::DVec3;

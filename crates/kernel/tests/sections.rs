@@ -1,6 +1,6 @@
 //! A thousand sections of a large solid: how long they take, and that they make up its volume.
 //!
-//! `cargo test --release -p lacuna-kernel --test sections -- --ignored --nocapture`
+//! `cargo test --release -p lacuna-kernel --test kernel sections:: -- --ignored --nocapture`
 
 use std::f64::consts::TAU;
 use std::time::Instant;

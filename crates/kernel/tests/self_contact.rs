@@ -1,10 +1,6 @@
 //! Where shapes come near themselves, against closed forms, polygons that are drawn by hand and fine samples.
-#![allow(clippy::unwrap_used)]
 
-// Its other half is for certificates.
-#[allow(dead_code)]
-mod oracle;
-
+use crate::oracle::Random;
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::{Address, Attractor, point_at};
 use lacuna_kernel::budget::{Budget, StopReason};
@@ -15,7 +11,6 @@ use lacuna_kernel::model::{
     Subdivision,
 };
 use lacuna_kernel::tolerance::Tolerance;
-use oracle::Random;
 
 fn attractor(shape: Shape) -> Attractor {
     Model { name: None, shape }.lower().unwrap().attractor

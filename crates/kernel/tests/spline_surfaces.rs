@@ -1,13 +1,10 @@
 //! Evaluated products of schemes: conforming, closed where they close, within their bounds. Expected values are closed
 //! forms and combinatorics.
 
-mod agreement;
-mod schemes;
-
-use agreement::agreed;
+use crate::agreement::agreed;
+use crate::schemes::*;
 use glam::DVec3;
 use lacuna_kernel::model::{ControlNet, CurveScheme, Shape};
-use schemes::*;
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 fn nurbs(degree: usize, knots: &[f64]) -> CurveScheme {

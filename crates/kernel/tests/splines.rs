@@ -1,11 +1,9 @@
 //! Splines of any degree on any knots against a direct evaluator that lives here (de Boor's algorithm), and against
 //! closed forms.
 
-mod schemes;
-
+use crate::schemes::*;
 use glam::DVec3;
 use lacuna_kernel::model::{ControlNet, CurveScheme};
-use schemes::*;
 
 /// Distinct states of curves that a spline on these knots reaches, without points.
 fn curve_states(degree: usize, knots: Vec<f64>) -> usize {

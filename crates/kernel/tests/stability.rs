@@ -1,17 +1,12 @@
 //! Critical radii against closed forms, an alpha complex by brute force, and Euler numbers of dilated meshes.
-#![allow(clippy::unwrap_used)]
 
-// Its other half is for certificates.
-#[allow(dead_code)]
-mod oracle;
-
+use crate::oracle::Random;
 use glam::{DMat3, DQuat, DVec3};
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::dilation::{Change, CriticalRadius, DilationError, Stability, Verdict, dilate, stability};
 use lacuna_kernel::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
 use lacuna_kernel::tolerance::{Radius, Tolerance};
-use oracle::Random;
 
 fn attractor(shape: Shape) -> Attractor {
     Model { name: None, shape }.lower().unwrap().attractor

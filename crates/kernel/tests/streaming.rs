@@ -1,5 +1,4 @@
 //! Evaluation in pieces gives what evaluation as a whole gives, for any number of threads, within its limits.
-#![allow(clippy::unwrap_used)]
 
 use glam::{DMat3, DVec3};
 use lacuna_kernel::attractor::{Attractor, RefineError, Streamed, count_cells, refine, stream};

@@ -1,11 +1,9 @@
 //! Subdivision surfaces: dimensions of states, limit points, volumes, boundaries, creases, and evaluation without
 //! cracks. Expected values: closed forms and CASES E (Stam 1998, Hakenberg and Reif 2014, OpenSubdiv's shapes).
 
-mod agreement;
-mod cages;
-
-use agreement::agreed;
-use cages::{attractor, cube, evaluated, grid, model, tetrahedron, torus, volume};
+use crate::agreement::agreed;
+use crate::cages;
+use crate::cages::{attractor, cube, evaluated, grid, model, tetrahedron, torus, volume};
 use glam::DVec3;
 use lacuna_kernel::attractor::Attractor;
 use lacuna_kernel::model::{BoundaryRule, CellKind, Coefficients, Corner, Crease, Scheme, Subdivision};

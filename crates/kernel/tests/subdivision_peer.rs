@@ -1,9 +1,8 @@
 //! Subdivision surfaces against OpenSubdiv (Debian's libosd-dev): limit points and normals on random cages with creases,
 //! corners and boundaries. Skipped with a message where it is not installed.
 
-mod cages;
-
-use cages::{attractor, cube, evaluated, grid, inset_torus, patches, tetrahedron, torus};
+use crate::cages;
+use crate::cages::{attractor, cube, evaluated, grid, inset_torus, patches, tetrahedron, torus};
 use glam::DVec3;
 use lacuna_kernel::attractor::{refine, refine_with_normals};
 use lacuna_kernel::budget::Budget;
@@ -279,7 +278,7 @@ fn cpu_seconds() -> Option<f64> {
 }
 
 /// Level 6 of a cage of 468 quads: the tolerance is the one at which as many faces are drawn. Alone in its process the CPU
-/// time is this evaluation's: `cargo test --test subdivision_peer -- --ignored --nocapture --test-threads 1`.
+/// time is this evaluation's: `cargo test -p lacuna-kernel --test kernel subdivision_peer:: -- --ignored --nocapture --test-threads 1`.
 #[test]
 #[ignore = "a measurement, to be run alone"]
 fn speed_beside_opensubdiv() {

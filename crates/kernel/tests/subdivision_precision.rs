@@ -1,18 +1,15 @@
 //! Leaf errors of subdivision surfaces: sound against much finer evaluations, and of second order away from
 //! extraordinary vertices, so that faces go with 1 / tolerance.
 
-mod cages;
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod oracle;
-
-use cages::{attractor, cube, evaluated, grid, tetrahedron, torus};
+use crate::cages;
+use crate::cages::{attractor, cube, evaluated, grid, tetrahedron, torus};
+use crate::oracle::{Oracle, Random};
 use glam::DVec3;
 use lacuna_kernel::attractor::refine_with_normals;
 use lacuna_kernel::automaton::StateId;
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::model::{BoundaryRule, CellKind, Corner, Crease, Scheme, Subdivision};
 use lacuna_kernel::tolerance::Tolerance;
-use oracle::{Oracle, Random};
 
 /// Faces with proven linear precision, and all.
 fn precise(surface: Subdivision) -> (usize, usize) {

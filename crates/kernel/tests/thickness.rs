@@ -1,15 +1,10 @@
 //! Walls and gaps: closed forms, and random solids against rays.
 
-#![allow(clippy::unwrap_used)]
-
-#[allow(dead_code)] // each test file uses a part
-mod oracle;
-
+use crate::oracle::Random;
 use glam::{DMat3, DVec3};
 use lacuna_kernel::budget::{Budget, CancelToken, StopReason};
 use lacuna_kernel::measure::{Side, Thickness, ThicknessMap, thickness, thickness_map};
 use lacuna_kernel::solid::TriMesh;
-use oracle::Random;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 fn cuboid(low: DVec3, high: DVec3) -> TriMesh {

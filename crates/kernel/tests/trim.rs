@@ -1,5 +1,4 @@
 //! Trimmed surfaces against closed forms: areas, topology, Hausdorff bounds, and loops that are refused.
-#![allow(clippy::unwrap_used)]
 
 use glam::{DVec2, DVec3};
 use lacuna_kernel::attractor::refine;

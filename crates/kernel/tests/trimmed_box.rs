@@ -1,13 +1,10 @@
 //! Boxes of trimmed surfaces: random patches and loops against samples that climb within what is kept.
-#![allow(clippy::unwrap_used)]
 
-mod schemes;
-
+use crate::schemes::{Random, blossom_point, homogeneous, lower, project};
 use glam::{DVec2, DVec3};
 use lacuna_kernel::budget::Budget;
 use lacuna_kernel::measure::{Interval, extent_along};
 use lacuna_kernel::model::{AffineMap, ControlNet, CurveScheme, Group, Part, Shape, TensorProduct, Trim, TrimCurve};
-use schemes::{Random, blossom_point, homogeneous, lower, project};
 use std::f64::consts::TAU;
 
 /// A spline surface of clamped or open knots.
