@@ -64,6 +64,14 @@ impl Enclosure {
         Some(Self { columns, places, groups, miss: sizes[1] - sizes[0] })
     }
 
+    /// The hull of segments, each given by its middle and what leads from there to an end.
+    pub(super) fn of_segments(segments: &[[Vec<f64>; 2]]) -> Self {
+        let rows = segments.first().map_or(0, |[middle, _]| middle.len());
+        let columns = SubdivisionOperator::exact(rows, segments.as_flattened().concat());
+        let places = (0..segments.len() as u32).flat_map(|group| [(group, true), (group, false)]).collect();
+        Self { columns, places, groups: segments.len(), miss: 0.0 }
+    }
+
     /// A box of the vectors that an affine map takes the attractor to, given by those that it takes the columns to.
     pub(super) fn box_of(&self, seen: &[Point]) -> [Point; 2] {
         if self.groups <= FEW_GROUPS { self.box_of_groups::<FEW_GROUPS>(seen) } else { self.box_of_groups::<MOST_GROUPS>(seen) }
@@ -98,12 +106,18 @@ impl Enclosure {
             }
             return [middle - reach, middle + reach];
         }
-        let (mut middles, mut reaches) = ([0.0; MOST_GROUPS], [0.0; MOST_GROUPS]);
+        if self.groups <= FEW_GROUPS { self.range_of_groups::<FEW_GROUPS>(seen) } else { self.range_of_groups::<MOST_GROUPS>(seen) }
+    }
+
+    /// The same, with as many groups as `N` at most.
+    #[inline]
+    fn range_of_groups<const N: usize>(&self, seen: impl Iterator<Item = f64>) -> [f64; 2] {
+        let (mut middles, mut reaches) = ([0.0; N], [0.0; N]);
         for (&(group, is_middle), value) in self.places.iter().zip(seen) {
             if is_middle {
                 middles[group as usize] = value;
             } else {
-                reaches[group as usize] += value.abs();
+                reaches[group as usize] += f64::abs(value);
             }
         }
         let ends = middles.iter().zip(&reaches).take(self.groups);

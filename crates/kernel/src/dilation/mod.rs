@@ -137,7 +137,8 @@ fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Bud
     if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
         return Ok(dilation);
     }
-    let by_rays = |cells: Cells| order.over_graph(cells, budget, |plan, graph| plan.run_over(graph, budget));
+    let graph = order.graph(budget)?;
+    let by_rays = |cells: Cells| order.over_graph(graph.as_ref(), cells, budget, |plan, graph| plan.run_over(graph, budget));
     if let Some(dilation) = by_rays(Cells::Many)? {
         return Ok(dilation);
     }
@@ -182,20 +183,32 @@ impl Order<'_> {
         unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
     }
 
-    /// What comes of the plan for a graph over a convex part of a plane that is made of few cells, or of many; none where it is none, or where rays do not serve it.
+    /// What it is the graph of over a convex part of a plane, and of how many cells; none where it is none.
+    fn graph(&self, budget: &Budget) -> Result<Option<(Graph, Cells)>, DilationError> {
+        let Some(graph) = self.simplify.then(|| self.attractor.graph()).flatten() else { return Ok(None) };
+        let plan = self.plan_of(self.attractor, COARSE, budget)?;
+        let are_few = plan.leaves(FEW_CELLS, budget)?.is_some() || (graph.has_smooth_curves && plan.split(budget)?.is_some());
+        Ok(Some((graph, if are_few { Cells::Few } else { Cells::Many })))
+    }
+
+    /// What comes of the plan for a graph, if it is made of as many cells; none where it is not, or where rays do not serve it.
     fn over_graph<T>(
         &self,
+        graph: Option<&(Graph, Cells)>,
         cells: Cells,
         budget: &Budget,
         work: impl FnOnce(&Plan<'_>, &Graph) -> Result<Option<T>, DilationError>,
     ) -> Result<Option<T>, DilationError> {
-        let Self { attractor, radius, tolerance, simplify } = *self;
-        let graph = if simplify { attractor.graph() } else { None };
-        let Some(graph) = graph else { return Ok(None) };
-        let balls = Balls { least: radius.mm(), most: radius.mm() };
-        let plan = Plan::new(attractor, balls, tolerance, simplify, COARSE, budget)?;
-        let are_few = plan.leaves(FEW_CELLS, budget)?.is_some() || (graph.has_smooth_curves() && plan.split(budget)?.is_some());
-        if are_few == (cells == Cells::Few) { work(&plan, &graph) } else { Ok(None) }
+        match graph {
+            Some((graph, own)) if *own == cells => work(&self.plan_of(self.attractor, COARSE, budget)?, graph),
+            _ => Ok(None),
+        }
+    }
+
+    /// The plan of a shape with one radius, the attractor or what stands for it.
+    fn plan_of<'b>(&self, attractor: &'b Attractor, coarseness: f64, budget: &Budget) -> Result<Plan<'b>, DilationError> {
+        let balls = Balls { least: self.radius.mm(), most: self.radius.mm() };
+        Plan::new(attractor, balls, self.tolerance, self.simplify, coarseness, budget)
     }
 
     /// What comes of the plan with sites of some coarseness.
@@ -209,12 +222,9 @@ impl Order<'_> {
         match Drawn::resolved(attractor, radius, tolerance, coarseness, budget)? {
             Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
             None => {
-                let plan = |attractor| {
-                    Plan::new(attractor, Balls { least: radius.mm(), most: radius.mm() }, tolerance, simplify, coarseness, budget)
-                };
-                let whole = plan(attractor)?;
+                let whole = self.plan_of(attractor, coarseness, budget)?;
                 match whole.split(budget)? {
-                    Some(split) => work(&plan(&split)?),
+                    Some(split) => work(&self.plan_of(&split, coarseness, budget)?),
                     None => work(&whole),
                 }
             }
@@ -262,7 +272,8 @@ pub fn predict(
     if let Some(prediction) = order.in_sheets(budget, |plan| plan.predict_in_sheets(budget))? {
         return Ok(prediction);
     }
-    let by_rays = |cells: Cells| order.over_graph(cells, budget, |plan, graph| plan.predict_over(graph, budget));
+    let graph = order.graph(budget)?;
+    let by_rays = |cells: Cells| order.over_graph(graph.as_ref(), cells, budget, |plan, graph| plan.predict_over(graph, budget));
     match by_rays(Cells::Many)? {
         Some(prediction) => Ok(prediction),
         None => order.planned(COARSE, budget, |plan| plan.predict(|| by_rays(Cells::Few), budget)),

@@ -1,7 +1,7 @@
 //! A few rays that stand for a rough graph.
 //!
 //! Let H be all that is not above a graph, and D_s(H) the places no farther from it than s. What is above the graph's dilation depends on H alone, and H is a union of rays that lead down from the graph's places. *Peaks* are some of
-//! these: for s' < s, D_s'(H) is in the union of the D_s of the rays below peaks. A column over a parallelogram whose corners are no farther than c from its middle, and which is nowhere higher than h, is within c of the ray below the place of height h over the middle: it is *hidden* if all within s' + c of that one is within s of rays below peaks.
+//! these: for s' < s, D_s'(H) is in the union of the D_s of the rays below peaks. A column over a polygon whose corners are no farther than c from its middle, and which is nowhere higher than h, is within c of the ray below the place of height h over the middle: it is *hidden* if all within s' + c of that one is within s of rays below peaks.
 //!
 //! Columns are taken from the widest to the narrowest. One that is not hidden has a highest place, which is a peak unless the rays below others have all within s - m of its own; its parts are looked at next. Where 2 c <= s - s' - m none need be: what is within s' + c of the ray over its middle is within s - m of that over its highest place.
 //! The same is done upside down: rays lead up from pits.
@@ -19,10 +19,10 @@ use rayon::prelude::*;
 const APART: f64 = 0.5;
 const NARROW: f64 = 0.27;
 const SLACK: f64 = 0.05;
-/// The same for the border: how wide and high columns are there, how far places between two of them are off, and how much nearer than s the sheets end.
-const EDGE: f64 = 0.01;
-const BETWEEN: f64 = 0.02;
-const BORDER: f64 = 0.06;
+/// The same for the border: how wide and high columns are there, how far places between two of them are off, and how much nearer than s the sheets end. The strip goes down from there: along steep graphs it would be too near before it is beyond s, did they end much nearer.
+const EDGE: f64 = 0.001;
+const BETWEEN: f64 = 0.002;
+const BORDER: f64 = 0.005;
 /// Places along the border at most.
 const MOST_ENDS: f64 = 200_000.0;
 /// In how many rounds the columns of a level are looked at, so that peaks of one hide columns of the next.
@@ -101,21 +101,25 @@ struct Border {
 fn at_border(graph: &Graph, within: f64, [least, outer]: [f64; 2], budget: &Budget) -> Result<Option<Border>, Stopped> {
     let edge = EDGE * within;
     let step = (8.0 * least * BETWEEN * within).sqrt();
-    let (mut ends, roots) = (Vec::new(), graph.columns(1.0));
+    let (mut places, roots) = (Vec::new(), graph.columns(1.0));
     for (k, a) in graph.corners.iter().enumerate() {
         let b = graph.corners[(k + 1) % graph.corners.len()];
         let steps = ((b[0] - a[0]).hypot(b[1] - a[1]) / step).ceil();
-        if ends.len() as f64 + steps > MOST_ENDS {
+        if places.len() as f64 + steps > MOST_ENDS {
             return Ok(None);
         }
-        for share in (0..steps as u64).map(|number| number as f64 / steps) {
-            budget.cancel.check()?;
-            let at = [0, 1].map(|axis| a[axis] + share * (b[axis] - a[axis]));
-            let Some(column) = graph.narrow_at(&roots, at, edge) else { return Ok(None) };
-            let [x, y] = column.middle();
-            ends.push([x, y, column.low, column.high]);
-        }
+        let shares = (0..steps as u64).map(|number| number as f64 / steps);
+        places.extend(shares.map(|share| [0, 1].map(|axis| a[axis] + share * (b[axis] - a[axis]))));
     }
+    let end = |&at: &[f64; 2]| {
+        budget.cancel.check()?;
+        Ok(graph.narrow_at(&roots, at, edge).map(|column| {
+            let [x, y] = column.middle();
+            [x, y, column.low, column.high]
+        }))
+    };
+    let ends: Vec<Option<[f64; 4]>> = places.par_iter().map(end).collect::<Result<_, Stopped>>()?;
+    let Some(ends) = ends.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
     // From a place that is so far from the part of the plane to what is closest there, from that to the next of these along the border, and to the middle of its column.
     let away = |distance: f64| distance.hypot(0.5 * step) + edge;
     let border = least - BORDER * within;
@@ -167,7 +171,13 @@ impl Search<'_> {
             for (number, column) in open.drain(..).enumerate() {
                 rounds[number % ROUNDS].push(column);
             }
-            for round in rounds {
+            // What comes of as many at once is no more than may wait.
+            let at_once = (self.most / self.graph.most_parts().max(1)).max(1);
+            let parts = rounds.into_iter().flat_map(|round| round.chunks(at_once).map(<[Open]>::to_vec).collect::<Vec<_>>());
+            for round in parts {
+                if open.len() > self.most {
+                    return Ok(false);
+                }
                 let look = |column: Open| budget.cancel.check().map(|()| self.look(column));
                 let seen: Vec<Seen> = round.into_par_iter().map(look).collect::<Result<_, Stopped>>()?;
                 for seen in seen {
@@ -231,8 +241,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attractor::cell::distance_squared;
-    use crate::attractor::graph::tests::{graphs, places};
+    use crate::attractor::graph::tests::{away, graphs, places};
     use crate::budget::{Limits, StopReason};
     use crate::dilation::plan::{Balls, Plan};
     use crate::split_mix::Random;
@@ -243,7 +252,7 @@ mod tests {
     const WITHIN: f64 = 0.2;
 
     /// The distance from rays that lead down.
-    fn away(x: &Point, peaks: &[Point]) -> f64 {
+    fn from_rays(x: &Point, peaks: &[Point]) -> f64 {
         let square = |peak: &Point| (x[0] - peak[0]).powi(2) + (x[1] - peak[1]).powi(2) + (x[2] - peak[2]).max(0.0).powi(2);
         peaks.iter().map(square).fold(f64::INFINITY, f64::min).sqrt()
     }
@@ -264,8 +273,8 @@ mod tests {
                 let place = &all[(random.share() * all.len() as f64) as usize];
                 let way = DVec3::new(random.share() - 0.5, random.share() - 0.5, random.share() - 0.5).normalize();
                 let x = (DVec3::from_array(*place) + (least - inward) * way).to_array();
-                farthest[0] = farthest[0].max(away(&x, &rays.peaks[0]));
-                farthest[1] = farthest[1].max(away(&[x[0], x[1], -x[2]], &rays.peaks[1]));
+                farthest[0] = farthest[0].max(from_rays(&x, &rays.peaks[0]));
+                farthest[1] = farthest[1].max(from_rays(&[x[0], x[1], -x[2]], &rays.peaks[1]));
             }
             assert!(farthest.iter().all(|&far| far <= least + 1e-6 && far > least - inward), "{number}: {farthest:?} {least}");
             for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
@@ -293,7 +302,7 @@ mod tests {
                 };
                 assert!(open(out(rays.border)) > 0.0 && rays.border > least - 0.1 * WITHIN, "{number} {k}");
                 let [x, y] = out(rays.rim);
-                assert!(rays.peaks.iter().all(|peaks| away(&[x, y, -1e3], peaks) <= *outer + 1e-9), "{number} {k}");
+                assert!(rays.peaks.iter().all(|peaks| from_rays(&[x, y, -1e3], peaks) <= *outer + 1e-9), "{number} {k}");
             }
         }
     }
@@ -327,14 +336,11 @@ mod tests {
             let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
             let again = alone.install(|| plan.run_over(&graph, &Budget::default())).unwrap().unwrap();
             assert!(again.solid.mesh().vertices == made.solid.mesh().vertices, "{number}");
-            let all = places(attractor, &graph, 60_000);
             let mesh = made.solid.mesh();
-            for triangle in mesh.triangles.iter().step_by(mesh.triangles.len() / 400) {
+            for triangle in mesh.triangles.iter().step_by(mesh.triangles.len() / 200) {
                 let middle = triangle.iter().map(|&corner| mesh.vertices[corner as usize] / 3.0).sum::<DVec3>();
-                let x = graph.axes.map(|axis| middle[axis]);
-                let nearest = all.iter().map(|place| distance_squared(&x, place)).fold(f64::INFINITY, f64::min).sqrt();
-                // Other places of the graph may be nearer than the vertices, by as much as these are apart.
-                assert!(nearest >= RADIUS - made.inner_mm - 1e-6 && nearest <= RADIUS + made.outer_mm + 0.15, "{number}: {nearest}");
+                let [least, most] = away(&graph, &graph.axes.map(|axis| middle[axis]), 0.02);
+                assert!(most >= RADIUS - made.inner_mm && least <= RADIUS + made.outer_mm, "{number}: {least} {most} {middle}");
             }
             let predicted = plan.predict_over(&graph, &Budget::default()).unwrap().unwrap();
             assert_eq!(predicted.triangles as usize, mesh.triangles.len());
