@@ -94,9 +94,9 @@ fn along(attractor: &Attractor, root: &Root, axes: [usize; 3], extent: f64) -> O
     if contraction > LEAST_CONTRACTION {
         return None;
     }
-    let all: Vec<Vec<DVec2>> = maps.iter().map(|map| polygon.iter().map(|&corner| map.place(corner)).collect()).collect();
     let as_place = |at: DVec2| (at + origin.truncate()).to_array();
-    let tiles: Vec<Vec<Place>> = all.iter().map(|tile| tile.iter().map(|&corner| as_place(corner)).collect()).collect();
+    let tile = |map: &Map| polygon.iter().map(|&corner| as_place(map.place(corner))).collect();
+    let tiles: Vec<Vec<Place>> = maps.iter().map(tile).collect();
     tiles.iter().all(|tile| is_wide(tile, extent)).then_some(())?;
     let list: Vec<_> = tiles.iter().flat_map(|tile| sides(tile, extent)).collect();
     let (pairs, open) = pairs(&list);
@@ -115,7 +115,7 @@ fn along(attractor: &Attractor, root: &Root, axes: [usize; 3], extent: f64) -> O
     };
     // Over each corner, and so over all of the polygon, between two planes.
     let slope = tiling.slope();
-    let [low, high] = tiling.beside(slope, extent);
+    let [low, high] = tiling.beside(slope);
     let up = inverse * (0.5 * (high - low) * DVec3::Z);
     let segment = |corner: &DVec2| {
         let middle = barycentric(corner.extend(slope.dot(*corner) + 0.5 * (low + high)));
@@ -306,16 +306,12 @@ impl Tiling<'_> {
     }
 
     /// Between which heights above a plane through the origin the graph is: above each tile, these are affine and d times what they are above the polygon.
-    fn beside(&self, slope: DVec2, extent: f64) -> [f64; 2] {
-        let affine: Vec<([f64; 2], f64)> = self
-            .maps
-            .iter()
-            .map(|map| {
-                let own =
-                    self.polygon.iter().map(|&corner| map.height(corner) + map.scaling * slope.dot(corner) - slope.dot(map.place(corner)));
-                (extremes(own), map.scaling)
-            })
-            .collect();
+    fn beside(&self, slope: DVec2) -> [f64; 2] {
+        let affine = |map: &Map| {
+            let above = |&corner: &DVec2| map.height(corner) + map.scaling * slope.dot(corner) - slope.dot(map.place(corner));
+            (extremes(self.polygon.iter().map(above)), map.scaling)
+        };
+        let affine: Vec<([f64; 2], f64)> = self.maps.iter().map(affine).collect();
         let largest = affine.iter().flat_map(|(own, _)| own).fold(0.0_f64, |most, own| most.max(own.abs()));
         let scaling = affine.iter().fold(0.0_f64, |most, own| most.max(own.1.abs()));
         let mut range = [-1.0, 1.0].map(|sign| sign * largest / (1.0 - scaling));
@@ -326,7 +322,7 @@ impl Tiling<'_> {
             };
             range = extremes(affine.iter().flat_map(image));
         }
-        let more = MISS * extent / (1.0 - scaling);
+        let more = MISS * self.scale / (1.0 - scaling);
         [range[0] - more, range[1] + more]
     }
 
