@@ -173,13 +173,12 @@ impl Search<'_> {
             }
             // What comes of as many at once is no more than may wait.
             let at_once = (self.most / self.graph.most_parts().max(1)).max(1);
-            let parts = rounds.into_iter().flat_map(|round| round.chunks(at_once).map(<[Open]>::to_vec).collect::<Vec<_>>());
-            for round in parts {
+            for part in rounds.iter().flat_map(|round| round.chunks(at_once)) {
                 if open.len() > self.most {
                     return Ok(false);
                 }
-                let look = |column: Open| budget.cancel.check().map(|()| self.look(column));
-                let seen: Vec<Seen> = round.into_par_iter().map(look).collect::<Result<_, Stopped>>()?;
+                let look = |column: &Open| budget.cancel.check().map(|()| self.look(column));
+                let seen: Vec<Seen> = part.par_iter().map(look).collect::<Result<_, Stopped>>()?;
                 for seen in seen {
                     budget.cancel.check()?;
                     match seen {
@@ -210,7 +209,7 @@ impl Search<'_> {
         self.apart * (NARROW / APART)
     }
 
-    fn look(&self, (column, known): Open) -> Seen {
+    fn look(&self, (column, known): &Open) -> Seen {
         let ([x, y], reach) = (column.middle(), column.reach());
         let is_hidden = |high: f64| self.cover.hides(&[x, y, high], self.held + reach);
         if is_hidden(column.high) {
@@ -218,7 +217,7 @@ impl Search<'_> {
         }
         let narrow = self.narrow();
         let splits = SPLITS[usize::from(reach <= NARROWEST[0] * narrow)];
-        let (peak, high) = known.map_or_else(|| self.graph.peak(&column, self.slack, splits), |peak| (peak, peak[2]));
+        let (peak, high) = known.map_or_else(|| self.graph.peak(column, self.slack, splits), |peak| (peak, peak[2]));
         if high < column.high && is_hidden(high) {
             return Seen::Hidden;
         }
@@ -228,7 +227,7 @@ impl Search<'_> {
         }
         let mut parts = Vec::new();
         if !is_highest || reach > narrow {
-            parts.extend(self.graph.parts(&column).map(|part| {
+            parts.extend(self.graph.parts(column).map(|part| {
                 let part = part.below(high);
                 let is_known = is_highest && part.has([peak[0], peak[1]]);
                 (part, is_known.then_some(peak))

@@ -262,8 +262,9 @@ ordered_by!(Glimpse, |this, other| this.high.total_cmp(&other.high));
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use super::tiles::tests::{lowered, takagi, triangle};
     use super::*;
-    use crate::model::{AffineMap, ControlNet, CurveScheme, Ifs, Model, Shape, TensorProduct};
+    use crate::model::{ControlNet, CurveScheme, Model, Shape, TensorProduct};
     use crate::split_mix::Random;
     use glam::DVec3;
 
@@ -285,18 +286,14 @@ pub(crate) mod tests {
         CurveScheme::Nurbs { degree: 3, knots: vec![0.0, 0.0, 0.0, 0.0, 0.4, 1.0, 1.0, 1.0, 1.0] }
     }
 
-    fn of_maps(maps: Vec<AffineMap>) -> Attractor {
-        Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) }.lower().unwrap().attractor
-    }
-
     /// Rough along one axis, with two roots beside each other; along both, sheared; with other axes in the plane, one of them turned; and of maps, over a square and a triangle.
     pub(crate) fn graphs() -> Vec<Attractor> {
         vec![
             product([rough(&[0.45, -0.5, 0.4, 0.5]), cubic()], [5, 5], |place| place),
             product([rough(&[0.5, -0.4]), rough(&[0.45, 0.5])], [3, 3], |place| DVec3::new(place.x + 0.3 * place.y, place.y, place.z)),
             product([CurveScheme::Bezier, rough(&[0.6, -0.5])], [4, 3], |place| DVec3::new(place.z, place.x, -place.y)),
-            of_maps(tiles::tests::takagi(6.0)),
-            of_maps(tiles::tests::triangle(0.45)),
+            lowered(takagi(6.0)),
+            lowered(triangle(0.45)),
         ]
     }
 

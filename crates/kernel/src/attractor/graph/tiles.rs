@@ -457,7 +457,7 @@ pub(super) mod tests {
     use crate::model::{AffineMap, Ifs, Model, Shape};
     use crate::split_mix::Random;
 
-    fn lowered(maps: Vec<AffineMap>) -> Attractor {
+    pub(in crate::attractor::graph) fn lowered(maps: Vec<AffineMap>) -> Attractor {
         Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) }.lower().unwrap().attractor
     }
 
