@@ -6,11 +6,15 @@ use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit
 use crate::dilation::convex::Convex;
 use crate::dilation::surface::NameMap;
 use crate::measure::triangle::closest_on_triangle;
+use crate::solid::TriMesh;
 use crate::solid::box_tree::{Box32, BoxTree};
 use crate::solid::half_edges::NONE;
+use std::collections::BTreeSet;
 
 /// How often the way between two triangles is sought from one to the other before corners and sides are.
 const STEPS: usize = 2;
+/// What rounding may take of a glance.
+const NEARLY: f64 = 1e-9;
 
 /// A place where a triangle may not be as it is.
 #[derive(Clone, Copy, Debug)]
@@ -31,15 +35,15 @@ pub(super) struct Question {
 }
 
 /// Triangles for searches.
-pub(super) struct Faces {
-    pub(super) all: Vec<Face>,
+pub(in crate::dilation) struct Faces {
+    pub(in crate::dilation) all: Vec<Face>,
     tree: BoxTree,
 }
 
 /// A triangle with its normal, and the ball around its middle that holds it.
-pub(super) struct Face {
-    pub(super) corners: [Point; 3],
-    pub(super) normal: Point,
+pub(in crate::dilation) struct Face {
+    pub(in crate::dilation) corners: [Point; 3],
+    pub(in crate::dilation) normal: Point,
     centre: Point,
     radius: f64,
 }
@@ -79,6 +83,17 @@ impl Face {
         Self { normal, radius: radius(&corners, &centre), corners, centre }
     }
 
+    /// Whether it may be nearer to a place than a distance, given squared, at a glance.
+    #[inline]
+    pub(in crate::dilation) fn may_be_nearer(&self, x: &Point, square: f64) -> bool {
+        let way = subtract(&self.centre, x);
+        let along = dot(&way, &self.normal);
+        let (aside, reach) = (dot(&way, &way) - along * along, self.radius * (1.0 + NEARLY));
+        // Beside the disc around it, which holds it, and off its plane.
+        let beyond = (aside.max(0.0).sqrt() - reach).max(0.0);
+        along * along * (1.0 - NEARLY) + beyond * beyond <= square
+    }
+
     /// Whether a plane shows that it is as far from a triangle: its own, or one across the way between both middles, or between closest places, which are found by going back and forth.
     pub(super) fn is_apart(&self, triangle: &[Point; 3], centre: &Point, least: f64) -> bool {
         if lowest(triangle, &self.normal) - dot(&self.normal, &self.corners[0]) >= least
@@ -108,6 +123,11 @@ impl Faces {
         Self { all, tree }
     }
 
+    /// The triangles of a mesh.
+    pub(in crate::dilation) fn of_mesh(mesh: &TriMesh) -> Self {
+        Self::new((0..mesh.triangles.len() as u32).map(|triangle| mesh.points_of(triangle)))
+    }
+
     /// Faces that are close to each other, a few at a time.
     pub(super) fn groups(&self) -> Vec<&[u32]> {
         (0..self.tree.leaves()).map(|leaf| self.tree.items(leaf)).filter(|items| !items.is_empty()).collect()
@@ -127,7 +147,7 @@ impl Faces {
     }
 
     /// Calls `visit` with the faces whose boxes are within a distance of that of some points, until it answers false.
-    pub(super) fn around(&self, points: &[Point], distance: f64, mut visit: impl FnMut(u32) -> bool) {
+    pub(in crate::dilation) fn around(&self, points: &[Point], distance: f64, mut visit: impl FnMut(u32) -> bool) {
         let within = figure::box_around(points, distance);
         self.tree.query(&within, 0, |leaf| {
             let mut own = self.tree.items(leaf).iter().zip(self.tree.boxes(leaf));
@@ -204,6 +224,22 @@ impl Foot {
         let [a, b] = self.shares.map(|share| dot(&way, &share));
         std::array::from_fn(|axis| self.first[axis] + a * self.ways[0][axis] + b * self.ways[1][axis])
     }
+}
+
+/// Triangles without those whose corners are at two places or one, which add nothing to the sides and corners of the others; none where one does.
+pub(in crate::dilation) fn without_lines<T: Copy + Ord>(mut triangles: Vec<[T; 3]>) -> Option<Vec<[T; 3]>> {
+    let is_line = |[a, b, c]: &[T; 3]| a == b || b == c || c == a;
+    let ends = |corners: &[T; 3]| {
+        (0..3).map(|k| [corners[k], corners[(k + 1) % 3]]).map(|[a, b]| if a < b { [a, b] } else { [b, a] }).collect::<Vec<_>>()
+    };
+    let lines: BTreeSet<[T; 2]> = triangles.iter().filter(|corners| is_line(corners)).flat_map(ends).collect();
+    if lines.is_empty() {
+        return Some(triangles);
+    }
+    triangles.retain(|corners| !is_line(corners));
+    let sides: BTreeSet<[T; 2]> =
+        triangles.iter().flat_map(ends).flat_map(|[a, b]| [[a, b], [a, a], [b, b]]).filter(|side| lines.contains(side)).collect();
+    (sides.len() == lines.len()).then_some(triangles)
 }
 
 /// The corners of triangles, each once, and these as numbers of them.

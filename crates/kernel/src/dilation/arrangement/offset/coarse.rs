@@ -19,6 +19,8 @@ const STRIP: f64 = 0.6;
 /// The least height of a triangle, as a share of its longest side, and while what is hidden goes.
 const LEAST_HEIGHT: f64 = 0.02;
 const LEAST_WHILE_HIDDEN: f64 = 1e-4;
+/// Sides that are shorter than this, as a share of the longest one around a vertex, go before others: noise and marching cubes leave such, which would end up between slivers.
+const SHORT: f64 = 0.2;
 /// Vertices that are looked at before a stop is noticed.
 const IN_A_ROW: u32 = 256;
 
@@ -29,8 +31,9 @@ pub(super) struct Coarse<'a> {
     /// How far out the sheets are, and the cosine of the angle by which the border turns at most at vertices that may go.
     radius: f64,
     turn: f64,
-    /// The least height of a triangle that may come to be, as a share of its longest side.
+    /// The least height of a triangle that may come to be, as a share of its longest side, unless one was as low before; and how long sides may be that go, as a share of the longest one around a vertex.
     height: f64,
+    short: f64,
     mesh: HalfEdges,
     mender: Mender,
     /// Triangles one of whose sheets looks the other way, as a surface has where it bends by more than the distance over less than may be off: they may become such ones, until they are gone.
@@ -42,8 +45,9 @@ pub(super) struct Coarse<'a> {
     gone: Vec<u32>,
     owners: Vec<usize>,
     fresh: Vec<(Fresh, bool)>,
-    /// The normals of the star's triangles.
+    /// The normals of the star's triangles, and their heights as shares of their longest sides.
     normals: Vec<Point>,
+    heights: Vec<f64>,
     lengths: Vec<(f64, usize)>,
 }
 
@@ -222,13 +226,14 @@ impl<'a> Coarse<'a> {
         let is_inverted = |&corners: &[u32; 3]| Triangle::new(skin, radius, 0.0, corners).is_some_and(|own| own.is_inverted);
         let mut inverted: Vec<bool> = skin.triangles.iter().map(is_inverted).collect();
         inverted.resize(first.len(), false);
-        let (gone, owners, fresh, normals, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (gone, owners, fresh, normals, heights, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self {
             skin,
             hidden,
             radius,
             turn,
             height: LEAST_HEIGHT,
+            short: 1.0,
             mesh,
             mender,
             inverted,
@@ -238,6 +243,7 @@ impl<'a> Coarse<'a> {
             owners,
             fresh,
             normals,
+            heights,
             lengths,
         }
     }
@@ -264,8 +270,9 @@ impl<'a> Coarse<'a> {
         if self.shows() {
             return Ok(false);
         }
-        self.height = LEAST_HEIGHT;
-        for share in PASSES {
+        let short = self.skin.seams.all.is_empty().then_some((1.0, LEAST_WHILE_HIDDEN, SHORT));
+        for (share, height, length) in short.into_iter().chain(PASSES.map(|share| (share, LEAST_HEIGHT, 1.0))) {
+            (self.height, self.short) = (height, length);
             for vertex in 0..self.skin.beyond() {
                 check(vertex, budget)?;
                 self.remove(vertex, share, most, false);
@@ -290,8 +297,12 @@ impl<'a> Coarse<'a> {
         if !may_turn(vertex) || !mate.is_none_or(may_turn) || !self.begin(vertex, to_seams) {
             return;
         }
+        let longest = self.lengths.iter().map(|length| length.0).fold(0.0, f64::max);
         for index in 0..self.lengths.len() {
-            let m = self.lengths[index].1;
+            let (length, m) = self.lengths[index];
+            if length > self.short * self.short * longest {
+                break;
+            }
             if !self.serves(m, share, most) || !self.mender.keeps_manifold(&self.mesh, m) {
                 continue;
             }
@@ -331,7 +342,7 @@ impl<'a> Coarse<'a> {
         if !self.mesh.star(vertex, MOST_AROUND, &mut self.mender.star) {
             return false;
         }
-        let Self { skin, hidden, mesh, mender, first, next, gone, normals, lengths, .. } = self;
+        let Self { skin, hidden, mesh, mender, first, next, gone, normals, heights, lengths, .. } = self;
         let ring = &mender.star.ring;
         gone.clear();
         gone.push(vertex);
@@ -348,6 +359,12 @@ impl<'a> Coarse<'a> {
         normals.extend((0..count).map(|k| {
             let (a, b) = (at(ring[k]), at(ring[(k + 1) % count]));
             cross(&subtract(a, at(vertex)), &subtract(b, at(vertex)))
+        }));
+        heights.clear();
+        heights.extend((0..count).map(|k| {
+            let (a, b) = (at(ring[k]), at(ring[(k + 1) % count]));
+            let longest = distance_squared(a, b).max(distance_squared(a, at(vertex))).max(distance_squared(b, at(vertex)));
+            dot(&normals[k], &normals[k]).sqrt() / longest
         }));
         lengths.clear();
         // What is on the border goes along it.
@@ -366,13 +383,13 @@ impl<'a> Coarse<'a> {
 
     /// Whether the star's vertex may move to ring m.
     fn serves(&mut self, m: usize, share: f64, most: &[f64]) -> bool {
-        let Self { skin, hidden, radius, height, mender, inverted, gone, owners, fresh, normals, .. } = self;
+        let Self { skin, hidden, radius, height, mender, inverted, gone, owners, fresh, normals, heights, .. } = self;
         let ring = &mender.star.ring;
         let count = ring.len();
         fresh.clear();
         for k in kept(Some(m), count) {
             let corners = [ring[m], ring[k], ring[(k + 1) % count]];
-            let Some(own) = Fresh::new(skin, *radius, *height, corners) else { return false };
+            let Some(own) = Fresh::new(skin, *radius, height.min(heights[k]), corners) else { return false };
             let is_turned = matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0);
             // What has a hidden corner will not be left as it is, nor will what is inverted.
             let has_hidden = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);

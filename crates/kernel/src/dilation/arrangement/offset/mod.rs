@@ -21,7 +21,7 @@ mod tests;
 mod ways;
 
 use super::between::Memory;
-use super::faces::{Faces, Question};
+use super::faces::{Faces, Question, without_lines};
 use super::figure::{self, Figure};
 use super::sum::is_embedded;
 use super::{BYTES_PER_TRIANGLE, Flat};
@@ -67,7 +67,10 @@ pub(super) fn surface(
     round: impl Fn(f64) -> f64 + Sync,
     budget: &Budget,
 ) -> Result<Option<Flat>, Stopped> {
-    let Some(triangles) = figure::triangles(figures) else { return Ok(None) };
+    let bits = |corners: &[Point; 3]| corners.map(|corner| corner.map(|x| (x + 0.0).to_bits()));
+    let triangles = figure::triangles(figures).and_then(|triangles| without_lines(triangles.iter().map(bits).collect()));
+    let Some(triangles) = triangles else { return Ok(None) };
+    let triangles: Vec<[Point; 3]> = triangles.into_iter().map(|corners| corners.map(|corner| corner.map(f64::from_bits))).collect();
     if BYTES_PER_TRIANGLE * triangles.len() as f64 > budget.limits.memory_bytes as f64 {
         return Ok(None);
     }

@@ -153,6 +153,27 @@ impl Mesh {
         mesh
     }
 
+    /// The same with vertices on some sides, close to one of their ends or at the same place, as marching cubes leave them.
+    fn with_short_sides(mut self, random: &mut Random) -> Self {
+        for _ in 0..self.faces.len() / 8 {
+            let own = random.next() as usize % self.faces.len();
+            let [a, b, c] = [0, 1, 2].map(|k| self.faces[own][k]);
+            let [from, to, beside] = [a, b, c].map(|end| self.vertices[end as usize]);
+            let is_other = |face: &Vec<u32>| (0..3).any(|k| face[k] == b && face[(k + 1) % 3] == a);
+            let Some(other) = self.faces.iter().position(is_other) else { continue };
+            let d = self.faces[other].iter().copied().find(|&corner| corner != a && corner != b).unwrap();
+            let beyond = self.vertices[d as usize];
+            if [to - from, beside - from, beside - to, beyond - from, beyond - to].iter().any(|side| side.length() < 0.2) {
+                continue;
+            }
+            let new = self.vertices.len() as u32;
+            self.vertices.push(from.lerp(to, [0.0, 1e-4, 3e-3, 0.03][random.next() as usize % 4]));
+            (self.faces[own], self.faces[other]) = (vec![new, b, c], vec![b, new, d]);
+            self.faces.extend([vec![a, new, c], vec![new, a, d]]);
+        }
+        self
+    }
+
     fn and(mut self, other: Self) -> Self {
         let first = self.vertices.len() as u32;
         self.vertices.extend(other.vertices);
@@ -221,7 +242,7 @@ fn shape(case: usize, random: &mut Random) -> (Mesh, (u64, u64, i64)) {
 fn assert_made(case: usize, mesh: &Mesh, [radius, tolerance]: [f64; 2], expected: (u64, u64, i64), places: u32, random: &mut Random) {
     let mesh = mesh.clone().turned(random);
     let attractor = mesh.lowered();
-    assert!(mesh.is_made(radius, tolerance) && is_flat(&attractor, radius, tolerance), "{case}");
+    assert!(mesh.is_made(radius, tolerance) && is_flat(&attractor, radius, tolerance), "{case} {radius} {tolerance}");
     let dilation = arranged(&attractor, radius, tolerance);
     assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
     assert_eq!(topology(&dilation), expected, "{case}");
@@ -240,6 +261,19 @@ fn sheets_keep_their_bounds_and_have_the_surface_s_topology() {
         let (mesh, expected) = shape(case, &mut random);
         let (radius, share) = ([1.0, 0.6, 1.4][case % 3], [0.1, 0.2][case % 2]);
         assert_made(case, &mesh, [radius, share * radius], expected, 300, &mut random);
+    }
+}
+
+/// Triangles that are short, or no more than sides of others, are in the way of none.
+#[test]
+fn sheets_follow_meshes_with_short_sides() {
+    let mut random = Random(173);
+    let shapes = [(Mesh::torus(80, 48, [15.0, 6.0]), (1, 1, 0)), (Mesh::ball(80, 40, 12.0, 0.05), (1, 1, 4))];
+    for (case, (mesh, expected)) in shapes.into_iter().enumerate() {
+        let mesh = mesh.with_short_sides(&mut random);
+        for (radius, share) in [(1.0, 0.1), (1.4, 0.2), (3.0, 0.1)] {
+            assert_made(case, &mesh, [radius, share * radius], expected, 100, &mut random);
+        }
     }
 }
 
