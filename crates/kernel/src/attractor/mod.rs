@@ -53,7 +53,7 @@ pub(crate) use patch::BezierPatch;
 pub use precision::LinearPrecision;
 pub use radii::OwnRadius;
 pub use refine::{RefineError, Streamed, count_cells, refine, refine_with_normals, stream};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
 pub use tangent::{NoTangentPlane, TangentPlanes};
 use trim::TrimmedSurface;
@@ -84,6 +84,45 @@ pub struct SolidSurface {
     /// closest point along its pseudo-normal tells inside from outside (Baerentzen and Aanaes, "Signed
     /// distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005).
     pub normals: Vec<[glam::DVec3; 7]>,
+}
+
+impl SolidSurface {
+    /// Computes the pseudo-normals from the corners that the roots hold.
+    #[must_use]
+    pub(crate) fn with_normals(mut self, roots: &[Root]) -> Self {
+        let corners: Vec<[DVec3; 3]> = roots[self.first_root..self.first_root + self.triangles.len()]
+            .iter()
+            .map(|root| std::array::from_fn(|k| DVec3::new(root.points[k][0], root.points[k][1], root.points[k][2])))
+            .collect();
+        let count = self.triangles.iter().flatten().max().map_or(0, |&index| index as usize + 1);
+        let mut at_corner = vec![DVec3::ZERO; count];
+        let mut at_side: BTreeMap<(u32, u32), DVec3> = BTreeMap::new();
+        let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
+        for (triangle, points) in self.triangles.iter().zip(&corners) {
+            let face = normal(points);
+            for k in 0..3 {
+                let (here, next, last) = (points[k], points[(k + 1) % 3], points[(k + 2) % 3]);
+                let angle = (next - here).angle_between(last - here);
+                at_corner[triangle[k] as usize] += if angle.is_finite() { angle * face } else { DVec3::ZERO };
+                let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+                *at_side.entry((a.min(b), a.max(b))).or_insert(DVec3::ZERO) += face;
+            }
+        }
+        self.normals = self
+            .triangles
+            .iter()
+            .zip(&corners)
+            .map(|(triangle, points)| {
+                let side = |k: usize| {
+                    let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+                    at_side[&(a.min(b), a.max(b))]
+                };
+                let at = |k: usize| at_corner[triangle[k] as usize];
+                [normal(points), side(0), side(1), side(2), at(0), at(1), at(2)]
+            })
+            .collect();
+        self
+    }
 }
 
 /// The limit set of an automaton and control points. Owns bounds, never points.
@@ -375,11 +414,43 @@ impl Attractor {
         Ok((TriMesh { vertices: drawn.vertices, triangles: drawn.triangles }, deviation_mm))
     }
 
-    /// Triangles as an attractor; none where they are no such.
-    pub(crate) fn of_triangles(mesh: &TriMesh) -> Option<Self> {
+    /// Triangles as an attractor, or the solid that they bound; none where they are no such.
+    pub(crate) fn of_triangles(mesh: &TriMesh, is_solid: bool) -> Option<Self> {
         let automaton = Automaton::new(vec![State::simplex(3)]).ok()?;
-        let roots = roots_of(&mesh.vertices, &mesh.triangles, StateId::new(0)).collect();
-        Self::new(automaton, roots, Vec::new(), Vec::new()).ok()
+        let mut roots: Vec<Root> = roots_of(&mesh.vertices, &mesh.triangles, StateId::new(0)).collect();
+        let mut solids = Vec::new();
+        if is_solid {
+            roots.iter_mut().for_each(|root| root.solid = Some(0));
+            let surface = SolidSurface { first_root: 0, triangles: mesh.triangles.clone(), normals: Vec::new() };
+            solids.push(surface.with_normals(&roots));
+        }
+        Self::new(automaton, roots, solids, Vec::new()).ok()
+    }
+
+    /// The triangles that it is, with common corners, and whether they bound a solid; none where it is something else, or has radii of its own.
+    pub(crate) fn triangles(&self) -> Option<(TriMesh, bool)> {
+        let is_triangle = |root: &Root| {
+            let state = self.automaton.state(root.state);
+            state.leaf == LeafPrimitive::Simplex && state.transitions.is_empty() && root.points.len() == 3 && !root.rational
+        };
+        let is_solid = self.solids.len() == 1;
+        let is_whole = |root: &Root| root.solid.is_some() == is_solid && is_triangle(root);
+        if self.solids.len() > 1 || self.has_own_radii() || !self.trimmed.is_empty() || !self.roots.iter().all(is_whole) {
+            return None;
+        }
+        let (mut mesh, mut numbers) = (TriMesh::default(), HashMap::new());
+        for root in &self.roots {
+            let corners: [u32; 3] = std::array::from_fn(|k| {
+                let [x, y, z, _] = root.points[k];
+                // 0 and -0 are one place.
+                *numbers.entry([x, y, z].map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
+                    mesh.vertices.push(DVec3::new(x, y, z));
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            mesh.triangles.push(corners);
+        }
+        Some((mesh, is_solid))
     }
 
     /// The trimmed surface that a root belongs to.

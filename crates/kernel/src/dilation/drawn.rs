@@ -1,11 +1,15 @@
 //! Shapes that stand for others: triangles for trimmed and for smooth surfaces, and roots with one radius each.
 
 use super::DilationError;
-use super::plan::{Balls, Meant, Plan};
+use super::arrangement::without_lines;
+use super::decimation::{decimated, is_finer};
+use super::plan::{Balls, JUNG, Meant, Plan};
 use super::unfold::unfolded;
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Limits};
+use crate::groups::Groups;
 use crate::measure::bounds::{bounding_box, dilated_box};
+use crate::solid::TriMesh;
 use crate::tolerance::{Radius, Tolerance};
 use std::borrow::Cow;
 
@@ -20,6 +24,15 @@ const SMOOTH_SHARE: f64 = 0.2;
 
 /// Share of it by which they may move where they turn back.
 const UNFOLDED_SHARE: f64 = 0.2;
+
+/// Share of the tolerance that fewer triangles may use which stand for a mesh of at least so many.
+const DECIMATED_SHARE: f64 = 0.2;
+const MANY_TRIANGLES: usize = 20_000;
+/// Bytes that it takes for each of these at most to find them.
+const BYTES_PER_TRIANGLE: u64 = 1_000;
+
+/// How far from its surface a solid may be another one then, as a share of how far dilations within the tolerance reach at least.
+const NEAR_SURFACE: f64 = 0.9;
 
 /// Cells of a smooth surface at most: in any case, and for each square of the radius times the tolerance in half of the box around. With no radius of curvature below that of the ball a cell that is off by a fifth of the tolerance has about one such square; rough surfaces have more.
 const FEW_CELLS: f64 = 10_000.0;
@@ -97,16 +110,59 @@ impl Drawn {
         let Some((mesh, deviation_mm)) = unless_stopped(drawn.map(Some))? else { return Ok(None) };
         let (mesh, moved) = unfolded(mesh, UNFOLDED_SHARE * aimed);
         let deviation_mm = deviation_mm + moved;
-        let Some(attractor) = Attractor::of_triangles(&mesh) else { return Ok(None) };
+        let Some(attractor) = Attractor::of_triangles(&mesh, false) else { return Ok(None) };
         let Ok(rest) = Tolerance::new(aimed - deviation_mm) else { return Ok(None) };
         let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius) };
         Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest }))
+    }
+
+    /// Fewer triangles for a mesh that is finer than needed, within their share of the tolerance, times `coarseness`; `None` where it is no such.
+    pub(super) fn decimated(
+        Finer { mesh, is_solid }: &Finer,
+        attractor: &Attractor,
+        radius: Radius,
+        tolerance: Tolerance,
+        coarseness: f64,
+        budget: &Budget,
+    ) -> Result<Option<Self>, DilationError> {
+        let radius = radius.mm();
+        let aimed = tolerance.mm().min(0.5 * radius);
+        let share = coarseness * DECIMATED_SHARE * aimed;
+        // Whatever is farther from the surface than this is in both solids, or in none.
+        let longest = if *is_solid { NEAR_SURFACE * (radius - aimed) / JUNG } else { f64::INFINITY };
+        let Some(fewer) = decimated(mesh, share, longest, budget)? else { return Ok(None) };
+        let Some(drawn) = Attractor::of_triangles(&fewer, *is_solid) else { return Ok(None) };
+        let Ok(rest) = Tolerance::new(aimed - share) else { return Ok(None) };
+        let bounds = bounding_box(attractor, budget)?.grown(radius);
+        let meant = Meant { off: share, deviation_mm: share, bounds };
+        Ok(Some(Self { attractor: drawn, balls: Balls { least: radius, most: radius }, meant, rest }))
     }
 
     /// The plan of its dilation, as that of the other one.
     pub(super) fn plan(&self, simplify: bool, coarseness: f64, budget: &Budget) -> Result<Plan<'_>, DilationError> {
         let plan = Plan::new(&self.attractor, self.balls, self.rest, simplify, coarseness, budget)?;
         Ok(plan.standing_for(self.meant))
+    }
+}
+
+/// A mesh in one piece of many triangles that are finer than needed, and whether it bounds a solid.
+pub(super) struct Finer {
+    mesh: TriMesh,
+    is_solid: bool,
+}
+
+impl Finer {
+    /// None where it is something else: parts that are alike are made once, as they are.
+    pub(super) fn of(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Option<Self> {
+        let count = attractor.roots().len();
+        if count < MANY_TRIANGLES || count as u64 > budget.limits.memory_bytes / BYTES_PER_TRIANGLE {
+            return None;
+        }
+        let (mut mesh, is_solid) = attractor.triangles()?;
+        mesh.triangles = without_lines(mesh.triangles)?;
+        let share = DECIMATED_SHARE * tolerance.mm().min(0.5 * radius.mm());
+        let is_whole = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles).all().iter().all(|&group| group == 0);
+        (is_whole && is_finer(&mesh, share)).then_some(Self { mesh, is_solid })
     }
 }
 

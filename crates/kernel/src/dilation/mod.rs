@@ -17,6 +17,7 @@
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
 //! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`).
+//! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them.
 //! For graphs over a convex part of a plane that have very many cells, as rough ones do, rays stand that lead down and up from a few of their places (`peaks`): between two sheets is all that is near to these.
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
 //!
@@ -31,6 +32,7 @@ mod block;
 mod certificate;
 mod convex;
 mod critical;
+mod decimation;
 mod drawn;
 mod dust;
 mod error;
@@ -64,7 +66,7 @@ use crate::budget::{Budget, Limits};
 use crate::measure::bounds::AxisBox;
 use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
-use drawn::{Drawn, unless_stopped};
+use drawn::{Drawn, Finer, unless_stopped};
 pub use error::DilationError;
 use plan::{Balls, Plan};
 pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
@@ -133,7 +135,7 @@ const FEW_CELLS: usize = 20_000;
 const MORE_CELLS: u64 = 10;
 
 fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
-    let order = Order { attractor, radius, tolerance, simplify };
+    let order = Order::new(attractor, radius, tolerance, simplify, budget);
     if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
         return Ok(dilation);
     }
@@ -169,17 +171,29 @@ struct Order<'a> {
     radius: Radius,
     tolerance: Tolerance,
     simplify: bool,
+    finer: Option<Finer>,
 }
 
-impl Order<'_> {
-    /// What comes of the plan for a smooth surface; none where it is none, or where sheets do not serve it.
+impl<'a> Order<'a> {
+    fn new(attractor: &'a Attractor, radius: Radius, tolerance: Tolerance, simplify: bool, budget: &Budget) -> Self {
+        let finer = if simplify { Finer::of(attractor, radius, tolerance, budget) } else { None };
+        Self { attractor, radius, tolerance, simplify, finer }
+    }
+
+    /// What comes of the plan for a smooth surface, or a mesh that is finer than needed; none where it is none, or where sheets do not serve it.
     fn in_sheets<T>(
         &self,
         budget: &Budget,
         work: impl FnOnce(&Plan<'_>) -> Result<Option<T>, DilationError>,
     ) -> Result<Option<T>, DilationError> {
         let smooth = if self.simplify { Drawn::smooth(self.attractor, self.radius, self.tolerance, budget)? } else { None };
-        let Some(smooth) = smooth else { return Ok(None) };
+        let Some(smooth) = smooth else {
+            // Where these serve all of a mesh that is finer than needed, fewer triangles are not asked for.
+            return match self.finer {
+                Some(_) => unless_stopped(self.plan_of(self.attractor, COARSE, budget).and_then(|plan| work(&plan))),
+                None => Ok(None),
+            };
+        };
         unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
     }
 
@@ -218,8 +232,13 @@ impl Order<'_> {
         budget: &Budget,
         work: impl FnOnce(&Plan<'_>) -> Result<T, DilationError>,
     ) -> Result<T, DilationError> {
-        let Self { attractor, radius, tolerance, simplify } = *self;
-        match Drawn::resolved(attractor, radius, tolerance, coarseness, budget)? {
+        let Self { attractor, radius, tolerance, simplify, .. } = *self;
+        let resolved = Drawn::resolved(attractor, radius, tolerance, coarseness, budget)?;
+        let drawn = match (resolved, &self.finer) {
+            (None, Some(finer)) => Drawn::decimated(finer, attractor, radius, tolerance, coarseness, budget)?,
+            (resolved, _) => resolved,
+        };
+        match drawn {
             Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
             None => {
                 let whole = self.plan_of(attractor, coarseness, budget)?;
@@ -268,7 +287,7 @@ pub fn predict(
     simplify: bool,
     budget: &Budget,
 ) -> Result<Prediction, DilationError> {
-    let order = Order { attractor, radius, tolerance, simplify };
+    let order = Order::new(attractor, radius, tolerance, simplify, budget);
     if let Some(prediction) = order.in_sheets(budget, |plan| plan.predict_in_sheets(budget))? {
         return Ok(prediction);
     }

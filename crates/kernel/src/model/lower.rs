@@ -208,7 +208,7 @@ impl Draft {
         }
         // Normals of a transformed surface are recomputed from its corners.
         for surface in &mut self.solids[first_solid..] {
-            *surface = super::mesh::with_normals(std::mem::take(surface), &self.roots);
+            *surface = std::mem::take(surface).with_normals(&self.roots);
         }
     }
 }

@@ -7,7 +7,6 @@ use crate::automaton::{State, StateId};
 use crate::measure::mass::enclosed_by;
 use crate::solid::TriMesh;
 use glam::DVec3;
-use std::collections::BTreeMap;
 
 /// Whether a mesh stands for its surface or for the solid it bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -166,7 +165,7 @@ impl PolygonMesh {
         }));
         if solid {
             let surface = SolidSurface { first_root, triangles: elements.triangles, normals: Vec::new() };
-            let surface = with_normals(surface, &draft.roots);
+            let surface = surface.with_normals(&draft.roots);
             draft.solids.push(surface);
         }
     }
@@ -224,40 +223,4 @@ fn has_no_border(triangles: &[[u32; 3]]) -> bool {
 /// A new state of points, segments or triangles.
 pub(super) fn simplex(draft: &mut Draft, corners: usize) -> StateId {
     draft.state(State::simplex(corners))
-}
-
-/// Computes the pseudo-normals from the corners that the roots hold.
-pub(super) fn with_normals(mut surface: SolidSurface, roots: &[Root]) -> SolidSurface {
-    let corners: Vec<[DVec3; 3]> = roots[surface.first_root..surface.first_root + surface.triangles.len()]
-        .iter()
-        .map(|root| std::array::from_fn(|k| DVec3::new(root.points[k][0], root.points[k][1], root.points[k][2])))
-        .collect();
-    let count = surface.triangles.iter().flatten().max().map_or(0, |&index| index as usize + 1);
-    let mut at_corner = vec![DVec3::ZERO; count];
-    let mut at_side: BTreeMap<(u32, u32), DVec3> = BTreeMap::new();
-    let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
-    for (triangle, points) in surface.triangles.iter().zip(&corners) {
-        let face = normal(points);
-        for k in 0..3 {
-            let (here, next, last) = (points[k], points[(k + 1) % 3], points[(k + 2) % 3]);
-            let angle = (next - here).angle_between(last - here);
-            at_corner[triangle[k] as usize] += if angle.is_finite() { angle * face } else { DVec3::ZERO };
-            let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-            *at_side.entry((a.min(b), a.max(b))).or_insert(DVec3::ZERO) += face;
-        }
-    }
-    surface.normals = surface
-        .triangles
-        .iter()
-        .zip(&corners)
-        .map(|(triangle, points)| {
-            let side = |k: usize| {
-                let (a, b) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-                at_side[&(a.min(b), a.max(b))]
-            };
-            let at = |k: usize| at_corner[triangle[k] as usize];
-            [normal(points), side(0), side(1), side(2), at(0), at(1), at(2)]
-        })
-        .collect();
-    surface
 }

@@ -54,6 +54,7 @@ use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 pub(super) use copies::Copies;
 use engine::{Engine, Forms, Run, State, TRIALS};
+pub(super) use faces::{Face, Faces, without_lines};
 use figure::{Figure, Outline};
 use form::Kind;
 pub(super) use index::Index;
@@ -222,10 +223,11 @@ impl Arrangement {
         candidates: &Candidates,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
-        let Some((sites, _)) = Sites::of(rule, candidates, most_of(MOST_POLYTOPES, budget), budget)? else { return Ok(None) };
+        let Some((mut sites, _)) = Sites::of(rule, candidates, most_of(MOST_POLYTOPES, budget), budget)? else { return Ok(None) };
+        sites.is_exact = setting.off + sites.off() == 0.0;
         let copies = Copies::default();
         let Some(flat) = offset::surface(&sites.list, setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
-        let mut arrangement = Self::empty(sites, setting.clone(), Vec::new(), Arc::new(copies));
+        let mut arrangement = Self::empty(sites, setting.clone(), rule.attractor().surfaces(), Arc::new(copies));
         arrangement.take(flat);
         Ok(Some(arrangement))
     }

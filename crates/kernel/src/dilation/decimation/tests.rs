@@ -1,0 +1,228 @@
+use super::cover::uncovered;
+use super::{WORTH, decimated, is_finer};
+use crate::attractor::Attractor;
+use crate::attractor::cell::Point;
+use crate::budget::{Budget, StopReason};
+use crate::dilation::arrangement::{Faces, without_lines};
+use crate::dilation::dilate;
+use crate::measure::triangle::closest_on_triangle;
+use crate::solid::{Inside, TriMesh};
+use crate::split_mix::Random;
+use crate::tolerance::{Radius, Tolerance};
+use glam::DVec3;
+use std::f64::consts::TAU;
+
+/// A grid of squares halved over the unit square, which is closed to rings where asked.
+fn grid(along: u32, across: u32, is_ring: bool, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    let [columns, rows] = [along, across].map(|count| if is_ring { count } else { count + 1 });
+    let number = |i: u32, j: u32| (i % columns) * rows + j % rows;
+    let places = (0..columns).flat_map(|i| (0..rows).map(move |j| [i, j]));
+    let vertices = places.map(|[i, j]| at(f64::from(i) / f64::from(along), f64::from(j) / f64::from(across))).collect();
+    let squares =
+        (0..along).flat_map(|i| (0..across).map(move |j| [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]));
+    TriMesh { vertices, triangles: squares.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
+}
+
+/// A bumpy ring, with some noise.
+fn ring(along: u32, across: u32, noise: f64) -> TriMesh {
+    let mut random = Random(181);
+    let mut mesh = grid(along, across, true, |u, v| {
+        let (u, v) = (TAU * u, TAU * v);
+        let (ring, height) = (20.0 + (8.0 + (3.0 * u).sin()) * v.cos(), (8.0 + (2.0 * u).cos()) * v.sin());
+        DVec3::new(ring * u.cos(), ring * u.sin(), height)
+    });
+    mesh.vertices.iter_mut().for_each(|x| *x *= 1.0 + noise * (random.share() - 0.5));
+    mesh
+}
+
+fn saddle(noise: f64) -> TriMesh {
+    let mut random = Random(191);
+    let mut mesh = grid(120, 120, false, |u, v| DVec3::new(40.0 * u, 40.0 * v, 12.0 * (u - 0.5) * (v - 0.5)));
+    mesh.vertices.iter_mut().for_each(|x| x.z += noise * (random.share() - 0.5));
+    mesh
+}
+
+fn distance(mesh: &TriMesh, x: &Point) -> f64 {
+    let square = |triangle: u32| {
+        let [a, b, c] = mesh.points_of(triangle);
+        DVec3::from_array(closest_on_triangle(x, &a, &b, &c)).distance_squared(DVec3::from_array(*x))
+    };
+    (0..mesh.triangles.len() as u32).map(square).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// A place of a mesh.
+fn place(mesh: &TriMesh, random: &mut Random) -> Point {
+    let [a, b, c] = mesh.points_of(random.next() as u32 % mesh.triangles.len() as u32).map(DVec3::from_array);
+    let (s, t) = (random.share().sqrt(), random.share());
+    a.lerp(b.lerp(c, t), s).to_array()
+}
+
+/// Nearly all of what may be off is used, and no more, at places of both meshes whose distances are looked for one by one.
+#[test]
+fn fewer_triangles_are_within_the_bound() {
+    let mut random = Random(193);
+    let budget = Budget::default();
+    for (mesh, most) in [(ring(240, 120, 0.0), 0.1), (ring(200, 100, 5e-4), 0.2), (saddle(0.0), 0.05), (saddle(0.01), 0.1)] {
+        let fewer = decimated(&mesh, most, f64::INFINITY, &budget).unwrap().unwrap();
+        assert!(is_finer(&mesh, most));
+        assert!(WORTH * fewer.triangles.len() <= mesh.triangles.len());
+        let mut farthest = 0.0_f64;
+        for _ in 0..1_500 {
+            farthest = farthest.max(distance(&fewer, &place(&mesh, &mut random))).max(distance(&mesh, &place(&fewer, &mut random)));
+        }
+        assert!(farthest <= most && farthest > 0.4 * most, "{farthest} of {most}");
+    }
+}
+
+/// Closed meshes stay closed and embedded, and have the same windings but close to them.
+#[test]
+fn solids_stay_what_they_are() {
+    let (mut random, budget) = (Random(197), Budget::default());
+    for (mesh, most, longest) in [(ring(240, 120, 0.0), 0.1, 4.0), (ring(200, 100, 5e-4), 0.2, 3.5)] {
+        let fewer = decimated(&mesh, most, longest, &budget).unwrap().unwrap();
+        let sides = fewer.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        assert!(sides.clone().all(|[a, b]| fewer.vertices[a as usize].distance(fewer.vertices[b as usize]) <= longest * (1.0 + 1e-12)));
+        let all: std::collections::HashSet<[u32; 2]> = sides.collect();
+        assert!(all.len() == 3 * fewer.triangles.len() && all.iter().all(|[a, b]| all.contains(&[*b, *a])));
+        let solids = [Inside::new(&mesh), Inside::new(&fewer)];
+        for _ in 0..2_000 {
+            let x = 60.0 * (DVec3::from_array(std::array::from_fn(|_| random.share())) - 0.5);
+            let [own, other] = [solids[0].winding(x), solids[1].winding(x)];
+            assert!(own == other || solids[0].distance(x) < 0.62 * longest, "{x}");
+        }
+    }
+    // With sides as short as told, and among long thin triangles, hardly anything goes.
+    assert!(decimated(&ring(60, 900, 0.0), 0.4, 2.0, &budget).unwrap().is_none());
+    assert!(decimated(&ring(240, 120, 0.0), 0.1, 0.6, &budget).unwrap().is_none());
+}
+
+/// Three triangles at a side, two fans at a corner, triangles of no area and border corners are left, or stay within the bound.
+#[test]
+fn odd_meshes_are_no_harm() {
+    let (mut random, budget) = (Random(199), Budget::default());
+    let mut mesh = saddle(0.0);
+    let first = mesh.vertices.len() as u32;
+    mesh.vertices.extend([DVec3::new(10.0, 10.0, 5.0), DVec3::new(20.0, 5.0, 30.0), DVec3::new(22.0, 5.0, 30.0), mesh.vertices[500]]);
+    mesh.triangles.extend([[300, 301, first], [7_000, first + 1, first + 2], [500, 501, first + 3]]);
+    let fewer = decimated(&mesh, 0.05, f64::INFINITY, &budget).unwrap().unwrap();
+    let all = (0..800).map(|_| distance(&fewer, &place(&mesh, &mut random)).max(distance(&mesh, &place(&fewer, &mut random))));
+    assert!(all.fold(0.0, f64::max) <= 0.05);
+    let corners = [0, 120, 120 * 121, 121 * 121 - 1].map(|corner: usize| mesh.vertices[corner].to_array());
+    assert!(corners.iter().all(|corner| distance(&fewer, corner) <= 0.05));
+}
+
+/// Fins on sides, faces that are there twice, or back to back: their neighbours are in any order.
+#[test]
+fn sides_of_many_triangles_stay() {
+    let (mut random, budget) = (Random(227), Budget::default());
+    for round in 0..24 {
+        let mut mesh = saddle(0.0);
+        for _ in 0..40 {
+            let [a, b, c] = mesh.triangles[random.next() as usize % mesh.triangles.len()];
+            let fin = mesh.vertices.len() as u32;
+            mesh.vertices.push(mesh.vertices[a as usize] + DVec3::new(random.share(), random.share(), 1.0));
+            match round % 4 {
+                0 => mesh.triangles.push([a, b, fin]),
+                1 => mesh.triangles.extend([[a, b, fin], [b, a, fin]]),
+                2 => mesh.triangles.push([a, b, c]),
+                _ => mesh.triangles.push([b, a, c]),
+            }
+        }
+        for k in (1..mesh.triangles.len()).rev().filter(|_| round % 8 > 3) {
+            mesh.triangles.swap(k, random.next() as usize % (k + 1));
+        }
+        let Some(fewer) = decimated(&mesh, 0.1, f64::INFINITY, &budget).unwrap() else { continue };
+        let all = (0..100).map(|_| distance(&fewer, &place(&mesh, &mut random)).max(distance(&mesh, &place(&fewer, &mut random))));
+        assert!(all.fold(0.0, f64::max) <= 0.1, "{round}");
+    }
+}
+
+/// Lines that are no sides of other triangles are no harm.
+#[test]
+fn lines_are_left_out_only_where_they_are_sides() {
+    let kept = [[0, 1, 2], [1, 2, 3]];
+    let with = |more: &[[u32; 3]]| without_lines([&kept, more].concat()).map(|all| all.len());
+    assert_eq!([with(&[]), with(&[[0, 0, 1], [2, 1, 2], [3, 3, 3]])], [Some(2); 2]);
+    assert_eq!([with(&[[0, 3, 3]]), with(&[[4, 4, 4]]), with(&[[1, 2, 1], [4, 0, 4]])], [None; 3]);
+    // A chord across a ring, and a place beside it.
+    for chord in [[0, 0, 15_000], [28_800, 28_800, 28_800]] {
+        let mut mesh = ring(240, 120, 0.0);
+        mesh.vertices.push(DVec3::new(100.0, 0.0, 0.0));
+        mesh.triangles.push(chord);
+        let attractor = Attractor::of_triangles(&mesh, false).unwrap();
+        let made = dilate(&attractor, Radius::new(3.0).unwrap(), Tolerance::new(0.6).unwrap(), &Budget::default()).unwrap();
+        let at = chord.map(|corner| mesh.vertices[corner as usize]);
+        let inside = Inside::new(made.solid.mesh());
+        assert!((0..=20).all(|k| inside.winding(at[0].lerp(at[2], f64::from(k) / 20.0)) == 1), "{chord:?}");
+    }
+}
+
+#[test]
+fn meshes_that_are_coarse_or_rough_are_left() {
+    let budget = Budget::default();
+    for (mesh, most) in [(ring(60, 30, 0.0), 0.05), (ring(200, 100, 0.02), 0.1), (saddle(0.5), 0.05)] {
+        assert!(!is_finer(&mesh, most) && decimated(&mesh, most, f64::INFINITY, &budget).unwrap().is_none());
+    }
+}
+
+/// A triangle over a grid of small ones is within what is told of them if it is, as places of it tell.
+#[test]
+fn what_is_uncovered_is_found() {
+    let (mut random, budget, mut counts) = (Random(211), Budget::default(), [0; 2]);
+    for round in 0..300 {
+        let height = [0.3, 0.03][round % 2];
+        let ground = grid(12, 12, false, |u, v| DVec3::new(6.0 * u, 6.0 * v, height * (5.0 * u).sin() * (4.0 * v).cos()));
+        let corner =
+            |random: &mut Random| DVec3::new(1.0 + 4.0 * random.share(), 1.0 + 4.0 * random.share(), height * (random.share() - 0.5));
+        let own = TriMesh { vertices: (0..3).map(|_| corner(&mut random)).collect(), triangles: vec![[0, 1, 2]] };
+        let farthest = (0..400).map(|_| distance(&ground, &place(&own, &mut random))).fold(0.0, f64::max);
+        let most = farthest * (0.8 + 0.4 * random.share());
+        let is_covered = uncovered(&own, &Faces::of_mesh(&ground), most, &budget).unwrap().is_empty();
+        assert!(!is_covered || farthest <= most, "{round}");
+        // Places miss the farthest one by a little.
+        assert!(is_covered || farthest > 0.9 * most, "{round}: {farthest} of {most}");
+        counts[usize::from(is_covered)] += 1;
+    }
+    assert!(counts.iter().all(|&count| count > 80), "{counts:?}");
+}
+
+/// Dilations of fine meshes and of the solids that they bound keep their bounds to these, are made of few triangles, and do not depend on threads.
+#[test]
+fn dilations_of_fine_meshes_keep_their_bounds() {
+    let mut random = Random(223);
+    let mesh = ring(260, 130, 1e-4);
+    let (radius, tolerance) = (Radius::new(3.0).unwrap(), Tolerance::new(0.6).unwrap());
+    for is_solid in [false, true] {
+        let attractor = Attractor::of_triangles(&mesh, is_solid).unwrap();
+        let made = dilate(&attractor, radius, tolerance, &Budget::default()).unwrap();
+        assert!(
+            made.topology_exact && made.leaf_cells < mesh.triangles.len() as u64,
+            "{} {:?} {}",
+            made.leaf_cells,
+            made.pitch_mm,
+            made.topology_exact
+        );
+        let topology = made.solid.topology();
+        assert_eq!((topology.shells, topology.genus), if is_solid { (1, 1) } else { (2, 2) });
+        assert!(made.inner_mm <= 0.6 && made.outer_mm <= 0.6);
+        let (around, within) = (Inside::new(made.solid.mesh()), Inside::new(&mesh));
+        for _ in 0..800 {
+            let x = DVec3::from_array(place(&mesh, &mut random)) + 5.0 * (DVec3::from_array(std::array::from_fn(|_| random.share())) - 0.5);
+            let own = distance(&mesh, &x.to_array());
+            let is_filled = is_solid && within.winding(x) > 0;
+            let is_in = around.winding(x) > 0;
+            assert!(is_in || (own > 3.0 - made.inner_mm && !is_filled), "{x} {own}");
+            assert!(!is_in || own <= 3.0 + made.outer_mm || is_filled, "{x} {own}");
+        }
+        let again = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let again = again.install(|| dilate(&attractor, radius, tolerance, &Budget::default()).unwrap());
+        assert!(again.solid.mesh() == made.solid.mesh());
+    }
+}
+
+#[test]
+fn decimation_can_be_stopped() {
+    let budget = Budget::default();
+    budget.cancel.fire(StopReason::Cancelled);
+    assert!(decimated(&ring(240, 120, 0.0), 0.1, f64::INFINITY, &budget).is_err());
+}
