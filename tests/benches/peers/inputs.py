@@ -7,7 +7,7 @@ from SplitMix64 (Steele, Lea, Flood 2014), so that every machine makes the same 
 """
 import sys
 from dataclasses import dataclass
-from itertools import product
+from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
@@ -291,6 +291,47 @@ def bumpy(n, m):
     return patch(place, n, m)
 
 
+def level_set(value, n, reach):
+    """Where a function is zero, by marching tetrahedra over n cubes along each side of a box, halved along their diagonals (Kuhn); the normals lead to where it is positive."""
+    ticks = np.linspace(-reach, reach, n + 1)
+    places = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    values = value(*places.T)
+    strides = np.array([(n + 1) ** 2, n + 1, 1])
+    cubes = (np.stack(np.meshgrid(*3 * [np.arange(n)], indexing="ij"), axis=-1).reshape(-1, 3) * strides).sum(axis=1)
+    points, triangles = [], []
+    for order in permutations(range(3)):
+        corners = cubes[:, None] + np.concatenate([[0], np.cumsum(strides[list(order)])])
+        is_low = values[corners] < 0
+        for few in (1, 2):
+            # One corner alone on its side, or two.
+            for is_few in (is_low, ~is_low)[: 3 - few]:
+                is_cut = is_few.sum(axis=1) == few
+                cut = np.take_along_axis(corners[is_cut], np.argsort(~is_few[is_cut], axis=1, kind="stable"), axis=1)
+                pairs = {1: [(0, 1), (0, 2), (0, 3)], 2: [(0, 2), (0, 3), (1, 3), (1, 2)]}[few]
+                ends = np.sort(np.stack([cut[:, pair] for pair in pairs], axis=1), axis=2)
+                low, high = values[ends[..., 0]], values[ends[..., 1]]
+                share = (low / (low - high))[..., None]
+                polygon = places[ends[..., 0]] * (1 - share) + places[ends[..., 1]] * share
+                out = places[cut][:, few:].mean(axis=1) - places[cut][:, :few].mean(axis=1)
+                out = out if is_few is is_low else -out
+                for k in range(1, len(pairs) - 1):
+                    a, b, c = polygon[:, 0], polygon[:, k], polygon[:, k + 1]
+                    is_in = (np.cross(b - a, c - a) * out).sum(axis=1) < 0
+                    b, c = np.where(is_in[:, None], c, b), np.where(is_in[:, None], b, c)
+                    triangles.append(sum(map(len, points)) + np.arange(3 * len(a)).reshape(3, -1).T)
+                    points.append(np.concatenate([a, b, c]))
+    return weld(np.concatenate(points), np.concatenate(triangles))
+
+
+def pebble(n):
+    """A round body of a level set, as scanners and implicit modellers write it: with short sides and slivers all over."""
+
+    def value(x, y, z):
+        return np.sqrt(x * x + y * y + z * z) - 1 + 0.06 * np.sin(3 * x + 1) * np.cos(3 * y) + 0.05 * np.sin(4 * z + 2 * x)
+
+    return level_set(value, n, 1.25)
+
+
 def together(parts):
     """Parts as one, with one vertex for all at a place."""
     counts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
@@ -435,6 +476,7 @@ SHAPES = {
     "lens": lambda: lens(128, 48),
     "drum": lambda: drum(128, 48),
     "cushion": lambda: cushion(48),
+    "pebble": lambda: pebble(40),
 }
 MAIN = list(SHAPES)[:8]
 
