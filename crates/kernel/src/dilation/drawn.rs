@@ -1,4 +1,4 @@
-//! Shapes that stand for others: triangles for trimmed and for smooth surfaces, and roots with one radius each.
+//! Shapes that stand for others: triangles for trimmed and for smooth surfaces, fewer of them for fine meshes, and roots with one radius each.
 
 use super::DilationError;
 use super::arrangement::without_lines;
@@ -8,7 +8,7 @@ use super::unfold::unfolded;
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Limits};
 use crate::groups::Groups;
-use crate::measure::bounds::{bounding_box, dilated_box};
+use crate::measure::bounds::{AxisBox, bounding_box, dilated_box};
 use crate::solid::TriMesh;
 use crate::tolerance::{Radius, Tolerance};
 use std::borrow::Cow;
@@ -110,10 +110,14 @@ impl Drawn {
         let Some((mesh, deviation_mm)) = unless_stopped(drawn.map(Some))? else { return Ok(None) };
         let (mesh, moved) = unfolded(mesh, UNFOLDED_SHARE * aimed);
         let deviation_mm = deviation_mm + moved;
-        let Some(attractor) = Attractor::of_triangles(&mesh, false) else { return Ok(None) };
-        let Ok(rest) = Tolerance::new(aimed - deviation_mm) else { return Ok(None) };
+        Ok(Attractor::of_triangles(&mesh, false).and_then(|drawn| Self::near(drawn, &bounds, radius, aimed, deviation_mm)))
+    }
+
+    /// What stands for a shape in a box, no place of either farther from the other one than told, with one radius; none where that leaves nothing of what is aimed at.
+    fn near(attractor: Attractor, bounds: &AxisBox, radius: f64, aimed: f64, deviation_mm: f64) -> Option<Self> {
+        let rest = Tolerance::new(aimed - deviation_mm).ok()?;
         let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius) };
-        Ok(Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest }))
+        Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest })
     }
 
     /// Fewer triangles for a mesh that is finer than needed, within their share of the tolerance, times `coarseness`; `None` where it is no such.
@@ -131,11 +135,8 @@ impl Drawn {
         // Whatever is farther from the surface than this is in both solids, or in none.
         let longest = if *is_solid { NEAR_SURFACE * (radius - aimed) / JUNG } else { f64::INFINITY };
         let Some(fewer) = decimated(mesh, share, longest, budget)? else { return Ok(None) };
-        let Some(drawn) = Attractor::of_triangles(&fewer, *is_solid) else { return Ok(None) };
-        let Ok(rest) = Tolerance::new(aimed - share) else { return Ok(None) };
-        let bounds = bounding_box(attractor, budget)?.grown(radius);
-        let meant = Meant { off: share, deviation_mm: share, bounds };
-        Ok(Some(Self { attractor: drawn, balls: Balls { least: radius, most: radius }, meant, rest }))
+        let bounds = bounding_box(attractor, budget)?;
+        Ok(Attractor::of_triangles(&fewer, *is_solid).and_then(|drawn| Self::near(drawn, &bounds, radius, aimed, share)))
     }
 
     /// The plan of its dilation, as that of the other one.

@@ -305,7 +305,11 @@ impl Decimation {
         Ok(())
     }
 
+    /// None of what is beyond the border, which is nowhere.
     fn facet(&self, corners: [u32; 3]) -> Option<Facet> {
+        if corners.contains(&self.beyond) {
+            return None;
+        }
         Facet::new(corners.map(|corner| self.mesh.points[corner as usize]), corners.map(|corner| &self.ups[corner as usize]))
     }
 
