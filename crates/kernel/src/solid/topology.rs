@@ -185,6 +185,7 @@ fn fans(link: &[(u32, u32)]) -> usize {
 }
 
 /// The triangles at each vertex.
+#[derive(Clone)]
 pub(crate) struct Incidence {
     offsets: Vec<u32>,
     triangles: Vec<u32>,

@@ -3,7 +3,7 @@
 //! At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
 //!
 //! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
-//! are moved in all directions away from S, too (`sheets`). What comes out bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
+//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened. What comes out bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
 //! * All of its triangles have s <= d <= t, and so has each way from a place of one of these to the place with the same shares in the feet of its corners d <= t (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of M: where no cell is, the boundary winds around nothing. So M is in D_t(S).
 //! * It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
@@ -38,7 +38,7 @@ use rayon::prelude::*;
 use sheets::{Name, Shape, Sheets};
 use skin::Skin;
 use std::cell::Cell;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use ways::Ways;
 
 /// By how many times the angle that a normal may be off its corner's a surface turns at seams at least. Neighbours that both turn as much as may be from the corner between them turn by twice that; with less, seams may end in the midst of what turns about as much along a side.
@@ -54,6 +54,8 @@ const FACET: f64 = -0.7;
 /// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
 const ROUNDS: u32 = 6;
 const FINER: f64 = 0.25;
+/// Rounds in which normals are evened where sheets fold.
+const EVENINGS: usize = 8;
 /// Triangles one after the other.
 const IN_A_ROW: usize = 64;
 
@@ -78,7 +80,7 @@ pub(super) fn surface(
     let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
     let mut last = None;
     for share in SEAMS {
-        let Some(skin) = Skin::new(&triangles, 1.0 - TURNED * half / radius, share, setting.slack) else {
+        let Some(skin) = Skin::new(&triangles, radius, TURNED * half, share, setting.slack) else {
             continue;
         };
         // With as many seams as before there are the same.
@@ -112,34 +114,49 @@ fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + 
     let hidden = skin.hidden(&valleys, faces, radius, half);
     let [row, column] = [[SIDE, RIM], [FACET, SIDE]].map(|[near, far]| 2.0 * (at(near) / at(far)).acos());
     let fold = 2.0 * (at(-TURNED) / radius).acos();
-    let first: Vec<f64> = skin.cosines.iter().map(|cosine| (BOTH * half - radius * (1.0 - cosine)).min(OFF * half)).collect();
+    let may_be_off = |skin: &Skin| skin.lost.iter().map(|lost| (BOTH * half - lost).min(OFF * half)).collect::<Vec<f64>>();
+    let first = may_be_off(skin);
     let (mut most, mut good) = (first.clone(), HashSet::new());
-    for round_number in 0..ROUNDS {
-        let mut coarse = Coarse::new(skin, &hidden, radius, column.cos());
+    // With other normals in the end: what is shown of the surface does not know these.
+    let mut evened = skin.clone();
+    let (mut round_number, mut evenings) = (0, 0);
+    while round_number < ROUNDS {
+        let mut coarse = Coarse::new(&evened, &hidden, radius, column.cos());
         if !coarse.run(&first, &most, budget)? {
             return Ok(None);
         }
         let (names, left) = coarse.triangles();
         let share = 1.0 + FINER * f64::from(round_number);
         let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
-        let expected = shape.triangles(skin, &left);
+        let expected = shape.triangles(&evened, &left);
         if expected > 2.0 * budget.limits.triangles as f64 {
             return Ok(Some(Flat::Beyond(expected)));
         }
         if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
             return Ok(None);
         }
-        let Some(sheets) = Sheets::new(skin, &valleys, &left, &shape, round) else {
+        let Some(sheets) = Sheets::new(&evened, &valleys, &left, &shape, round) else {
             return Ok(None);
         };
         let faults = around.faults(&sheets, &good, budget)?;
+        let names_of_all = || (0..sheets.triangles.len() as u32).map(|triangle| sheets.name(triangle)).collect::<HashSet<Name>>();
         if faults.is_empty() {
-            let is_left = ways.leave(&sheets, budget)?;
+            let not_left = ways.not_left(&sheets, budget)?;
+            if !not_left.is_empty() {
+                let feet = around.feet(&sheets, &not_left);
+                if evenings == EVENINGS || !evened.even(&feet, radius, TURNED * half) {
+                    return Ok(None);
+                }
+                evenings += 1;
+                most.iter_mut().zip(may_be_off(&evened)).for_each(|(most, other)| *most = most.min(other));
+                good = names_of_all();
+                continue;
+            }
             let mut surface = BlockSurface { vertices: sheets.vertices, triangles: sheets.triangles, ..BlockSurface::default() };
-            let is_shown = is_left && is_embedded(&mut surface, budget)? && holds(&surface, skin);
+            let is_shown = is_embedded(&mut surface, budget)? && holds(&surface, skin);
             return Ok(is_shown.then(|| if is_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) }));
         }
-        good = (0..sheets.triangles.len() as u32).map(|triangle| sheets.name(triangle)).collect();
+        good = names_of_all();
         for fault in faults {
             good.remove(&sheets.name(fault));
             let owner = sheets.owners[fault as usize];
@@ -150,6 +167,7 @@ fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + 
                 coarse.halve(names[owner as usize], &mut most);
             }
         }
+        round_number += 1;
     }
     Ok(None)
 }
@@ -173,6 +191,14 @@ impl Around<'_> {
         };
         let all: Vec<Vec<u32>> = open.par_chunks(IN_A_ROW).map(look).collect::<Result<_, Stopped>>()?;
         Ok(all.concat())
+    }
+
+    /// The vertices of the surface that corners of some triangles of sheets are out from, and those around these.
+    fn feet(&self, sheets: &Sheets, triangles: &[u32]) -> Vec<u32> {
+        let feet = triangles.iter().flat_map(|&triangle| sheets.triangles[triangle as usize]).map(|corner| sheets.feet[corner as usize]);
+        let near = feet.flat_map(|foot| self.skin.around.at(foot)).flat_map(|&triangle| self.skin.triangles[triangle as usize]);
+        let all: BTreeSet<u32> = near.collect();
+        all.into_iter().collect()
     }
 
     fn is_fault(&self, sheets: &Sheets, triangle: u32, memory: &mut Memory) -> bool {

@@ -33,7 +33,7 @@ pub(super) struct Seam {
 pub(super) type Corner = (u32, bool);
 
 /// What is on one side of a surface around a place of seams: the corners of the parts there, one after the other. On the border there are two parts.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Ring {
     pub(super) corners: Vec<Corner>,
     pub(super) is_border: bool,
@@ -42,7 +42,7 @@ pub(super) struct Ring {
 }
 
 /// All of a surface.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Seams {
     pub(super) all: Vec<Seam>,
     /// Of each vertex the first one at its place; none where there are no seams.

@@ -1,11 +1,14 @@
 //! The surface that is dilated: triangles with common corners, of which little turns from one to the next, but at seams.
 
+use super::coarse::lifted;
 use super::seams::Seams;
-use crate::attractor::cell::{Point, cross, dot, subtract, unit};
+use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
 use crate::dilation::arrangement::faces::numbered;
+use crate::groups::Groups;
 use crate::measure::triangle::closest_on_triangle;
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::topology::Incidence;
+use rayon::prelude::*;
 
 /// Sides that a way to a place crosses at most.
 const MOST_STEPS: usize = 64;
@@ -16,11 +19,14 @@ const SLIVER: f64 = 1e-6;
 /// The cosine of the angle by which triangles turn at a common side that is no seam at least, and of the angle between them at most.
 const SMOOTH: f64 = 0.5;
 const ACUTE: f64 = 0.9;
+/// Sides that are shorter than this, as a share of the longest ones at both ends, have one normal: noise and marching cubes turn the triangles there, and sheets would fold.
+const SHORT: f64 = 0.2;
 
 /// Of so many inner sides one is a seam at most.
 const MOST_SHARP: usize = 4;
 
 /// A surface of triangles with its normals.
+#[derive(Clone)]
 pub(super) struct Skin {
     pub(super) places: Vec<Point>,
     pub(super) triangles: Vec<[u32; 3]>,
@@ -29,8 +35,10 @@ pub(super) struct Skin {
     /// Unit normals of the triangles, and of the corners: up on one side, which may be another for another corner.
     pub(super) normals: Vec<Point>,
     pub(super) ups: Vec<Point>,
-    /// The least cosine of the angles between a corner's normal and those of its triangles.
-    pub(super) cosines: Vec<f64>,
+    /// The same, where those that short sides join have one.
+    shared: Vec<Point>,
+    /// By how much less than the radius the triangles at a corner are away from the places that are as far out along its normal, on either side, at most.
+    pub(super) lost: Vec<f64>,
     pub(super) around: Incidence,
     /// The sides that one triangle alone has, as it has them, and which it is; seams are none of these.
     pub(super) borders: Vec<([u32; 2], u32)>,
@@ -42,10 +50,10 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    /// The surface of some triangles, with seams where it turns by so many times the angle that a normal may be off that of a corner, whose cosine is `turn`; none where the normal of one turns from that of a corner by more than `turn` tells, its cosine, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, where parts meet at seams in other ways than along whole ones that are all hollow on a side, or all not, or where most inner sides are flat, by no more than `flatness`, or many are seams:
+    /// The surface of some triangles, with seams where it turns by so many times the angle by which a normal may be off that of a corner, so that as much of a radius is lost as may be; none where more is lost at a corner, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, where parts meet at seams in other ways than along whole ones that are all hollow on a side, or all not, or where most inner sides are flat, by no more than `flatness`, or many are seams:
     /// then there are few faces. Cost: some tenths of a microsecond for each.
-    pub(super) fn new(faces: &[[Point; 3]], turn: f64, seams: f64, flatness: f64) -> Option<Self> {
-        let least = (seams * turn.acos()).cos().max(SMOOTH);
+    pub(super) fn new(faces: &[[Point; 3]], radius: f64, most_lost: f64, seams: f64, flatness: f64) -> Option<Self> {
+        let least = (seams * (1.0 - most_lost / radius).acos()).cos().max(SMOOTH);
         let (mut places, mut triangles) = numbered(faces);
         let normals: Vec<Point> = faces.iter().map(upright).collect::<Option<_>>()?;
         let (mut borders, mut smooth, mut sharp, mut inwards, mut flat) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), 0);
@@ -87,14 +95,28 @@ impl Skin {
             }
         }
         ups.iter_mut().for_each(|up| *up = unit(up));
-        let mut cosines = vec![1.0_f64; places.len()];
-        for (normal, corners) in normals.iter().zip(&triangles) {
-            for &corner in corners {
-                let least = &mut cosines[corner as usize];
-                *least = least.min(dot(normal, &ups[corner as usize]).abs());
-            }
+        let around = Incidence::new(places.len(), &triangles);
+        if around.most() > MOST_AROUND {
+            return None;
         }
-        if cosines.iter().any(|&cosine| cosine < turn) || !seams.find_rings(&normals, &ups) {
+        let near = |vertex: usize| around.at(vertex as u32).iter().map(|&triangle| &faces[triangle as usize]);
+        // From the planes of triangles no more is lost; mostly these tell enough.
+        let lost_with = |vertex: usize, up: &Point| {
+            let cosines = around.at(vertex as u32).iter().map(|&triangle| dot(&normals[triangle as usize], up).abs());
+            let of_planes = radius * (1.0 - cosines.fold(1.0, f64::min));
+            if of_planes <= most_lost { of_planes } else { lost(&places[vertex], up, radius, near(vertex)) }
+        };
+        let shared = shared(&places, &triangles, &ups);
+        let choose = |vertex: usize| {
+            let own = lost_with(vertex, &ups[vertex]);
+            if shared[vertex] == ups[vertex] {
+                return (ups[vertex], own);
+            }
+            let with = lost_with(vertex, &shared[vertex]);
+            if with <= own { (shared[vertex], with) } else { (ups[vertex], own) }
+        };
+        let (ups, lost): (Vec<Point>, Vec<f64>) = (0..places.len()).into_par_iter().map(choose).unzip();
+        if lost.iter().any(|&lost| lost > most_lost) || !seams.find_rings(&normals, &ups) {
             return None;
         }
         let (mut outs, mut turns) = (vec![[0.0; 3]; places.len()], vec![1.0; places.len()]);
@@ -115,16 +137,31 @@ impl Skin {
             turns[*vertex as usize] = -1.0;
         }
         let borders: Vec<([u32; 2], u32)> = borders.iter().map(|edge| (edge.of(&triangles), edge.triangle)).collect();
-        let around = Incidence::new(places.len(), &triangles);
-        if around.most() > MOST_AROUND {
-            return None;
-        }
         outs.iter_mut().for_each(|out| *out = unit(out));
         let beyond = places.len() as u32;
         let sides = borders.iter().map(|(ends, _)| ends).chain(seams.all.iter().flat_map(|seam| &seam.ends));
         let more: Vec<[u32; 3]> = sides.map(|&[a, b]| [b, a, beyond]).collect();
         let mesh = HalfEdges::new([places.as_slice(), &[[0.0; 3]]].concat(), &[triangles.as_slice(), &more].concat());
-        Some(Self { places, triangles, mesh, normals, ups, cosines, around, borders, outs, turns, seams })
+        Some(Self { places, triangles, mesh, normals, ups, shared, lost, around, borders, outs, turns, seams })
+    }
+
+    /// Makes the normals of some corners those that short sides share, or else the means of those around them, where no more than told is lost of a radius; whether any is another one now.
+    pub(super) fn even(&mut self, corners: &[u32], radius: f64, most_lost: f64) -> bool {
+        let evened = |&corner: &u32| {
+            let beside = self.around.at(corner).iter().map(|&triangle| self.triangles[triangle as usize]);
+            let own = &self.ups[corner as usize];
+            let sum = beside.clone().flatten().fold([0.0; 3], |sum: Point, other| add(&sum, &self.ups[other as usize], own));
+            let faces: Vec<[Point; 3]> = beside.map(|corners| corners.map(|other| self.places[other as usize])).collect();
+            [self.shared[corner as usize], unit(&sum)].into_iter().filter(|up| up != own).find_map(|up| {
+                let lost = lost(&self.places[corner as usize], &up, radius, faces.iter());
+                (lost <= most_lost).then_some((corner, up, lost))
+            })
+        };
+        let all: Vec<(u32, Point, f64)> = corners.par_iter().filter_map(evened).collect();
+        for &(corner, up, lost) in &all {
+            (self.ups[corner as usize], self.lost[corner as usize]) = (up, lost);
+        }
+        !all.is_empty()
     }
 
     /// The corner that none of its triangles has.
@@ -168,6 +205,46 @@ impl Skin {
     pub(super) fn faces(&self) -> impl Iterator<Item = [Point; 3]> {
         self.triangles.iter().map(|corners| corners.map(|corner| self.places[corner as usize]))
     }
+}
+
+/// By how much less than a radius triangles are away from the places that are as far out from another one along a normal, on either side.
+fn lost<'a>(at: &Point, up: &Point, radius: f64, near: impl Iterator<Item = &'a [Point; 3]> + Clone) -> f64 {
+    let of = |side: f64| {
+        let out = lifted(at, up, side);
+        let squares = near.clone().map(|[a, b, c]| distance_squared(&out, &closest_on_triangle(&out, a, b, c)));
+        radius - squares.fold(f64::INFINITY, f64::min).sqrt()
+    };
+    of(radius).max(of(-radius))
+}
+
+/// Adds a normal to a sum, turned to the side of another one.
+fn add(sum: &Point, up: &Point, own: &Point) -> Point {
+    lifted(sum, up, if dot(up, own) < 0.0 { -1.0 } else { 1.0 })
+}
+
+/// The normals of corners, where those that short sides join have one.
+fn shared(places: &[Point], triangles: &[[u32; 3]], ups: &[Point]) -> Vec<Point> {
+    let sides = || triangles.iter().flat_map(|corners| (0..3).map(|k| [corners[k], corners[(k + 1) % 3]].map(|end| end as usize)));
+    let square = |[a, b]: [usize; 2]| distance_squared(&places[a], &places[b]);
+    let mut longest = vec![0.0_f64; places.len()];
+    for ends in sides() {
+        ends.into_iter().for_each(|end| longest[end] = longest[end].max(square(ends)));
+    }
+    let mut groups = Groups::new(places.len());
+    for [a, b] in sides().filter(|&[a, b]| square([a, b]) <= SHORT * SHORT * longest[a].min(longest[b])) {
+        groups.join(a, b);
+    }
+    let groups = groups.all();
+    let (mut sums, mut is_one) = (ups.to_vec(), vec![true; places.len()]);
+    for (vertex, group) in groups.iter().map(|&group| group as usize).enumerate().filter(|(vertex, group)| vertex != group) {
+        sums[group] = add(&sums[group], &ups[vertex], &ups[group]);
+        is_one[group] = false;
+    }
+    let shared = |(vertex, &group): (usize, &u32)| {
+        let sum = &sums[group as usize];
+        if is_one[group as usize] { ups[vertex] } else { unit(&add(&[0.0; 3], sum, &ups[vertex])) }
+    };
+    groups.iter().enumerate().map(shared).collect()
 }
 
 /// The unit normal of a triangle; none of a sliver, of which rounding would tell.

@@ -174,6 +174,43 @@ impl Mesh {
         self
     }
 
+    /// Where a function is zero, by marching tetrahedra over so many cubes along each side of a box, halved along their diagonals (Kuhn): with short sides and slivers all over.
+    fn level_set(cubes: u32, reach: f64, value: impl Fn(DVec3) -> f64) -> Self {
+        let at = |corner: [u32; 3]| reach * (2.0 * DVec3::from_array(corner.map(f64::from)) / f64::from(cubes) - DVec3::ONE);
+        let (mut mesh, mut numbers) = (Self::default(), HashMap::new());
+        let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        for (first, order) in (0..cubes.pow(3)).flat_map(|cube| orders.map(|order| (cube, order))) {
+            let mut corner = [first % cubes, first / cubes % cubes, first / cubes.pow(2)];
+            let mut corners = vec![corner];
+            for axis in order {
+                corner[axis] += 1;
+                corners.push(corner);
+            }
+            let (low, high): (Vec<[u32; 3]>, Vec<[u32; 3]>) = corners.into_iter().partition(|&corner| value(at(corner)) < 0.0);
+            let pairs = match (low.len(), high.len()) {
+                (0, _) | (_, 0) => continue,
+                (2, _) => vec![[low[0], high[0]], [low[0], high[1]], [low[1], high[1]], [low[1], high[0]]],
+                _ => low.iter().flat_map(|&low| high.iter().map(move |&high| [low, high])).collect(),
+            };
+            let vertices = pairs.iter().map(|&ends| {
+                *numbers.entry(ends).or_insert_with(|| {
+                    let [low, high] = ends.map(at);
+                    let [below, above] = [low, high].map(&value);
+                    mesh.vertices.push(low.lerp(high, below / (below - above)));
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            let vertices: Vec<u32> = vertices.collect();
+            let out = high.iter().map(|&high| at(high)).sum::<DVec3>() / high.len() as f64 - at(low[0]);
+            for k in 2..vertices.len() {
+                let [a, b, c] = [0, k - 1, k].map(|k| vertices[k]);
+                let [p, q, r] = [a, b, c].map(|vertex| mesh.vertices[vertex as usize]);
+                mesh.faces.push(if (q - p).cross(r - p).dot(out) > 0.0 { vec![a, b, c] } else { vec![a, c, b] });
+            }
+        }
+        mesh
+    }
+
     fn and(mut self, other: Self) -> Self {
         let first = self.vertices.len() as u32;
         self.vertices.extend(other.vertices);
@@ -274,6 +311,17 @@ fn sheets_follow_meshes_with_short_sides() {
         for (radius, share) in [(1.0, 0.1), (1.4, 0.2), (3.0, 0.1)] {
             assert_made(case, &mesh, [radius, share * radius], expected, 100, &mut random);
         }
+    }
+}
+
+/// A body of a level set: short sides have noise for normals, along which sheets would fold.
+#[test]
+fn sheets_follow_level_sets() {
+    let mut random = Random(179);
+    let wave = |x: DVec3| 1.2 * (0.22 * x.x + 1.0).sin() * (0.22 * x.y).cos() + (0.3 * x.z + 0.15 * x.x).sin();
+    let pebble = |cubes: u32| Mesh::level_set(cubes, 15.6, |x| x.length() - 12.0 + wave(x));
+    for (cubes, radius, share) in [(30, 0.6, 0.1), (30, 1.0, 0.05), (40, 2.0, 0.1)] {
+        assert_made(cubes as usize, &pebble(cubes), [radius, share * radius], (1, 1, 4), 50, &mut random);
     }
 }
 
@@ -420,7 +468,7 @@ fn faces_below_places_are_found() {
     let mut random = Random(139);
     let mesh = Mesh::torus(40, 24, [15.0, 6.0]);
     let corners = mesh.corners();
-    let skin = Skin::new(&corners, 0.97, 2.0, 1e-9).unwrap();
+    let skin = Skin::new(&corners, 1.0, 0.03, 2.0, 1e-9).unwrap();
     let mut found = 0;
     for _ in 0..300 {
         let from = random.next() as u32 % corners.len() as u32;

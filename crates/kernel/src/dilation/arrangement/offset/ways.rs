@@ -339,27 +339,28 @@ impl<'a> Ways<'a> {
         })
     }
 
-    /// Whether there are such directions that leave the sheets everywhere, too: those of corners, normals of triangles, or means of two of these at their common side.
+    /// The triangles of sheets at which no such directions are found that leave the sheets, too: those of corners, normals of triangles, or means of two of these at their common side.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn leave(&self, sheets: &Sheets, budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn not_left(&self, sheets: &Sheets, budget: &Budget) -> Result<Vec<u32>, Stopped> {
         let mesh = HalfEdges::new(sheets.vertices.clone(), &sheets.triangles);
         let around = Incidence::new(sheets.vertices.len(), &sheets.triangles);
         let at = |corner: u32| sheets.vertices[corner as usize];
         let way = |corner: u32| &sheets.ways[corner as usize];
         let numbers: Vec<u32> = (0..sheets.triangles.len() as u32).collect();
         let corners = |triangle: u32| sheets.triangles[triangle as usize];
-        let Some(normals) = numbers.iter().map(|&triangle| upright(&corners(triangle).map(at))).collect::<Option<Vec<Point>>>() else {
-            return Ok(false);
-        };
-        let leads = |way: &Point, triangle: u32| dot(way, &normals[triangle as usize]) > NOISE;
-        let leads_all = |vertex: u32| around.at(vertex).iter().all(|&other| leads(way(vertex), other));
-        if !(0..sheets.vertices.len() as u32).all(leads_all) {
-            return Ok(false);
+        let slivers: Vec<u32> = numbers.iter().copied().filter(|&triangle| upright(&corners(triangle).map(at)).is_none()).collect();
+        if !slivers.is_empty() {
+            return Ok(slivers);
         }
-        all(&numbers, budget, |&triangle| {
+        let normals: Vec<Point> = numbers.iter().filter_map(|&triangle| upright(&corners(triangle).map(at))).collect();
+        let leads = |way: &Point, triangle: u32| dot(way, &normals[triangle as usize]) > NOISE;
+        let is_left = |triangle: u32| {
             let (own, places, up) = (corners(triangle), corners(triangle).map(at), &normals[triangle as usize]);
+            if !own.iter().all(|&corner| leads(way(corner), triangle)) {
+                return false;
+            }
             // Corners whose ways serve all of the triangle.
             let serves = own.map(|corner| self.leaves_all(&places, way(corner)));
             let is_side_left = |k: usize| {
@@ -377,7 +378,13 @@ impl<'a> Ways<'a> {
             let facets = |k: usize| -> Vec<Point> { around.at(own[k]).iter().map(|&other| normals[other as usize]).collect() };
             let is_corner_left = |k: usize| serves[k] || self.leaves_between(&[places[k]], way(own[k]), &facets(k));
             (serves.contains(&true) || self.leaves_between(&places, up, &[*up])) && (0..3).all(is_side_left) && (0..3).all(is_corner_left)
-        })
+        };
+        let look = |row: &[u32]| {
+            budget.cancel.check()?;
+            Ok(row.iter().copied().filter(|&triangle| !is_left(triangle)).collect())
+        };
+        let all: Vec<Vec<u32>> = numbers.par_chunks(IN_A_ROW).map(look).collect::<Result<_, Stopped>>()?;
+        Ok(all.concat())
     }
 
     /// Whether all faces that are as near to some place of a corner, a side or a triangle are left behind along a direction, or those closest to it along another one that leads through some facets, which may be told of parts.
