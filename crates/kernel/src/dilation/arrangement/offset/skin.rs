@@ -19,7 +19,7 @@ const SLIVER: f64 = 1e-6;
 /// The cosine of the angle by which triangles turn at a common side that is no seam at least, and of the angle between them at most.
 const SMOOTH: f64 = 0.5;
 const ACUTE: f64 = 0.9;
-/// Sides that are shorter than this, as a share of the longest ones at both ends, have one normal: noise and marching cubes turn the triangles there, and sheets would fold.
+/// Sides that are shorter than this, as a share of the longest ones at both ends, may have one normal: noise and marching cubes turn the triangles there, and sheets would fold.
 const SHORT: f64 = 0.2;
 
 /// Of so many inner sides one is a seam at most.
@@ -35,9 +35,9 @@ pub(super) struct Skin {
     /// Unit normals of the triangles, and of the corners: up on one side, which may be another for another corner.
     pub(super) normals: Vec<Point>,
     pub(super) ups: Vec<Point>,
-    /// The same, where those that short sides join have one.
+    /// What those of corners were at first, but one for all that short sides join.
     shared: Vec<Point>,
-    /// By how much less than the radius the triangles at a corner are away from the places that are as far out along its normal, on either side, at most.
+    /// By how much less than the radius the triangles at a corner, no others, are away from the places that are as far out along its normal, on either side, at most.
     pub(super) lost: Vec<f64>,
     pub(super) around: Incidence,
     /// The sides that one triangle alone has, as it has them, and which it is; seams are none of these.
@@ -145,7 +145,7 @@ impl Skin {
         Some(Self { places, triangles, mesh, normals, ups, shared, lost, around, borders, outs, turns, seams })
     }
 
-    /// Makes the normals of some corners those that short sides share, or else the means of those around them, where no more than told is lost of a radius; whether any is another one now.
+    /// Makes the normals of some corners those that short sides share, or, where they are these already, the means of those around them, where no more than told is lost of a radius; whether any is another one now. So they take turns: means of means alone left pebble of the peers' comparison folded at r/40.
     pub(super) fn even(&mut self, corners: &[u32], radius: f64, most_lost: f64) -> bool {
         let evened = |&corner: &u32| {
             let beside = self.around.at(corner).iter().map(|&triangle| self.triangles[triangle as usize]);

@@ -339,7 +339,7 @@ impl<'a> Ways<'a> {
         })
     }
 
-    /// The triangles of sheets at which no such directions are found that leave the sheets, too: those of corners, normals of triangles, or means of two of these at their common side.
+    /// The triangles of sheets at which no such directions are found that leave the sheets, too: those of corners, normals of triangles, or means of two of these at their common side. Where there are slivers, only these.
     ///
     /// # Errors
     /// [`Stopped`].
