@@ -46,6 +46,7 @@ mod patches;
 mod peaks;
 mod plan;
 mod pool;
+mod removed;
 mod sample;
 mod seam;
 mod setting;

@@ -11,6 +11,7 @@ mod cover;
 mod tests;
 
 use super::arrangement::Faces;
+use super::removed::Removed;
 use crate::attractor::cell::{Point, between, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::measure::triangle::closest_on_triangle;
@@ -127,12 +128,8 @@ struct Decimation {
     longest_squared: f64,
     least: Quality,
     mender: Mender,
-    /// The first vertex that is gone and that a triangle stands for, and the next one of each.
-    first: Vec<u32>,
-    next: Vec<u32>,
-    /// The same of a star, and which new triangle will stand for each; those that may come to be, what there is before, and the neighbours, nearest first.
-    gone: Vec<u32>,
-    owners: Vec<usize>,
+    removed: Removed,
+    /// Of a star: what may come to be, what there is before, and the neighbours, nearest first.
     fresh: Vec<Fresh>,
     old: Vec<Option<Fresh>>,
     lengths: Vec<(f64, usize)>,
@@ -258,26 +255,9 @@ impl Decimation {
                 && mender.star.ring.iter().filter(|&&other| other == beyond).count() <= 1
         };
         let may_move = (0..beyond).map(may_move).collect();
-        let (first, next) = (vec![NONE; all.len()], vec![NONE; beyond as usize]);
-        let (gone, owners, fresh, old, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (removed, fresh, old, lengths) = (Removed::new(all.len(), beyond as usize), Vec::new(), Vec::new(), Vec::new());
         let longest_squared = longest * longest;
-        Self {
-            mesh: joined,
-            beyond,
-            ups,
-            is_border,
-            may_move,
-            longest_squared,
-            least: FAIR,
-            mender,
-            first,
-            next,
-            gone,
-            owners,
-            fresh,
-            old,
-            lengths,
-        }
+        Self { mesh: joined, beyond, ups, is_border, may_move, longest_squared, least: FAIR, mender, removed, fresh, old, lengths }
     }
 
     /// Removes vertices as long as none that is gone is farther from what is left than a share of what it may be off, along sides that are no longer than a share of the longest one around it.
@@ -319,17 +299,9 @@ impl Decimation {
             return false;
         }
         let mut old = std::mem::take(&mut self.old);
-        let Self { mesh, beyond, mender, first, next, gone, lengths, .. } = &mut *self;
+        let Self { mesh, beyond, mender, removed, lengths, .. } = &mut *self;
         let ring = &mender.star.ring;
-        gone.clear();
-        gone.push(vertex);
-        for &half in &mender.star.halves {
-            let mut own = first[(half / 3) as usize];
-            while own != NONE {
-                gone.push(own);
-                own = next[own as usize];
-            }
-        }
+        removed.look(vertex, &mender.star);
         let count = ring.len();
         lengths.clear();
         let at_beyond = ring.iter().position(|other| other == beyond);
@@ -371,16 +343,17 @@ impl Decimation {
         if !is_made {
             return false;
         }
-        let Self { mesh, beyond, is_border, gone, owners, fresh, old, mender, .. } = self;
+        let Self { mesh, beyond, is_border, removed, fresh, old, mender, .. } = self;
+        let Removed { around, owners, .. } = removed;
         owners.clear();
-        let serves = gone.iter().all(|&vertex| {
+        let serves = around.iter().all(|&vertex| {
             let Some((owner, distance)) = closest(fresh.iter(), &mesh.points[vertex as usize], is_border[vertex as usize]) else {
                 return false;
             };
             owners.push(owner);
             distance <= share * may_be_off[vertex as usize]
         });
-        let (ring, vertex) = (&mender.star.ring, gone[0]);
+        let (ring, vertex) = (&mender.star.ring, around[0]);
         let most = share * may_be_off[vertex as usize];
         let middle = |a: u32, b: u32| between(&mesh.points[a as usize], &mesh.points[b as usize], 0.5);
         let is_near = |found: Option<(usize, f64)>| found.is_some_and(|(_, distance)| distance <= most);
@@ -391,16 +364,8 @@ impl Decimation {
     }
 
     fn collapse(&mut self, vertex: u32, m: usize) {
-        let Self { mesh, mender, first, next, gone, owners, .. } = self;
-        mesh.collapse(vertex, &mender.star, m);
-        let halves = &mender.star.halves;
-        halves.iter().for_each(|half| first[(half / 3) as usize] = NONE);
-        let fresh: Vec<usize> = kept(Some(m), halves.len()).map(|k| (halves[k] / 3) as usize).collect();
-        for (&own, &owner) in gone.iter().zip(&*owners) {
-            let first = &mut first[fresh[owner]];
-            next[own as usize] = *first;
-            *first = own;
-        }
+        self.mesh.collapse(vertex, &self.mender.star, m);
+        self.removed.remove(&self.mender.star, m);
     }
 
     /// What is left, and what its triangles are called here.
@@ -416,10 +381,6 @@ impl Decimation {
     /// Calls `visit` with the corners of a triangle, and the vertices that it stands for.
     fn each_vertex(&self, triangle: u32, mut visit: impl FnMut(u32)) {
         self.mesh.triangle(triangle).into_iter().flatten().for_each(&mut visit);
-        let mut own = self.first[triangle as usize];
-        while own != NONE {
-            visit(own);
-            own = self.next[own as usize];
-        }
+        self.removed.each(triangle, visit);
     }
 }

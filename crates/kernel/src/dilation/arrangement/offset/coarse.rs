@@ -4,7 +4,8 @@ use super::seams::Hidden;
 use super::skin::Skin;
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
-use crate::solid::half_edges::{HalfEdges, NONE, kept};
+use crate::dilation::removed::Removed;
+use crate::solid::half_edges::{HalfEdges, kept};
 use crate::solid::mend::{MOST_AROUND, Mender};
 
 /// How far off a sheet places may be that it goes by, in units of what may be, pass by pass.
@@ -38,12 +39,8 @@ pub(super) struct Coarse<'a> {
     mender: Mender,
     /// Triangles one of whose sheets looks the other way, as a surface has where it bends by more than the distance over less than may be off: they may become such ones, until they are gone.
     inverted: Vec<bool>,
-    /// The first vertex that is gone and that a triangle stands for, and the next one of each.
-    first: Vec<u32>,
-    next: Vec<u32>,
-    /// The same of a star, and which new triangle will stand for each: those that may come to be, and whether these have hidden corners.
-    gone: Vec<u32>,
-    owners: Vec<usize>,
+    removed: Removed,
+    /// What may come to be of a star, and whether it has hidden corners.
     fresh: Vec<(Fresh, bool)>,
     /// The normals of the star's triangles, and their heights as shares of their longest sides.
     normals: Vec<Point>,
@@ -222,11 +219,11 @@ impl<'a> Coarse<'a> {
         let mesh = skin.mesh.clone();
         let mut mender = Mender::default();
         mender.start(&mesh);
-        let (first, next) = (vec![NONE; mesh.triangles() as usize], vec![NONE; skin.places.len()]);
+        let count = mesh.triangles() as usize;
         let is_inverted = |&corners: &[u32; 3]| Triangle::new(skin, radius, 0.0, corners).is_some_and(|own| own.is_inverted);
         let mut inverted: Vec<bool> = skin.triangles.iter().map(is_inverted).collect();
-        inverted.resize(first.len(), false);
-        let (gone, owners, fresh, normals, heights, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        inverted.resize(count, false);
+        let (fresh, normals, heights, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self {
             skin,
             hidden,
@@ -237,10 +234,7 @@ impl<'a> Coarse<'a> {
             mesh,
             mender,
             inverted,
-            first,
-            next,
-            gone,
-            owners,
+            removed: Removed::new(count, skin.places.len()),
             fresh,
             normals,
             heights,
@@ -342,17 +336,9 @@ impl<'a> Coarse<'a> {
         if !self.mesh.star(vertex, MOST_AROUND, &mut self.mender.star) {
             return false;
         }
-        let Self { skin, hidden, mesh, mender, first, next, gone, normals, heights, lengths, .. } = self;
+        let Self { skin, hidden, mesh, mender, removed, normals, heights, lengths, .. } = self;
         let ring = &mender.star.ring;
-        gone.clear();
-        gone.push(vertex);
-        for &half in &mender.star.halves {
-            let mut own = first[(half / 3) as usize];
-            while own != NONE {
-                gone.push(own);
-                own = next[own as usize];
-            }
-        }
+        removed.look(vertex, &mender.star);
         let at = |corner: u32| &mesh.points[corner as usize];
         let count = ring.len();
         normals.clear();
@@ -383,7 +369,7 @@ impl<'a> Coarse<'a> {
 
     /// Whether the star's vertex may move to ring m.
     fn serves(&mut self, m: usize, share: f64, most: &[f64]) -> bool {
-        let Self { skin, hidden, radius, height, mender, inverted, gone, owners, fresh, normals, heights, .. } = self;
+        let Self { skin, hidden, radius, height, mender, inverted, removed, fresh, normals, heights, .. } = self;
         let ring = &mender.star.ring;
         let count = ring.len();
         fresh.clear();
@@ -403,8 +389,9 @@ impl<'a> Coarse<'a> {
             }
             fresh.push((own, is_passing));
         }
+        let Removed { around, owners, .. } = removed;
         owners.clear();
-        gone.iter().all(|&vertex| {
+        around.iter().all(|&vertex| {
             let depths = fresh.iter().map(|(own, _)| own.depth(skin, vertex)).enumerate();
             let Some((owner, _)) = depths.max_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
             owners.push(owner);
@@ -414,17 +401,11 @@ impl<'a> Coarse<'a> {
     }
 
     fn collapse(&mut self, vertex: u32, m: usize) {
-        let Self { mesh, mender, inverted, first, next, gone, owners, fresh: made, .. } = self;
+        let Self { mesh, mender, inverted, removed, fresh, .. } = self;
         mesh.collapse(vertex, &mender.star, m);
+        removed.remove(&mender.star, m);
         let halves = &mender.star.halves;
-        halves.iter().for_each(|half| first[(half / 3) as usize] = NONE);
-        let fresh: Vec<usize> = kept(Some(m), halves.len()).map(|k| (halves[k] / 3) as usize).collect();
-        fresh.iter().zip(made).for_each(|(&triangle, (own, _))| inverted[triangle] = own.is_inverted());
-        for (&own, &owner) in gone.iter().zip(&*owners) {
-            let first = &mut first[fresh[owner]];
-            next[own as usize] = *first;
-            *first = own;
-        }
+        kept(Some(m), halves.len()).zip(fresh).for_each(|(k, (own, _))| inverted[(halves[k] / 3) as usize] = own.is_inverted());
     }
 
     /// The triangles that are left, with what they are called.
@@ -438,11 +419,7 @@ impl<'a> Coarse<'a> {
         for corner in self.mesh.triangle(name).into_iter().flatten() {
             most[corner as usize] *= 0.5;
         }
-        let mut own = self.first[name as usize];
-        while own != NONE {
-            most[own as usize] *= 0.5;
-            own = self.next[own as usize];
-        }
+        self.removed.each(name, |own| most[own as usize] *= 0.5);
     }
 }
 

@@ -117,25 +117,26 @@ fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + 
     let may_be_off = |skin: &Skin| skin.lost.iter().map(|lost| (BOTH * half - lost).min(OFF * half)).collect::<Vec<f64>>();
     let first = may_be_off(skin);
     let (mut most, mut good) = (first.clone(), HashSet::new());
-    // With other normals in the end: what is shown of the surface does not know these.
-    let mut evened = skin.clone();
+    // With other normals, if these are needed: what is shown of the surface does not know them.
+    let mut evened: Option<Skin> = None;
     let (mut round_number, mut evenings) = (0, 0);
     while round_number < ROUNDS {
-        let mut coarse = Coarse::new(&evened, &hidden, radius, column.cos());
+        let own = evened.as_ref().unwrap_or(skin);
+        let mut coarse = Coarse::new(own, &hidden, radius, column.cos());
         if !coarse.run(&first, &most, budget)? {
             return Ok(None);
         }
         let (names, left) = coarse.triangles();
         let share = 1.0 + FINER * f64::from(round_number);
         let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
-        let expected = shape.triangles(&evened, &left);
+        let expected = shape.triangles(own, &left);
         if expected > 2.0 * budget.limits.triangles as f64 {
             return Ok(Some(Flat::Beyond(expected)));
         }
         if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
             return Ok(None);
         }
-        let Some(sheets) = Sheets::new(&evened, &valleys, &left, &shape, round) else {
+        let Some(sheets) = Sheets::new(own, &valleys, &left, &shape, round) else {
             return Ok(None);
         };
         let faults = around.faults(&sheets, &good, budget)?;
@@ -143,12 +144,12 @@ fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + 
         if faults.is_empty() {
             let not_left = ways.not_left(&sheets, budget)?;
             if !not_left.is_empty() {
-                let feet = around.feet(&sheets, &not_left);
+                let (feet, evened) = (around.feet(&sheets, &not_left), evened.get_or_insert_with(|| skin.clone()));
                 if evenings == EVENINGS || !evened.even(&feet, radius, TURNED * half) {
                     return Ok(None);
                 }
                 evenings += 1;
-                most.iter_mut().zip(may_be_off(&evened)).for_each(|(most, other)| *most = most.min(other));
+                most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
                 good = names_of_all();
                 continue;
             }
@@ -195,8 +196,9 @@ impl Around<'_> {
 
     /// The vertices of the surface that corners of some triangles of sheets are out from, and those around these.
     fn feet(&self, sheets: &Sheets, triangles: &[u32]) -> Vec<u32> {
-        let feet = triangles.iter().flat_map(|&triangle| sheets.triangles[triangle as usize]).map(|corner| sheets.feet[corner as usize]);
-        let near = feet.flat_map(|foot| self.skin.around.at(foot)).flat_map(|&triangle| self.skin.triangles[triangle as usize]);
+        let corners = triangles.iter().flat_map(|&triangle| sheets.triangles[triangle as usize]);
+        let feet: BTreeSet<u32> = corners.map(|corner| sheets.feet[corner as usize]).collect();
+        let near = feet.into_iter().flat_map(|foot| self.skin.around.at(foot)).flat_map(|&triangle| self.skin.triangles[triangle as usize]);
         let all: BTreeSet<u32> = near.collect();
         all.into_iter().collect()
     }

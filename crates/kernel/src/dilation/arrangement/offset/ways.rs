@@ -350,11 +350,10 @@ impl<'a> Ways<'a> {
         let way = |corner: u32| &sheets.ways[corner as usize];
         let numbers: Vec<u32> = (0..sheets.triangles.len() as u32).collect();
         let corners = |triangle: u32| sheets.triangles[triangle as usize];
-        let slivers: Vec<u32> = numbers.iter().copied().filter(|&triangle| upright(&corners(triangle).map(at)).is_none()).collect();
-        if !slivers.is_empty() {
-            return Ok(slivers);
-        }
-        let normals: Vec<Point> = numbers.iter().filter_map(|&triangle| upright(&corners(triangle).map(at))).collect();
+        let normals: Vec<Option<Point>> = numbers.iter().map(|&triangle| upright(&corners(triangle).map(at))).collect();
+        let Some(normals) = normals.iter().copied().collect::<Option<Vec<Point>>>() else {
+            return Ok(numbers.into_iter().filter(|&triangle| normals[triangle as usize].is_none()).collect());
+        };
         let leads = |way: &Point, triangle: u32| dot(way, &normals[triangle as usize]) > NOISE;
         let is_left = |triangle: u32| {
             let (own, places, up) = (corners(triangle), corners(triangle).map(at), &normals[triangle as usize]);
