@@ -59,6 +59,11 @@ pub(super) struct Seam {
 pub(super) type Blocks = BTreeMap<[i64; 3], Mutex<BlockSurface>>;
 
 impl BlockSurface {
+    /// Where the corners of a triangle are.
+    pub(super) fn places(&self, triangle: u32) -> [Point; 3] {
+        self.triangles[triangle as usize].map(|corner| self.vertices[corner as usize])
+    }
+
     /// Gives back what lists have grown beyond their length: all blocks are held at once.
     pub(super) fn shrink(&mut self) {
         self.vertices.shrink_to_fit();

@@ -163,7 +163,9 @@ impl Faces {
         let centre = middle(triangle);
         let wide = inner + radius(triangle, &centre);
         let mut found = None;
-        self.around(triangle, *inner, |item| {
+        // Nothing is nearer than less than nothing.
+        let least = inner.max(0.0);
+        self.around(triangle, least, |item| {
             let face = &self.all[item as usize];
             let is_far = dot(&normal, &face.centre) + face.radius <= highest
                 || distance_squared(&face.centre, &centre) >= (wide + face.radius).powi(2)

@@ -38,7 +38,7 @@ pub(super) struct Coarse<'a> {
     mesh: HalfEdges,
     mender: Mender,
     /// Triangles one of whose sheets looks the other way, as a surface has where it bends by more than the distance over less than may be off: they may become such ones, until they are gone.
-    inverted: Vec<bool>,
+    inverted: Vec<[bool; 2]>,
     removed: Removed,
     /// What may come to be of a star, and whether it has hidden corners.
     fresh: Vec<(Fresh, bool)>,
@@ -79,8 +79,11 @@ impl Fresh {
         }
     }
 
-    fn is_inverted(&self) -> bool {
-        matches!(self, Self::Triangle(own) if own.is_inverted)
+    fn is_inverted(&self) -> [bool; 2] {
+        match self {
+            Self::Triangle(own) => own.is_inverted,
+            Self::Side(_) => [false; 2],
+        }
     }
 
     fn sag(&self) -> f64 {
@@ -153,8 +156,8 @@ struct Triangle {
     normal: Point,
     sheets: [(Point, Point); 2],
     sag: f64,
-    /// Whether one of these is not along it.
-    is_inverted: bool,
+    /// Which of these are not along it.
+    is_inverted: [bool; 2],
 }
 
 impl Triangle {
@@ -174,13 +177,16 @@ impl Triangle {
             return None;
         }
         let mut sheets = [([0.0; 3], [0.0; 3]); 2];
-        let (mut sag, mut is_inverted) = (0.0_f64, false);
+        let (mut sag, mut is_inverted) = (0.0_f64, [false; 2]);
         let ups: [Point; 3] = std::array::from_fn(|k| skin.ups[corners[k] as usize].map(|part| part * cosines[k].signum()));
-        for (sheet, side) in sheets.iter_mut().zip([radius, -radius]) {
+        for ((sheet, is_inverted), side) in sheets.iter_mut().zip(&mut is_inverted).zip([radius, -radius]) {
             let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side));
             let own = unit(&across(&out));
-            is_inverted |= dot(&own, &normal) < LEAST_COSINE;
+            *is_inverted = dot(&own, &normal) < LEAST_COSINE;
             *sheet = (out[0], own);
+            if dot(&own, &normal) < 0.0 {
+                continue;
+            }
             // Of a curve with these normals at its ends.
             for k in 0..3 {
                 let next = (k + 1) % 3;
@@ -205,7 +211,9 @@ impl Triangle {
         let (x, up) = (&skin.places[vertex as usize], &skin.ups[vertex as usize]);
         let own = radius.copysign(dot(&self.normal, up));
         let off = |(at, normal): &(Point, Point), side: f64| dot(normal, &subtract(&lifted(x, up, side * own), at)).abs();
-        off(&self.sheets[0], 1.0).max(off(&self.sheets[1], -1.0))
+        let [upper, lower] = [0, 1].map(|k| dot(&self.sheets[k].1, &self.normal) < 0.0);
+        let counted = |is_inverted: bool, off: f64| if is_inverted { 0.0 } else { off };
+        counted(upper, off(&self.sheets[0], 1.0)).max(counted(lower, off(&self.sheets[1], -1.0)))
     }
 }
 
@@ -220,9 +228,9 @@ impl<'a> Coarse<'a> {
         let mut mender = Mender::default();
         mender.start(&mesh);
         let count = mesh.triangles() as usize;
-        let is_inverted = |&corners: &[u32; 3]| Triangle::new(skin, radius, 0.0, corners).is_some_and(|own| own.is_inverted);
-        let mut inverted: Vec<bool> = skin.triangles.iter().map(is_inverted).collect();
-        inverted.resize(count, false);
+        let is_inverted = |&corners: &[u32; 3]| Triangle::new(skin, radius, 0.0, corners).map_or([false; 2], |own| own.is_inverted);
+        let mut inverted: Vec<[bool; 2]> = skin.triangles.iter().map(is_inverted).collect();
+        inverted.resize(count, [false; 2]);
         let (fresh, normals, heights, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self {
             skin,
@@ -379,10 +387,12 @@ impl<'a> Coarse<'a> {
             let is_turned = matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0);
             // What has a hidden corner will not be left as it is, nor will what is inverted.
             let has_hidden = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);
-            let is_passing = has_hidden || own.is_inverted();
-            if is_turned || (is_passing && !has_hidden && !inverted[(mender.star.halves[k] / 3) as usize]) {
+            let before = inverted[(mender.star.halves[k] / 3) as usize];
+            let is_new = (0..2).any(|side| own.is_inverted()[side] && !before[side]);
+            if is_turned || (is_new && !has_hidden) {
                 return false;
             }
+            let is_passing = has_hidden;
             let is_off = |&corner: &u32| corner != skin.beyond() && own.sag() > share * most[corner as usize];
             if !is_passing && corners.iter().any(is_off) {
                 return false;

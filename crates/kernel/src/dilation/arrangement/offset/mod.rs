@@ -3,42 +3,51 @@
 //! At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
 //!
 //! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
-//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened. What comes out bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
+//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
-//! * All of its triangles have s <= d <= t, and so has each way from a place of one of these to the place with the same shares in the feet of its corners d <= t (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of M: where no cell is, the boundary winds around nothing. So M is in D_t(S).
-//! * It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
+//! * Each way from a place of the sheets to the place with the same shares in the feet of its corners has d <= t - m (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of the sheets: where no cell is, these wind around nothing. Where sheets cross each other they are cut (`crossed`), and M is what they wind around once or more: so M is in D_t(S), as what cuts, mending and rounding move is moved by less than m.
+//!   So is what else is added: closed parts that are filled, and lids (`lids`) over places where sheets are too near, look back, or touch, each with a place inside such that what is between that and the lid has d <= t - m; and what is between slivers and what they become (`tidy`).
+//! * All triangles of its boundary have s <= d <= t. It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
 //! * Wherever s <= d(x) <= t there is a direction w with w . (x - c) > 0 for all places c of S that are closest to x; and at places of the boundary of M there is one that leaves it through all facets there, too (`ways`).
 //!
 //! So M has the topology of D_r(S): see [`critical`](crate::dilation::critical) for the same of lattices. Where the faces stand for another shape S', no place of either farther than e from the other one, and s <= r - e and r + 2 e <= t, there also is a w wherever r - e <= d(x) <= r + e such that w . (x - c) > e for
 //! all places c of S no farther from x than d(x) + 2 e: then D_r(S') has the topology of D_r(S), see `steady`. Where that does not come out, as where parts of S come so near to each other that their dilations touch, polytopes, or a lattice, do the work.
 
 mod coarse;
+mod crossed;
+mod lids;
+mod outcome;
 mod seams;
 mod sheets;
 mod skin;
 #[cfg(test)]
 mod tests;
+mod tidy;
 mod ways;
 
-use super::between::Memory;
-use super::faces::{Faces, Question, without_lines};
+use super::between::{Memory, middle, radius};
+use super::faces::{Faces, Fault, Question, without_lines};
 use super::figure::{self, Figure};
 use super::sum::is_embedded;
 use super::{BYTES_PER_TRIANGLE, Flat};
-use crate::attractor::cell::Point;
+use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::convex::Convex;
 use crate::dilation::setting::Setting;
 use crate::dilation::surface::BlockSurface;
 use crate::groups::Groups;
 use crate::solid::half_edges::NONE;
 use crate::solid::{Inside, TriMesh};
 use coarse::Coarse;
+use crossed::Pieces;
 use glam::DVec3;
+use outcome::Outcome;
 use rayon::prelude::*;
 use sheets::{Name, Shape, Sheets};
-use skin::Skin;
+use skin::{Skin, upright};
 use std::cell::Cell;
 use std::collections::{BTreeSet, HashSet};
+use std::ops::ControlFlow;
 use ways::Ways;
 
 /// By how many times the angle that a normal may be off its corner's a surface turns at seams at least. Neighbours that both turn as much as may be from the corner between them turn by twice that; with less, seams may end in the midst of what turns about as much along a side.
@@ -52,12 +61,25 @@ const RIM: f64 = 0.4;
 const SIDE: f64 = -0.3;
 const FACET: f64 = -0.7;
 /// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
-const ROUNDS: u32 = 6;
+const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
-/// Rounds in which normals are evened where sheets fold.
-const EVENINGS: usize = 8;
+/// Rounds in which normals are evened where what is left of sheets looks back, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
+const EVENINGS: usize = 2;
+const FEWER: usize = 2;
+/// Of so many triangles one may be covered by lids.
+const SPARSE: usize = 16;
+/// The round from which on what is too near is left to lids.
+const NEARLY: u32 = 3;
+/// By what share of half the band vertices are shaken, so that triangles do not touch each other.
+const SHAKEN: f64 = 0.01;
+/// What is cut, mended and rounded is off by so many roundings at most, all in all.
+const MOVED: f64 = 128.0;
 /// Triangles one after the other.
 const IN_A_ROW: usize = 64;
+/// Within how many times the outer distance what is closest is sought.
+const AWAY: f64 = 1.5;
+/// Directions across which the width of what may be filled is asked, besides the axes.
+const MOST_NORMALS: usize = 32;
 
 /// The surface around figures that are the faces of a surface that turns little, with coordinates that are rounded; none where they are not, or the proof does not come out.
 ///
@@ -88,28 +110,38 @@ pub(super) fn surface(
             continue;
         }
         budget.cancel.check()?;
-        let made = along(&Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer }, setting, &round, budget)?;
-        if made.is_some() {
+        let made = along(
+            &Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer, moved: MOVED * setting.rounding },
+            setting,
+            &round,
+            budget,
+        )?;
+        if let ControlFlow::Break(made) = made {
             return Ok(made);
         }
     }
     Ok(None)
 }
 
-/// The same, given the surface with its seams.
-fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + Sync), budget: &Budget) -> Result<Option<Flat>, Stopped> {
-    let Around { skin, faces, inner, outer } = *around;
+/// The same, given the surface with its seams: what is made, or that it cannot be, unless other seams may serve.
+fn along(
+    around: &Around<'_>,
+    setting: &Setting,
+    round: &(impl Fn(f64) -> f64 + Sync),
+    budget: &Budget,
+) -> Result<ControlFlow<Option<Flat>>, Stopped> {
+    let Around { skin, faces, inner, outer, moved } = *around;
     let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
     budget.cancel.check()?;
     let ways = Ways::new(skin, faces, [inner, outer]);
     let (off, reach) = (setting.off + setting.slack, setting.reach);
     let is_steady = setting.off > 0.0 && inner <= reach - off && reach + 2.0 * off <= outer && ways.lead_out(off, budget)?;
     if !is_steady && !ways.lead_out(0.0, budget)? {
-        return Ok(None);
+        return Ok(ControlFlow::Continue(()));
     }
     let at = |share: f64| radius + share * half;
     let Some(valleys) = skin.seams.valleys(skin, radius) else {
-        return Ok(None);
+        return Ok(ControlFlow::Continue(()));
     };
     let hidden = skin.hidden(&valleys, faces, radius, half);
     let [row, column] = [[SIDE, RIM], [FACET, SIDE]].map(|[near, far]| 2.0 * (at(near) / at(far)).acos());
@@ -119,47 +151,81 @@ fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + 
     let (mut most, mut good) = (first.clone(), HashSet::new());
     // With other normals, if these are needed: what is shown of the surface does not know them.
     let mut evened: Option<Skin> = None;
-    let (mut round_number, mut evenings) = (0, 0);
+    let (mut round_number, mut evenings, mut has_lids, mut may_move_before) = (0, 0, false, false);
     while round_number < ROUNDS {
         let own = evened.as_ref().unwrap_or(skin);
         let mut coarse = Coarse::new(own, &hidden, radius, column.cos());
         if !coarse.run(&first, &most, budget)? {
-            return Ok(None);
+            return Ok(ControlFlow::Continue(()));
         }
         let (names, left) = coarse.triangles();
         let share = 1.0 + FINER * f64::from(round_number);
         let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
         let expected = shape.triangles(own, &left);
         if expected > 2.0 * budget.limits.triangles as f64 {
-            return Ok(Some(Flat::Beyond(expected)));
+            return Ok(ControlFlow::Break(Some(Flat::Beyond(expected))));
         }
         if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
-            return Ok(None);
+            return Ok(ControlFlow::Continue(()));
         }
-        let Some(sheets) = Sheets::new(own, &valleys, &left, &shape, round) else {
-            return Ok(None);
+        let Some(mut sheets) = Sheets::new(own, &valleys, &left, &shape, round) else {
+            return Ok(ControlFlow::Continue(()));
         };
-        let faults = around.faults(&sheets, &good, budget)?;
-        let names_of_all = || (0..sheets.triangles.len() as u32).map(|triangle| sheets.name(triangle)).collect::<HashSet<Name>>();
-        if faults.is_empty() {
-            let not_left = ways.not_left(&sheets, budget)?;
-            if !not_left.is_empty() {
-                let (feet, evened) = (around.feet(&sheets, &not_left), evened.get_or_insert_with(|| skin.clone()));
-                if evenings == EVENINGS || !evened.even(&feet, radius, TURNED * half) {
-                    return Ok(None);
-                }
+        let mut pieces = Pieces::of(&sheets, skin, round, budget)?;
+        if pieces.is_none() {
+            // Triangles touch each other.
+            sheets.shake(SHAKEN * half, round);
+            pieces = Pieces::of(&sheets, skin, round, budget)?;
+        }
+        let Some(mut pieces) = pieces else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        pieces.fill(|part| around.is_filled(part));
+        // What is cut is not exactly where it is said to be.
+        let may_move = pieces.is_cut || has_lids;
+        if may_move != may_move_before {
+            may_move_before = may_move;
+            good.clear();
+        }
+        let faults = around.faults(&sheets, &pieces, &good, if may_move { outer - moved } else { outer }, budget)?;
+        if faults.is_empty() || (round_number >= NEARLY && faults.iter().all(|fault| fault.1)) {
+            let is_fault: HashSet<u32> = faults.iter().map(|fault| fault.0).collect();
+            let owners = pieces.owners.clone();
+            let is_good = |piece: &u32| !is_fault.contains(&owners[*piece as usize]);
+            let mut outcome = Outcome::new(&sheets, pieces, (0..owners.len() as u32).filter(is_good));
+            let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
+            if !flaws.not_left.is_empty() && evenings < EVENINGS {
+                let (feet, evened) = (around.feet(outcome.feet(&flaws.not_left)), evened.get_or_insert_with(|| skin.clone()));
                 evenings += 1;
-                most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
-                good = names_of_all();
+                if evened.even(&feet, radius, TURNED * half) {
+                    most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
+                    continue;
+                }
+            }
+            if !flaws.is_none() && !may_move {
+                has_lids = true;
                 continue;
             }
-            let mut surface = BlockSurface { vertices: sheets.vertices, triangles: sheets.triangles, ..BlockSurface::default() };
+            let mut before = usize::MAX;
+            while !flaws.is_none() {
+                // Where they would be everywhere, or do not leave much less, lids do not help.
+                let is_hopeless = flaws.count() > (before / FEWER).min(outcome.surface.triangles.len() / SPARSE);
+                before = flaws.count();
+                if is_hopeless || !outcome.cover(around, &flaws, round, budget)? {
+                    return Ok(ControlFlow::Break(None));
+                }
+                flaws = outcome.flaws(around, &ways, setting, budget)?;
+            }
+            if outcome.off > moved {
+                return Ok(ControlFlow::Break(None));
+            }
+            let mut surface = outcome.surface;
             let is_shown = is_embedded(&mut surface, budget)? && holds(&surface, skin);
-            return Ok(is_shown.then(|| if is_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) }));
+            let made = if is_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) };
+            return Ok(if is_shown { ControlFlow::Break(Some(made)) } else { ControlFlow::Continue(()) });
         }
-        good = names_of_all();
-        for fault in faults {
-            good.remove(&sheets.name(fault));
+        good = pieces.good(&sheets, &faults);
+        for (fault, _) in faults {
             let owner = sheets.owners[fault as usize];
             if owner == NONE {
                 let corners = sheets.triangles[fault as usize];
@@ -170,7 +236,7 @@ fn along(around: &Around<'_>, setting: &Setting, round: &(impl Fn(f64) -> f64 + 
         }
         round_number += 1;
     }
-    Ok(None)
+    Ok(ControlFlow::Continue(()))
 }
 
 /// A surface, and the distances from it that sheets are between.
@@ -179,32 +245,66 @@ struct Around<'a> {
     faces: &'a Faces,
     inner: f64,
     outer: f64,
+    /// How far what is cut may be from where it is said to be.
+    moved: f64,
 }
 
 impl Around<'_> {
-    /// The triangles of sheets that are nearer or farther, or whose ways to their feet are, but for those that are known to be good.
-    fn faults(&self, sheets: &Sheets, good: &HashSet<Name>, budget: &Budget) -> Result<Vec<u32>, Stopped> {
-        let open: Vec<u32> = (0..sheets.triangles.len() as u32).filter(|&triangle| !good.contains(&sheets.name(triangle))).collect();
-        let look = |row: &[u32]| {
+    fn radius(&self) -> f64 {
+        0.5 * (self.inner + self.outer)
+    }
+
+    /// Half the width of the band.
+    fn half(&self) -> f64 {
+        0.5 * (self.outer - self.inner)
+    }
+
+    /// The triangles of sheets that are nearer or farther, or whose ways to their feet are, but for those that are known to be good, and whether each is too near alone: of those that are cut what is left of them, and of what is not left only whether ways are farther.
+    fn faults(
+        &self,
+        sheets: &Sheets,
+        pieces: &Pieces,
+        good: &HashSet<(Name, bool)>,
+        outer: f64,
+        budget: &Budget,
+    ) -> Result<Vec<(u32, bool)>, Stopped> {
+        let whole = pieces.whole(sheets);
+        let is_open = |&triangle: &u32| !good.contains(&(sheets.name(triangle), whole[triangle as usize]));
+        let mut open: Vec<(u32, Option<u32>)> =
+            (0..sheets.triangles.len() as u32).filter(is_open).map(|triangle| (triangle, None)).collect();
+        let is_cut = |own: &(u32, Option<u32>)| !whole[own.0 as usize];
+        open.extend((0..).zip(&pieces.owners).map(|(piece, &owner)| (owner, Some(piece))).filter(is_cut));
+        let look = |row: &[(u32, Option<u32>)]| {
             budget.cancel.check()?;
             let mut memory = Memory::default();
-            Ok(row.iter().copied().filter(|&triangle| self.is_fault(sheets, triangle, &mut memory)).collect())
+            let mut fault = |&(triangle, piece): &(u32, Option<u32>)| {
+                let corners = piece.map(|piece| pieces.corners(piece));
+                let mut is_so = |inner: f64| self.fault(sheets, triangle, corners, [inner, outer], &mut memory);
+                let inner = if piece.is_some() || whole[triangle as usize] { self.inner } else { f64::NEG_INFINITY };
+                let is_near = matches!(is_so(inner)?, Fault::Near(..));
+                // What is too near may have ways that are too far, too.
+                Some((triangle, is_near && is_so(f64::NEG_INFINITY).is_none()))
+            };
+            Ok(row.iter().filter_map(&mut fault).collect())
         };
-        let all: Vec<Vec<u32>> = open.par_chunks(IN_A_ROW).map(look).collect::<Result<_, Stopped>>()?;
-        Ok(all.concat())
+        let all: Vec<Vec<(u32, bool)>> = open.par_chunks(IN_A_ROW).map(look).collect::<Result<_, Stopped>>()?;
+        // Those that are too far first.
+        let mut all = all.concat();
+        all.sort_unstable();
+        all.dedup_by_key(|fault| fault.0);
+        Ok(all)
     }
 
-    /// The vertices of the surface that corners of some triangles of sheets are out from, and those around these.
-    fn feet(&self, sheets: &Sheets, triangles: &[u32]) -> Vec<u32> {
-        let corners = triangles.iter().flat_map(|&triangle| sheets.triangles[triangle as usize]);
-        let feet: BTreeSet<u32> = corners.map(|corner| sheets.feet[corner as usize]).collect();
-        let near = feet.into_iter().flat_map(|foot| self.skin.around.at(foot)).flat_map(|&triangle| self.skin.triangles[triangle as usize]);
-        let all: BTreeSet<u32> = near.collect();
-        all.into_iter().collect()
-    }
-
-    fn is_fault(&self, sheets: &Sheets, triangle: u32, memory: &mut Memory) -> bool {
-        let Self { skin, faces, inner, outer } = *self;
+    /// Where a triangle of sheets is nearer or farther, or its ways to its feet are; or a piece of it.
+    fn fault(
+        &self,
+        sheets: &Sheets,
+        triangle: u32,
+        piece: Option<[Point; 3]>,
+        [inner, outer]: [f64; 2],
+        memory: &mut Memory,
+    ) -> Option<Fault> {
+        let skin = self.skin;
         let corners = sheets.triangles[triangle as usize];
         let feet = corners.map(|corner| sheets.feet[corner as usize]);
         let owners = feet.map(|foot| skin.around.at(foot)[0]);
@@ -213,8 +313,58 @@ impl Around<'_> {
             last.set(skin.near(last.get(), place));
             Some(last.get())
         };
-        let (triangle, feet) = (corners.map(|corner| sheets.vertices[corner as usize]), feet.map(|foot| skin.places[foot as usize]));
-        faces.fault_with(offer, &Question { triangle, feet: Some(feet), owners, inner, outer }, memory).is_some()
+        let places = feet.map(|foot| skin.places[foot as usize]);
+        let feet = if piece.is_none() { Some(places) } else { None };
+        let triangle = piece.unwrap_or_else(|| corners.map(|corner| sheets.vertices[corner as usize]));
+        self.faces.fault_with(offer, &Question { triangle, feet, owners, inner, outer }, memory)
+    }
+
+    /// Some vertices of the surface, and those around these.
+    fn feet(&self, feet: BTreeSet<u32>) -> Vec<u32> {
+        let near = feet.into_iter().flat_map(|foot| self.skin.around.at(foot)).flat_map(|&triangle| self.skin.triangles[triangle as usize]);
+        let all: BTreeSet<u32> = near.collect();
+        all.into_iter().collect()
+    }
+
+    /// The face that is closest to a place, and the way from there to the place; none where none is near.
+    fn closest(&self, x: &Point) -> Option<(u32, Point)> {
+        let (mut least, mut found) = (f64::INFINITY, None);
+        self.faces.around(&[*x], AWAY * self.outer, |number| {
+            let face = &self.faces.all[number as usize];
+            if face.may_be_nearer(x, least) {
+                let way = subtract(x, &face.closest(x));
+                let square = dot(&way, &way);
+                if square < least {
+                    (least, found) = (square, Some((number, way)));
+                }
+            }
+            true
+        });
+        found
+    }
+
+    /// How far a triangle looks along the way to its middle from what is closest: a cosine.
+    fn leads(&self, triangle: &[Point; 3]) -> f64 {
+        let [a, b, c] = triangle;
+        let normal = unit(&cross(&subtract(b, a), &subtract(c, a)));
+        self.closest(&middle(triangle)).map_or(-1.0, |(_, way)| dot(&normal, &unit(&way)))
+    }
+
+    /// Whether all that a closed surface bounds, given by its triangles, is shown to be nearer than the outer distance by what may move: what is inside is no farther from it than half of what it is wide.
+    fn is_filled(&self, triangles: &[[Point; 3]]) -> bool {
+        let width = |along: &Point| {
+            let all = triangles.iter().flatten().map(|corner| dot(corner, along));
+            all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
+        };
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let normals = triangles.iter().filter_map(upright).take(MOST_NORMALS);
+        let half_width = 0.5 * axes.into_iter().chain(normals).map(|along| width(&along)).fold(f64::INFINITY, f64::min);
+        half_width < self.outer
+            && triangles.iter().all(|triangle| {
+                let centre = middle(triangle);
+                let reach = radius(triangle, &centre) + half_width;
+                self.closest(&centre).is_some_and(|(_, way)| dot(&way, &way).sqrt() + reach <= self.outer - self.moved)
+            })
     }
 }
 

@@ -343,6 +343,12 @@ impl Sheets {
         self.owners.push(NONE);
     }
 
+    /// Moves all vertices by as much along each axis at most, so that none is on a plane or a line of others.
+    pub(super) fn shake(&mut self, most: f64, round: impl Fn(f64) -> f64) {
+        let mut shaken = shaken(0);
+        self.vertices.iter_mut().for_each(|vertex| *vertex = vertex.map(|x| round(x + most * shaken())));
+    }
+
     /// What a triangle is called.
     pub(super) fn name(&self, triangle: u32) -> Name {
         self.triangles[triangle as usize].map(|corner| (self.vertices[corner as usize].map(f64::to_bits), self.feet[corner as usize]))
@@ -407,6 +413,15 @@ impl Sheets {
             }
             if is_first { i += 1 } else { j += 1 }
         }
+    }
+}
+
+/// Numbers from -1 to 1, one after the other, as if by chance (Knuth's linear congruential generator, TAOCP 3.3.4).
+pub(super) fn shaken(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
     }
 }
 

@@ -325,6 +325,22 @@ fn sheets_follow_level_sets() {
     }
 }
 
+/// A ball with bumps that bend by more than the radius: sheets cross themselves there.
+#[test]
+fn sheets_may_cross_themselves() {
+    let mut random = Random(181);
+    let bumpy = |cubes: u32, bend: f64| {
+        let wave = move |x: DVec3| 0.8 * (bend * x.x + 0.4).sin() * (bend * x.y + 0.2).sin() * (bend * x.z).cos();
+        Mesh::level_set(cubes, 15.6, |x| x.length() - 12.0 + wave(x))
+    };
+    assert_made(60, &bumpy(60, 0.7), [1.5, 0.15], (1, 1, 4), 50, &mut random);
+    // Parts that overlap are one.
+    let sheet = Mesh::vault(20, 16, 12.0, 20.0);
+    let double = sheet.clone().and(sheet.moved(DVec3::new(0.0, 0.0, 2.0_f64.sqrt())));
+    assert_made(1, &double, [1.0, 0.1], (1, 0, 2), 300, &mut random);
+    assert_steady(&double.turned(&mut random).lowered(), 1.0, 0.1);
+}
+
 /// A shape with seams, with the components, the cavities and the Euler number of its dilation.
 fn seamed(case: usize) -> (Mesh, (u64, u64, i64)) {
     // For the lesser tolerance, finer ones.
@@ -380,11 +396,11 @@ fn sheets_agree_with_the_lattice() {
     assert!((8..16).contains(&made), "{made}");
 }
 
-/// Sheets that come so near to each other that their dilations touch within the band, or meet, are left to others; so is what is filled at the radius.
+/// Sheets that come so near to each other that their dilations touch within the band are left to others, and so is what is filled at the radius; where they overlap by more they are cut.
 #[test]
-fn sheets_that_come_close_are_left_to_others() {
+fn sheets_that_touch_are_left_to_others() {
     let mut random = Random(131);
-    for (gap, is_made) in [(3.0, true), (2.45, true), (2.15, false), (2.0, false), (1.85, false), (1.0, false), (0.0, false)] {
+    for (gap, is_made) in [(3.0, true), (2.45, true), (2.15, true), (2.0, false), (1.85, false), (1.0, true), (0.0, false)] {
         let sheet = Mesh::vault(20, 16, 12.0, 20.0);
         let mesh = sheet.clone().and(sheet.moved(DVec3::new(0.0, 0.0, 2.0_f64.sqrt() * gap))).turned(&mut random);
         assert_eq!(mesh.is_made(1.0, 0.1), is_made, "{gap}");

@@ -2,7 +2,6 @@
 
 use super::coarse::lifted;
 use super::seams::Seam;
-use super::sheets::Sheets;
 use super::skin::{Skin, upright};
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
@@ -10,6 +9,7 @@ use crate::dilation::arrangement::between::{Body, lowest, middle};
 use crate::dilation::arrangement::faces::{Face, Faces};
 use crate::dilation::arrangement::polytopes::frame;
 use crate::dilation::convex::Convex;
+use crate::dilation::surface::BlockSurface;
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::topology::Incidence;
 use rayon::prelude::*;
@@ -122,13 +122,9 @@ impl<'a> Ways<'a> {
             Ok(group.iter().copied().filter(|&face| !is_whole && !ways.lead_from(&[face])).collect())
         };
         let left = groups.par_iter().with_min_len(FEW).map(left).collect::<Result<Vec<Vec<u32>>, Stopped>>()?.concat();
-        // Without seams, sheets would cross where these are.
-        if !left.is_empty() && skin.seams.all.is_empty() {
-            return Ok(false);
-        }
         let mut is_left = vec![false; skin.triangles.len()];
         left.iter().for_each(|&face| is_left[face as usize] = true);
-        Ok(all(&left, budget, |&face| ways.lead_from_parts(face, &is_left))?
+        Ok(all(&left, budget, |&face| ways.lead_from_parts(face, &is_left, &rays, &cones))?
             && all(&skin.borders, budget, |(ends, triangle)| ways.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
             && all(&skin.seams.all, budget, |seam| ways.lead_over(seam))?
             && all(&borders, budget, |&vertex| ways.lead_around(&at(vertex), &rays(vertex), &cones))?)
@@ -162,8 +158,7 @@ impl<'a> Ways<'a> {
 
     /// The same, or in directions that are sought, see [`Ways::lead_apart`].
     fn lead_somewhere(&self, places: &[Point], cone: &Cone) -> bool {
-        self.lead_along(places, cone)
-            || (!self.skin.seams.all.is_empty() && self.lead_apart(places, &cone.around(), [self.inner, self.outer]))
+        self.lead_along(places, cone) || self.lead_apart(places, &cone.around(), [self.inner, self.outer])
     }
 
     /// Whether it is so of what is between two distances from some places, in directions between some that are unit vectors, and has its closest place among these: for what is around a middle, by no more than h, of all faces that may be closest to some of it, each along a way that leads from its closest places by more than h.
@@ -207,7 +202,7 @@ impl<'a> Ways<'a> {
     }
 
     /// Likewise of the inside of a face, and of its inner sides and corners, on both sides of it, each in the directions that belong to it: of those that no face has which is not left, and no earlier one.
-    fn lead_from_parts(&self, face: u32, is_left: &[bool]) -> bool {
+    fn lead_from_parts(&self, face: u32, is_left: &[bool], rays: &impl Fn(u32) -> Vec<Point>, cones: &[Cone]) -> bool {
         let Skin { triangles, places, normals, mesh, around, .. } = self.skin;
         let (corners, normal) = (triangles[face as usize], normals[face as usize]);
         let at = corners.map(|corner| places[corner as usize]);
@@ -235,7 +230,10 @@ impl<'a> Ways<'a> {
             let all: Vec<Point> = all.iter().map(|&other| along(other, side)).collect();
             let axis = mean(all.iter().copied());
             let cosine = all.iter().map(|way| dot(way, &axis)).fold(1.0, f64::min) - NOISE;
-            cosine > FRAC_1_SQRT_2 && self.lead_apart(&[at[k]], &Cone::new(axis, cosine).around(), between)
+            match cosine > FRAC_1_SQRT_2 {
+                true => self.lead_apart(&[at[k]], &Cone::new(axis, cosine).around(), between),
+                false => self.lead_around(&at[k], &rays(corners[k]), cones),
+            }
         };
         [1.0, -1.0].into_iter().all(|side: f64| {
             self.lead_apart(&at, &[along(face, side)], between)
@@ -339,29 +337,32 @@ impl<'a> Ways<'a> {
         })
     }
 
-    /// The triangles of sheets at which no such directions are found that leave the sheets, too: those of corners, normals of triangles, or means of two of these at their common side. Where there are slivers, only these.
+    /// The triangles of a surface at which no such directions are found that leave it, too: those of corners, as given or means of those of their triangles, normals of triangles, or means of two of these at their common side. Slivers are among these.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn not_left(&self, sheets: &Sheets, budget: &Budget) -> Result<Vec<u32>, Stopped> {
-        let mesh = HalfEdges::new(sheets.vertices.clone(), &sheets.triangles);
-        let around = Incidence::new(sheets.vertices.len(), &sheets.triangles);
-        let at = |corner: u32| sheets.vertices[corner as usize];
-        let way = |corner: u32| &sheets.ways[corner as usize];
-        let numbers: Vec<u32> = (0..sheets.triangles.len() as u32).collect();
-        let corners = |triangle: u32| sheets.triangles[triangle as usize];
-        let normals: Vec<Option<Point>> = numbers.iter().map(|&triangle| upright(&corners(triangle).map(at))).collect();
-        let Some(normals) = normals.iter().copied().collect::<Option<Vec<Point>>>() else {
-            return Ok(numbers.into_iter().filter(|&triangle| normals[triangle as usize].is_none()).collect());
-        };
+    pub(super) fn not_left(&self, surface: &BlockSurface, ways: &[Option<Point>], budget: &Budget) -> Result<Vec<u32>, Stopped> {
+        let mesh = HalfEdges::new(surface.vertices.clone(), &surface.triangles);
+        let around = Incidence::new(surface.vertices.len(), &surface.triangles);
+        let at = |corner: u32| surface.vertices[corner as usize];
+        let numbers: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+        let corners = |triangle: u32| surface.triangles[triangle as usize];
+        // Nothing leads through a sliver.
+        let normals: Vec<Point> = numbers.iter().map(|&triangle| upright(&corners(triangle).map(at)).unwrap_or_default()).collect();
         let leads = |way: &Point, triangle: u32| dot(way, &normals[triangle as usize]) > NOISE;
+        let leading = |vertex: u32| {
+            let all = around.at(vertex);
+            let mean = (!all.is_empty()).then(|| mean(all.iter().map(|&other| normals[other as usize])));
+            ways[vertex as usize].into_iter().chain(mean).find(|way| all.iter().all(|&other| leads(way, other)))
+        };
+        let ways: Vec<Option<Point>> = (0..surface.vertices.len() as u32).into_par_iter().map(leading).collect();
         let is_left = |triangle: u32| {
             let (own, places, up) = (corners(triangle), corners(triangle).map(at), &normals[triangle as usize]);
-            if !own.iter().all(|&corner| leads(way(corner), triangle)) {
+            if *up == [0.0; 3] {
                 return false;
             }
             // Corners whose ways serve all of the triangle.
-            let serves = own.map(|corner| self.leaves_all(&places, way(corner)));
+            let serves = own.map(|corner| ways[corner as usize].as_ref().is_some_and(|way| self.leaves_all(&places, way)));
             let is_side_left = |k: usize| {
                 let twin = mesh.twin(3 * triangle + k as u32);
                 let ends = [k, (k + 1) % 3];
@@ -369,14 +370,15 @@ impl<'a> Ways<'a> {
                     && (ends.iter().any(|&end| serves[end]) || {
                         let mean = unit(&std::array::from_fn(|axis| up[axis] + normals[(twin / 3) as usize][axis]));
                         let through = [*up, normals[(twin / 3) as usize]];
-                        leads(&mean, triangle)
-                            && leads(&mean, twin / 3)
-                            && self.leaves_between(&ends.map(|end| places[end]), &mean, &through)
+                        let along = (leads(&mean, triangle) && leads(&mean, twin / 3)).then_some(&mean);
+                        self.leaves_between(&ends.map(|end| places[end]), along, &through)
                     })
             };
             let facets = |k: usize| -> Vec<Point> { around.at(own[k]).iter().map(|&other| normals[other as usize]).collect() };
-            let is_corner_left = |k: usize| serves[k] || self.leaves_between(&[places[k]], way(own[k]), &facets(k));
-            (serves.contains(&true) || self.leaves_between(&places, up, &[*up])) && (0..3).all(is_side_left) && (0..3).all(is_corner_left)
+            let is_corner_left = |k: usize| serves[k] || self.leaves_between(&[places[k]], ways[own[k] as usize].as_ref(), &facets(k));
+            (serves.contains(&true) || self.leaves_between(&places, Some(up), &[*up]))
+                && (0..3).all(is_side_left)
+                && (0..3).all(is_corner_left)
         };
         let look = |row: &[u32]| {
             budget.cancel.check()?;
@@ -387,8 +389,8 @@ impl<'a> Ways<'a> {
     }
 
     /// Whether all faces that are as near to some place of a corner, a side or a triangle are left behind along a direction, or those closest to it along another one that leads through some facets, which may be told of parts.
-    fn leaves_between(&self, places: &[Point], along: &Point, through: &[Point]) -> bool {
-        if self.leaves(places, along, lowest(places, along)) {
+    fn leaves_between(&self, places: &[Point], along: Option<&Point>, through: &[Point]) -> bool {
+        if along.is_some_and(|along| self.leaves(places, along, lowest(places, along))) {
             return true;
         }
         match self.halves(places, SHORT) {
