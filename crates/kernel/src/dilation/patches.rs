@@ -9,7 +9,6 @@ use super::setting::Setting;
 use super::simplify::{Core, OF_POLYTOPES, Simplifier};
 use super::surface::BlockSurface;
 use super::tree::NodeId;
-use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::solid::half_edges::NONE;
 
@@ -184,10 +183,6 @@ impl<'a> Patches<'a> {
 }
 
 impl BlockSurface {
-    fn corners(&self, triangle: u32) -> [&Point; 3] {
-        self.triangles[triangle as usize].map(|corner| &self.vertices[corner as usize])
-    }
-
     fn is_within(&self, triangle: u32, core: &Core) -> bool {
         self.corners(triangle).iter().all(|corner| core.contains(corner))
     }

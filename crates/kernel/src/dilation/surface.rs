@@ -60,7 +60,7 @@ pub(super) type Blocks = BTreeMap<[i64; 3], Mutex<BlockSurface>>;
 
 impl BlockSurface {
     /// Where the corners of a triangle are.
-    pub(super) fn places(&self, triangle: u32) -> [Point; 3] {
+    pub(super) fn corners(&self, triangle: u32) -> [Point; 3] {
         self.triangles[triangle as usize].map(|corner| self.vertices[corner as usize])
     }
 

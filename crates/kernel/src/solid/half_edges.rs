@@ -82,11 +82,13 @@ impl HalfEdges {
             own.sort_unstable_by_key(|&half| (ends_of(half, &self.corners)[1], half));
             for edge in own.chunk_by(|&a, &b| ends_of(a, &self.corners)[1] == ends_of(b, &self.corners)[1]) {
                 for (index, &half) in edge.iter().enumerate() {
-                    let (from, is_single) = (self.corners[half as usize], |half: u32| self.twins[half as usize] == NONE);
                     // Each has one twin at most, where more than two triangles meet, too.
-                    let is_twin = |&&other: &&u32| is_single(other) && self.corners[other as usize] != from;
-                    let other = edge[index + 1..].iter().find(is_twin).copied().filter(|_| is_single(half));
-                    if let Some(other) = other {
+                    if self.twins[half as usize] != NONE {
+                        continue;
+                    }
+                    let from = self.corners[half as usize];
+                    let is_twin = |&&other: &&u32| self.twins[other as usize] == NONE && self.corners[other as usize] != from;
+                    if let Some(&other) = edge[index + 1..].iter().find(is_twin) {
                         self.twins[half as usize] = other;
                         self.twins[other as usize] = half;
                     }

@@ -64,7 +64,7 @@ impl Topology {
                 let mut part = Self::default();
                 let mut link = Vec::new();
                 for vertex in chunk * CHUNK..((chunk + 1) * CHUNK).min(count) {
-                    around.link(mesh, vertex as u32, &mut link);
+                    around.link(&mesh.triangles, vertex as u32, &mut link);
                     part.add_vertex(vertex as u32, &mut link);
                 }
                 part
@@ -223,10 +223,16 @@ impl Incidence {
         &self.triangles[self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
     }
 
-    fn link(&self, mesh: &TriMesh, vertex: u32, link: &mut Vec<(u32, u32)>) {
+    /// Whether a vertex's triangles are one closed fan, or it has none; `link` is working memory.
+    pub(crate) fn is_ring(&self, triangles: &[[u32; 3]], vertex: u32, link: &mut Vec<(u32, u32)>) -> bool {
+        self.link(triangles, vertex, link);
+        link.is_empty() || is_cycle(link)
+    }
+
+    fn link(&self, triangles: &[[u32; 3]], vertex: u32, link: &mut Vec<(u32, u32)>) {
         link.clear();
         link.extend(self.at(vertex).iter().map(|&triangle| {
-            let corners = mesh.triangles[triangle as usize];
+            let corners = triangles[triangle as usize];
             let at = corners.iter().position(|&corner| corner == vertex).unwrap_or(0);
             (corners[(at + 1) % 3], corners[(at + 2) % 3])
         }));

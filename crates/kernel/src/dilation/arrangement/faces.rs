@@ -203,27 +203,44 @@ impl Faces {
 
 /// The map from a triangle to another, corner by corner.
 struct Foot {
-    origin: Point,
+    shares: Shares,
     first: Point,
-    /// Vectors that tell how much of two sides a way has, and where these lead.
-    shares: [Point; 2],
+    /// Where two sides lead.
     ways: [Point; 2],
+}
+
+/// Coordinates in a triangle: the shares of its second and third corner.
+pub(super) struct Shares {
+    origin: Point,
+    /// Vectors that tell how much of two sides a way has.
+    dual: [Point; 2],
+}
+
+impl Shares {
+    /// None for a triangle without area.
+    pub(super) fn new([a, b, c]: &[Point; 3]) -> Option<Self> {
+        let [p, q] = [subtract(b, a), subtract(c, a)];
+        let [pp, pq, qq] = [dot(&p, &p), dot(&p, &q), dot(&q, &q)];
+        let double = pp * qq - pq * pq;
+        let dual = |own: &Point, other: &Point, square: f64| std::array::from_fn(|axis| (square * own[axis] - pq * other[axis]) / double);
+        (double > 0.0).then(|| Self { origin: *a, dual: [dual(&p, &q, qq), dual(&q, &p, pp)] })
+    }
+
+    pub(super) fn of(&self, x: &Point) -> [f64; 2] {
+        let way = subtract(x, &self.origin);
+        self.dual.each_ref().map(|dual| dot(&way, dual))
+    }
 }
 
 impl Foot {
     /// None for a triangle without area.
     fn new(triangle: &[Point; 3], feet: &[Point; 3]) -> Option<Self> {
-        let [p, q] = [1, 2].map(|k| subtract(&triangle[k], &triangle[0]));
-        let [pp, pq, qq] = [dot(&p, &p), dot(&p, &q), dot(&q, &q)];
-        let double = pp * qq - pq * pq;
-        let dual = |own: &Point, other: &Point, square: f64| std::array::from_fn(|axis| (square * own[axis] - pq * other[axis]) / double);
         let ways = [1, 2].map(|k| subtract(&feet[k], &feet[0]));
-        (double > 0.0).then(|| Self { origin: triangle[0], first: feet[0], shares: [dual(&p, &q, qq), dual(&q, &p, pp)], ways })
+        Some(Self { shares: Shares::new(triangle)?, first: feet[0], ways })
     }
 
     fn of(&self, x: &Point) -> Point {
-        let way = subtract(x, &self.origin);
-        let [a, b] = self.shares.map(|share| dot(&way, &share));
+        let [a, b] = self.shares.of(x);
         std::array::from_fn(|axis| self.first[axis] + a * self.ways[0][axis] + b * self.ways[1][axis])
     }
 }

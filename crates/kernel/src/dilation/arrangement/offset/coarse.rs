@@ -182,9 +182,10 @@ impl Triangle {
         for ((sheet, is_inverted), side) in sheets.iter_mut().zip(&mut is_inverted).zip([radius, -radius]) {
             let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side));
             let own = unit(&across(&out));
-            *is_inverted = dot(&own, &normal) < LEAST_COSINE;
+            let cosine = dot(&own, &normal);
+            *is_inverted = cosine < LEAST_COSINE;
             *sheet = (out[0], own);
-            if dot(&own, &normal) < 0.0 {
+            if cosine < 0.0 {
                 continue;
             }
             // Of a curve with these normals at its ends.
@@ -210,10 +211,11 @@ impl Triangle {
     fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
         let (x, up) = (&skin.places[vertex as usize], &skin.ups[vertex as usize]);
         let own = radius.copysign(dot(&self.normal, up));
-        let off = |(at, normal): &(Point, Point), side: f64| dot(normal, &subtract(&lifted(x, up, side * own), at)).abs();
-        let [upper, lower] = [0, 1].map(|k| dot(&self.sheets[k].1, &self.normal) < 0.0);
-        let counted = |is_inverted: bool, off: f64| if is_inverted { 0.0 } else { off };
-        counted(upper, off(&self.sheets[0], 1.0)).max(counted(lower, off(&self.sheets[1], -1.0)))
+        // Sheets that look the other way are cut away.
+        let off = |(at, normal): &(Point, Point), side: f64| {
+            if dot(normal, &self.normal) < 0.0 { 0.0 } else { dot(normal, &subtract(&lifted(x, up, side * own), at)).abs() }
+        };
+        off(&self.sheets[0], 1.0).max(off(&self.sheets[1], -1.0))
     }
 }
 
@@ -385,19 +387,18 @@ impl<'a> Coarse<'a> {
             let corners = [ring[m], ring[k], ring[(k + 1) % count]];
             let Some(own) = Fresh::new(skin, *radius, height.min(heights[k]), corners) else { return false };
             let is_turned = matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0);
-            // What has a hidden corner will not be left as it is, nor will what is inverted.
+            // What has a hidden corner will not be left as it is.
             let has_hidden = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);
             let before = inverted[(mender.star.halves[k] / 3) as usize];
             let is_new = (0..2).any(|side| own.is_inverted()[side] && !before[side]);
             if is_turned || (is_new && !has_hidden) {
                 return false;
             }
-            let is_passing = has_hidden;
             let is_off = |&corner: &u32| corner != skin.beyond() && own.sag() > share * most[corner as usize];
-            if !is_passing && corners.iter().any(is_off) {
+            if !has_hidden && corners.iter().any(is_off) {
                 return false;
             }
-            fresh.push((own, is_passing));
+            fresh.push((own, has_hidden));
         }
         let Removed { around, owners, .. } = removed;
         owners.clear();
@@ -405,8 +406,8 @@ impl<'a> Coarse<'a> {
             let depths = fresh.iter().map(|(own, _)| own.depth(skin, vertex)).enumerate();
             let Some((owner, _)) = depths.max_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
             owners.push(owner);
-            let (own, is_passing) = &fresh[owner];
-            *is_passing || own.error(skin, *radius, vertex) <= share * most[vertex as usize]
+            let (own, has_hidden) = &fresh[owner];
+            *has_hidden || own.error(skin, *radius, vertex) <= share * most[vertex as usize]
         })
     }
 

@@ -11,6 +11,7 @@ use super::sheets::{Name, Sheets};
 use super::skin::{Edge, Skin, edges};
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
+use crate::dilation::arrangement::faces::Shares;
 use crate::dilation::arrangement::plane::{Mesh, corners, handle, join};
 use crate::dilation::surface::NameMap;
 use crate::groups::Groups;
@@ -77,13 +78,9 @@ impl Pieces {
     /// [`Stopped`].
     pub(super) fn of(sheets: &Sheets, skin: &Skin, round: &(impl Fn(f64) -> f64 + Sync), budget: &Budget) -> Result<Option<Self>, Stopped> {
         let mut all = Self { vertices: sheets.vertices.clone(), triangles: Vec::new(), owners: Vec::new(), off: 0.0, is_cut: false };
-        let groups = Groups::of_triangles(sheets.vertices.len(), &sheets.triangles).all();
-        let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for (triangle, corners) in (0..).zip(&sheets.triangles) {
-            parts.entry(groups[corners[0] as usize]).or_default().push(triangle);
-        }
+        let parts = parts(sheets.vertices.len(), &sheets.triangles);
         let foot = |corner: u32| &skin.places[sheets.feet[corner as usize] as usize];
-        for part in parts.values() {
+        for part in &parts {
             let corners = || part.iter().map(|&triangle| sheets.triangles[triangle as usize]);
             let volumes = corners().map(|[a, b, c]| dot(foot(a), &cross(foot(b), foot(c))));
             let (volume, size) = volumes.fold((0.0, 0.0), |(volume, size): (f64, f64), own| (volume + own, size + own.abs()));
@@ -202,9 +199,8 @@ impl Pieces {
 
     /// What the triangles of sheets are called that have no fault, and whether they are whole.
     pub(super) fn good(&self, sheets: &Sheets, faults: &[(u32, bool)]) -> HashSet<(Name, bool)> {
-        let mut is_good = vec![true; sheets.triangles.len()];
-        faults.iter().for_each(|&(triangle, _)| is_good[triangle as usize] = false);
-        let all = (0..).zip(self.whole(sheets)).filter(|&(triangle, _)| is_good[triangle as usize]);
+        let is_fault: HashSet<u32> = faults.iter().map(|fault| fault.0).collect();
+        let all = (0..).zip(self.whole(sheets)).filter(|(triangle, _)| !is_fault.contains(triangle));
         all.map(|(triangle, is_whole)| (sheets.name(triangle), is_whole)).collect()
     }
 
@@ -213,12 +209,7 @@ impl Pieces {
         if !self.is_cut {
             return;
         }
-        let groups = Groups::of_triangles(self.vertices.len(), &self.triangles).all();
-        let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for (triangle, corners) in (0..).zip(&self.triangles) {
-            parts.entry(groups[corners[0] as usize]).or_default().push(triangle);
-        }
-        let parts: Vec<Vec<u32>> = parts.into_values().collect();
+        let parts = parts(self.vertices.len(), &self.triangles);
         let is_gone = |part: &Vec<u32>| is_none(&part.iter().map(|&piece| self.corners(piece)).collect::<Vec<_>>());
         let gone: Vec<bool> = parts.par_iter().map(is_gone).collect();
         let mut is_kept = vec![true; self.triangles.len()];
@@ -313,9 +304,9 @@ impl Cutting<'_> {
                 continue;
             }
             budget.cancel.check()?;
-            let frame = self.frame(triangle);
+            let Some(shares) = self.shares(triangle) else { return Ok(false) };
             let own: Vec<Segment> = self.segments[triangle as usize].iter().copied().filter(|own| own.other > triangle).collect();
-            let flat: Vec<[[f64; 2]; 2]> = own.iter().map(|own| own.ends.map(|end| frame.of(self.at(end)))).collect();
+            let flat: Vec<[[f64; 2]; 2]> = own.iter().map(|own| own.ends.map(|end| shares.of(self.at(end)))).collect();
             for (k, l) in (0..own.len()).flat_map(|l| (0..l).map(move |k| (k, l))) {
                 if own[k].ends.iter().any(|end| own[l].ends.contains(end)) {
                     continue;
@@ -339,8 +330,9 @@ impl Cutting<'_> {
         Ok(true)
     }
 
-    fn frame(&self, triangle: u32) -> Frame {
-        Frame::new(&self.mesh.triangles[triangle as usize].map(|corner| *self.at(corner)))
+    /// Coordinates in a triangle; none where it has no area.
+    fn shares(&self, triangle: u32) -> Option<Shares> {
+        Shares::new(&self.mesh.triangles[triangle as usize].map(|corner| *self.at(corner)))
     }
 
     /// The pieces of a triangle; none where rounding hides what these are.
@@ -367,14 +359,14 @@ impl Cutting<'_> {
             chain.push(ends[1]);
             plane.join(&chain)?;
         }
-        let frame = self.frame(triangle);
+        let shares = self.shares(triangle)?;
         for Segment { ends, other } in segments {
             let pair = [triangle.min(*other), triangle.max(*other)];
             let middle = self.on_segments.get(&pair).into_iter().flatten().map(|&(_, vertex)| vertex);
             let chain: Vec<u32> = std::iter::once(ends[0]).chain(middle).chain([ends[1]]).collect();
             for &vertex in &chain {
                 if !plane.vertices.contains(&vertex) {
-                    plane.add(vertex, frame.of(self.at(vertex)))?;
+                    plane.add(vertex, shares.of(self.at(vertex)))?;
                     plane.sides.push(0);
                 }
             }
@@ -384,25 +376,14 @@ impl Cutting<'_> {
     }
 }
 
-/// Coordinates in a triangle: the shares of its second and third corner.
-struct Frame {
-    origin: Point,
-    shares: [Point; 2],
-}
-
-impl Frame {
-    fn new([a, b, c]: &[Point; 3]) -> Self {
-        let [p, q] = [subtract(b, a), subtract(c, a)];
-        let [pp, pq, qq] = [dot(&p, &p), dot(&p, &q), dot(&q, &q)];
-        let double = pp * qq - pq * pq;
-        let dual = |own: &Point, other: &Point, square: f64| std::array::from_fn(|axis| (square * own[axis] - pq * other[axis]) / double);
-        Self { origin: *a, shares: [dual(&p, &q, qq), dual(&q, &p, pp)] }
+/// The triangles of each of the surfaces that hang together.
+fn parts(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let groups = Groups::of_triangles(vertices, triangles).all();
+    let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (triangle, corners) in (0..).zip(triangles) {
+        parts.entry(groups[corners[0] as usize]).or_default().push(triangle);
     }
-
-    fn of(&self, x: &Point) -> [f64; 2] {
-        let way = subtract(x, &self.origin);
-        self.shares.each_ref().map(|share| dot(&way, share))
-    }
+    parts.into_values().collect()
 }
 
 /// How far along both of two segments they cross, if they do.

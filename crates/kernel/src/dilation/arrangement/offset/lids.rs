@@ -12,6 +12,7 @@ use crate::dilation::arrangement::polytopes::frame;
 use crate::dilation::surface::BlockSurface;
 use crate::solid::TriMesh;
 use crate::solid::half_edges::NONE;
+use crate::split_mix::{Random, mix};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -55,7 +56,7 @@ impl Around<'_> {
         let mut places = Vec::new();
         for &triangle in triangles {
             budget.cancel.check()?;
-            parts(surface.places(triangle), 0.5 * reach, &mut places);
+            parts(surface.corners(triangle), 0.5 * reach, &mut places);
         }
         let lid = |places: &Vec<Point>| {
             budget.cancel.check()?;
@@ -97,8 +98,8 @@ impl Around<'_> {
             corners.push(self.at(&beside(below(SIDES - TOP), wide + SLOPE * half, corner), SIDES)?);
         }
         corners.push(below(BOTTOM - TOP));
-        let mut shaken = shaken(corners.iter().flatten().fold(0, |seed, x| (seed ^ x.to_bits()).rotate_left(17)));
-        corners.iter_mut().for_each(|corner| *corner = corner.map(|x| round(x + SHAKEN * half * shaken())));
+        let mut random = Random(corners.iter().flatten().fold(0, |seed, x| mix(seed ^ x.to_bits())));
+        corners.iter_mut().for_each(|corner| *corner = shaken(corner, SHAKEN * half, &mut random).map(round));
         let triangles: Vec<[u32; 3]> = (0..CORNERS)
             .flat_map(|corner| {
                 let next = (corner + 1) % CORNERS;

@@ -189,10 +189,7 @@ fn along(
         }
         let faults = around.faults(&sheets, &pieces, &good, if may_move { outer - moved } else { outer }, budget)?;
         if faults.is_empty() || (round_number >= NEARLY && faults.iter().all(|fault| fault.1)) {
-            let is_fault: HashSet<u32> = faults.iter().map(|fault| fault.0).collect();
-            let owners = pieces.owners.clone();
-            let is_good = |piece: &u32| !is_fault.contains(&owners[*piece as usize]);
-            let mut outcome = Outcome::new(&sheets, pieces, (0..owners.len() as u32).filter(is_good));
+            let mut outcome = Outcome::new(&sheets, pieces, &faults);
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
             if !flaws.not_left.is_empty() && evenings < EVENINGS {
                 let (feet, evened) = (around.feet(outcome.feet(&flaws.not_left)), evened.get_or_insert_with(|| skin.clone()));

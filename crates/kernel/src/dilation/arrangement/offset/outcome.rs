@@ -1,9 +1,9 @@
 //! What is left of sheets that were cut, and what of it is not as it has to be.
 
-use super::Around;
 use super::crossed::Pieces;
 use super::sheets::Sheets;
 use super::ways::Ways;
+use super::{Around, IN_A_ROW};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::Memory;
@@ -19,8 +19,6 @@ use std::collections::{BTreeSet, HashSet};
 
 /// The cosine from which on a triangle looks back.
 const BACK: f64 = 0.05;
-/// Triangles one after the other.
-const IN_A_ROW: usize = 64;
 
 /// A closed surface, and of places of sheets the vertices of the surface that these are out from, and the ways from there.
 pub(super) struct Outcome {
@@ -61,19 +59,21 @@ impl Flaws {
 }
 
 impl Outcome {
-    /// Given which pieces are known to be between the distances.
-    pub(super) fn new(sheets: &Sheets, pieces: Pieces, good: impl Iterator<Item = u32>) -> Self {
+    /// Given the triangles of sheets that have faults: pieces of others are between the distances.
+    pub(super) fn new(sheets: &Sheets, pieces: Pieces, faults: &[(u32, bool)]) -> Self {
         let places = sheets.vertices.iter().map(|vertex| vertex.map(f64::to_bits));
         let from = places.zip(sheets.feet.iter().copied().zip(sheets.ways.iter().copied())).collect();
-        let Pieces { vertices, triangles, off, is_cut, .. } = pieces;
+        let is_fault: HashSet<u32> = faults.iter().map(|fault| fault.0).collect();
+        let Pieces { vertices, triangles, owners, off, is_cut } = pieces;
         let surface = BlockSurface { vertices, triangles, ..BlockSurface::default() };
-        let good = good.map(|piece| name(surface.places(piece))).collect();
+        let good = (0..).zip(owners).filter(|(_, owner)| !is_fault.contains(owner));
+        let good = good.map(|(piece, _)| name(surface.corners(piece))).collect();
         Self { surface, from, good, off, is_cut }
     }
 
     /// The vertices of the surface that some of its triangles are out from.
     pub(super) fn feet(&self, triangles: &[u32]) -> BTreeSet<u32> {
-        let corners = triangles.iter().flat_map(|&triangle| self.surface.places(triangle));
+        let corners = triangles.iter().flat_map(|&triangle| self.surface.corners(triangle));
         corners.filter_map(|corner| self.from.get(&corner.map(f64::to_bits))).map(|own| own.0).collect()
     }
 
@@ -93,7 +93,7 @@ impl Outcome {
                 (self.surface.vertices, self.surface.triangles) = (points, triangles);
                 around.tidy(&mut self.surface, budget)?;
                 // Vertices at one place are one, and pinched.
-                let corners: Vec<[Point; 3]> = self.numbers().map(|triangle| self.surface.places(triangle)).collect();
+                let corners: Vec<[Point; 3]> = self.numbers().map(|triangle| self.surface.corners(triangle)).collect();
                 (self.surface.vertices, self.surface.triangles) = numbered(&corners);
                 let is_pinched = pinched(&self.surface);
                 let at = |corner: u32| is_pinched.contains(&corner);
@@ -106,7 +106,7 @@ impl Outcome {
         let way = |vertex: &Point| self.from.get(&vertex.map(f64::to_bits)).map(|own| own.1);
         let all: Vec<Option<Point>> = self.surface.vertices.iter().map(way).collect();
         flaws.not_left = ways.not_left(&self.surface, &all, budget)?;
-        let is_back = |triangle: &&u32| around.leads(&self.surface.places(**triangle)) < BACK;
+        let is_back = |triangle: &&u32| around.leads(&self.surface.corners(**triangle)) < BACK;
         flaws.back = flaws.not_left.par_iter().filter(is_back).copied().collect();
         Ok(flaws)
     }
@@ -137,12 +137,12 @@ impl Outcome {
 
     /// The triangles that are nearer or farther than they have to be, of those that are not known to be good.
     fn look(&mut self, around: &Around<'_>, budget: &Budget) -> Result<Vec<u32>, Stopped> {
-        let open: Vec<u32> = self.numbers().filter(|&triangle| !self.good.contains(&name(self.surface.places(triangle)))).collect();
+        let open: Vec<u32> = self.numbers().filter(|&triangle| !self.good.contains(&name(self.surface.corners(triangle)))).collect();
         let look = |row: &[u32]| {
             budget.cancel.check()?;
             let mut memory = Memory::default();
             let mut is_off = |&triangle: &u32| {
-                let triangle = self.surface.places(triangle);
+                let triangle = self.surface.corners(triangle);
                 let question = Question { triangle, feet: None, owners: [NONE; 3], inner: around.inner, outer: around.outer };
                 let offer = |x: &Point| around.closest(x).map(|own| own.0);
                 around.faces.fault_with(offer, &question, &mut memory).is_some()
@@ -151,7 +151,7 @@ impl Outcome {
         };
         let found: Vec<Vec<bool>> = open.par_chunks(IN_A_ROW).map(look).collect::<Result<_, Stopped>>()?;
         let (off, good): (Vec<_>, Vec<_>) = open.into_iter().zip(found.into_iter().flatten()).partition(|(_, is_off)| *is_off);
-        self.good.extend(good.into_iter().map(|(triangle, _)| name(self.surface.places(triangle))));
+        self.good.extend(good.into_iter().map(|(triangle, _)| name(self.surface.corners(triangle))));
         Ok(off.into_iter().map(|(triangle, _)| triangle).collect())
     }
 }
@@ -199,24 +199,7 @@ fn doubled(triangles: &[[u32; 3]]) -> Vec<u32> {
 /// The vertices whose triangles are no single ring.
 fn pinched(surface: &BlockSurface) -> HashSet<u32> {
     let around = Incidence::new(surface.vertices.len(), &surface.triangles);
-    let sides = |triangle: u32, vertex: u32| {
-        let corners = surface.triangles[triangle as usize];
-        let k = (0..3).find(|&k| corners[k] == vertex).unwrap_or_default();
-        [corners[(k + 1) % 3], corners[(k + 2) % 3]]
-    };
-    let is_ring = |vertex: u32| {
-        let own = around.at(vertex);
-        let Some(&first) = own.first() else { return true };
-        let mut triangle = first;
-        for step in 1..=own.len() {
-            let [_, out] = sides(triangle, vertex);
-            let Some(&next) = own.iter().find(|&&other| sides(other, vertex)[0] == out) else { return false };
-            triangle = next;
-            if (triangle == first) != (step == own.len()) {
-                return false;
-            }
-        }
-        true
-    };
-    (0..surface.vertices.len() as u32).into_par_iter().filter(|&vertex| !is_ring(vertex)).collect()
+    let all = 0..surface.vertices.len() as u32;
+    let is_pinched = |link: &mut Vec<(u32, u32)>, vertex: u32| (!around.is_ring(&surface.triangles, vertex, link)).then_some(vertex);
+    all.into_par_iter().map_init(Vec::new, is_pinched).flatten().collect()
 }

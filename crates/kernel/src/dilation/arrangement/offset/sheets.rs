@@ -6,6 +6,7 @@ use super::skin::{Skin, edges};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::dilation::surface::NameMap;
 use crate::solid::half_edges::NONE;
+use crate::split_mix::Random;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -345,8 +346,8 @@ impl Sheets {
 
     /// Moves all vertices by as much along each axis at most, so that none is on a plane or a line of others.
     pub(super) fn shake(&mut self, most: f64, round: impl Fn(f64) -> f64) {
-        let mut shaken = shaken(0);
-        self.vertices.iter_mut().for_each(|vertex| *vertex = vertex.map(|x| round(x + most * shaken())));
+        let mut random = Random(0);
+        self.vertices.iter_mut().for_each(|vertex| *vertex = shaken(vertex, most, &mut random).map(&round));
     }
 
     /// What a triangle is called.
@@ -416,13 +417,9 @@ impl Sheets {
     }
 }
 
-/// Numbers from -1 to 1, one after the other, as if by chance (Knuth's linear congruential generator, TAOCP 3.3.4).
-pub(super) fn shaken(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
-    }
+/// A place, moved by as much along each axis at most, as if by chance.
+pub(super) fn shaken(x: &Point, most: f64, random: &mut Random) -> Point {
+    x.map(|x| x + most * (2.0 * random.share() - 1.0))
 }
 
 /// Directions between two, evenly, in as many rows as the angle takes.
