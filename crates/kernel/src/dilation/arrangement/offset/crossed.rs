@@ -27,8 +27,8 @@ use std::collections::{BTreeMap, HashSet};
 
 /// Pairs of triangles that cross at most, for each triangle.
 const MOST_CROSSINGS: usize = 16;
-/// How far before and behind a triangle it is asked how often the surface winds around that, as a share of its longest side.
-const BESIDE: f64 = 1e-6;
+/// How far before and behind a piece it is asked how often the surface winds around that, as shares of its longest side: where sheets fold back another one may be nearer than the first.
+const BESIDE: [f64; 3] = [1e-6, 1e-8, 1e-10];
 /// How long a piece is at least, as a share of coordinates, that it is asked at.
 const TOLD: f64 = 1e-7;
 /// Segments of a triangle at most.
@@ -496,12 +496,13 @@ fn labels(mesh: &TriMesh, vertices: &[Point], pieces: &[[u32; 3]], owners: &[u32
         let [a, b, c] = pieces[piece as usize].map(|corner| &vertices[corner as usize]);
         distance_squared(a, b).max(distance_squared(b, c)).max(distance_squared(c, a)).sqrt()
     };
-    // How often it winds just before and behind a piece.
-    let around = |piece: u32| {
+    // How often it winds just before a piece, where that is once less than behind it.
+    let around = |piece: u32, by: f64| {
         let [a, b, c] = pieces[piece as usize].map(|corner| &vertices[corner as usize]);
-        let (up, by) = (unit(&normal(owners[piece as usize])), BESIDE * long(piece));
-        [by, -by]
-            .map(|by| inside.winding(DVec3::from_array(std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0 + by * up[axis]))))
+        let (up, by) = (unit(&normal(owners[piece as usize])), by * long(piece));
+        let beside = |by: f64| DVec3::from_array(std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0 + by * up[axis]));
+        let before = inside.winding(beside(by));
+        (inside.winding(beside(-by)) == before + 1).then_some(before)
     };
     let mut labels: Vec<Option<i64>> = vec![None; pieces.len()];
     for first in 0..pieces.len() as u32 {
@@ -528,15 +529,12 @@ fn labels(mesh: &TriMesh, vertices: &[Point], pieces: &[[u32; 3]], owners: &[u32
         let Some(best) = all.iter().map(|&group| largest[group as usize]).max_by(|a, b| area(a).total_cmp(&area(b)).then(b.cmp(a))) else {
             continue;
         };
-        let [before, behind] = around(best);
-        if behind != before + 1 {
-            return Ok(None);
-        }
+        let Some(before) = BESIDE.into_iter().find_map(|by| around(best, by)) else { return Ok(None) };
         let more = before - labels[groups[best as usize] as usize].unwrap_or_default();
         // The others have to be so, too, as far as rounding lets it be told.
         let is_so = |&group: &u32| {
             let (piece, label) = (largest[group as usize], labels[group as usize].unwrap_or_default() + more);
-            long(piece) < TOLD * wide || around(piece) == [label, label + 1]
+            long(piece) < TOLD * wide || BESIDE.into_iter().any(|by| around(piece, by) == Some(label))
         };
         if !all.par_iter().all(is_so) {
             return Ok(None);
