@@ -54,6 +54,8 @@ pub(crate) struct SiteRule<'a> {
     tolerance: f64,
     /// The share that sites use of what they may be off.
     coarseness: f64,
+    /// See [`SITE_SHARE`].
+    share: f64,
     choices: Vec<Choice>,
     /// States that roots reach.
     used: Vec<usize>,
@@ -62,8 +64,9 @@ pub(crate) struct SiteRule<'a> {
 }
 
 /// The share of r^2 - (r - e)^2 that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
-/// needs a finer lattice.
+/// needs a finer lattice. Where points stand for cells it is fine anyway, and their number decides: their share is what they may be off outwards, nearly.
 const SITE_SHARE: f64 = 0.3;
+const DENSE_SHARE: f64 = 0.45;
 /// The share of e by which sites may be off the attractor: the lattice's own error is inner only.
 const OUTER_SHARE: f64 = 0.5;
 /// The share of both that segments along smooth curves use: there are 1.7 times as many, as their errors are squares of their lengths, and what is left saves a tenth to two thirds of the triangles. Curves that have more than twice as many are rough.
@@ -86,8 +89,11 @@ impl<'a> SiteRule<'a> {
             _ => 0.0,
         };
         let deficits = if attractor.has_own_radii() { (0..attractor.roots().len()).map(deficit).collect() } else { Vec::new() };
-        let mut rule = Self { attractor, radius, tolerance, coarseness, choices: Vec::new(), used, deficits };
+        let mut rule = Self { attractor, radius, tolerance, coarseness, share: SITE_SHARE, choices: Vec::new(), used, deficits };
         choose(&mut rule);
+        if rule.is_dense() {
+            rule.share = DENSE_SHARE;
+        }
         let never = CancelToken::new();
         if rule.is_along_curves()
             && let Ok(Some(leaves)) = rule.leaves(MANY, &never)
@@ -133,7 +139,7 @@ impl<'a> SiteRule<'a> {
 
     /// The share of r^2 - (r - e)^2 that is the lattice's: all of it where sites are cells themselves, without error.
     pub(crate) fn lattice_share(&self) -> f64 {
-        if self.is_exact() { 1.0 } else { 1.0 - self.coarseness * SITE_SHARE }
+        if self.is_exact() { 1.0 } else { 1.0 - self.coarseness * self.share }
     }
 
     /// Whether roots have different radii.
@@ -197,7 +203,7 @@ impl<'a> SiteRule<'a> {
             }
         };
         let least = self.radius - self.tolerance;
-        let allowed = least * least + self.coarseness * SITE_SHARE * (self.radius * self.radius - least * least);
+        let allowed = least * least + self.coarseness * self.share * (self.radius * self.radius - least * least);
         let deficit = self.deficit(cell.root);
         if deficit == 0.0 {
             let square = (least + error.inner).powi(2) + error.inner_square;

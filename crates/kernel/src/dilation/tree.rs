@@ -1,5 +1,5 @@
 //! Cells near a block of space, expanded only where a query needs them: nearest-site search by branch and
-//! bound.
+//! bound. Bounds are those of the cells first, and of the sites below them as far as these are known, which are much narrower where points stand for cells.
 //!
 //! The distance to the sites is a function of the point alone, to the last bit: sites are computed along
 //! their address from the root, whatever block asks, pruning keeps every cell whose lower bound is within
@@ -135,6 +135,8 @@ pub(super) struct Tree<'a> {
     /// Whether a node was left closed because there were too many: answers are then worthless.
     pub(super) exhausted: bool,
     nodes: Vec<Node>,
+    /// The node above each, or NONE.
+    above: Vec<NodeId>,
     /// The least deficit below every node, and the deficits of sites; empty where there are none.
     deficits: Vec<f64>,
     site_deficits: [Vec<f64>; 2],
@@ -167,6 +169,7 @@ impl<'a> Tree<'a> {
             most_nodes,
             exhausted: false,
             nodes: Vec::new(),
+            above: Vec::new(),
             deficits: Vec::new(),
             site_deficits: [Vec::new(), Vec::new()],
             cells: Vec::new(),
@@ -182,25 +185,51 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Adds a node above nodes that follow one another.
-    fn group(&mut self, children: &[NodeId]) -> NodeId {
-        let nodes = children.iter().map(|&id| &self.nodes[id as usize]);
+    /// A ball around those of nodes that follow one another.
+    #[inline]
+    fn around(&self, first: NodeId, count: u32) -> (Point, f64) {
+        let nodes = &self.nodes[first as usize..(first + count) as usize];
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for node in nodes.clone() {
+        for node in nodes {
             low = std::array::from_fn(|axis| low[axis].min(node.centre[axis] - node.radius));
             high = std::array::from_fn(|axis| high[axis].max(node.centre[axis] + node.radius));
         }
         let centre: Point = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        let radius = nodes.map(|node| distance_squared(&node.centre, &centre).sqrt() + node.radius).fold(0.0, f64::max);
-        self.nodes.push(Node { centre, radius: radius * (1.0 + 1e-12), content: Content::Open(children[0], children.len() as u32) });
+        let radius = nodes.iter().map(|node| distance_squared(&node.centre, &centre).sqrt() + node.radius).fold(0.0, f64::max);
+        (centre, radius * (1.0 + 1e-12))
+    }
+
+    /// Makes balls smaller from a node on that was expanded, upwards as long as that is worth it: what is below is known better then.
+    fn tighten(&mut self, mut id: NodeId) {
+        while id != NONE {
+            let Node { radius, content, .. } = self.nodes[id as usize];
+            let Content::Open(first, count) = content else { return };
+            let tight = self.around(first, count);
+            if tight.1 > TIGHTER * radius {
+                return;
+            }
+            let node = &mut self.nodes[id as usize];
+            (node.centre, node.radius) = tight;
+            id = self.above[id as usize];
+        }
+    }
+
+    /// Adds a node above nodes that follow one another.
+    fn group(&mut self, children: &[NodeId]) -> NodeId {
+        let (first, count) = (children[0], children.len() as u32);
+        let (centre, radius) = self.around(first, count);
+        let id = self.nodes.len() as NodeId;
+        self.nodes.push(Node { centre, radius, content: Content::Open(first, count) });
+        self.above.push(NONE);
+        self.above[first as usize..(first + count) as usize].fill(id);
         if self.rule.is_graded() {
             self.deficits.push(children.iter().map(|&id| self.deficits[id as usize]).fold(f64::INFINITY, f64::min));
         }
-        self.cells.push(self.cells[children[0] as usize]);
-        self.nodes.len() as NodeId - 1
+        self.cells.push(self.cells[first as usize]);
+        id
     }
 
-    fn add(&mut self, cell: Cell, points: &[ControlPoint]) {
+    fn add(&mut self, cell: Cell, points: &[ControlPoint], above: NodeId) {
         let content = if let Some(error) = self.rule.leaf(&cell, points) {
             self.leaves += 1;
             self.largest_error = self.largest_error.max(error);
@@ -222,7 +251,13 @@ impl<'a> Tree<'a> {
             self.points.extend_from_slice(points);
             Content::Closed(first)
         };
-        self.nodes.push(Node { centre: cell.ball.centre, radius: cell.ball.radius + self.slack, content });
+        // Of one point nothing is elsewhere.
+        let (centre, radius) = match content {
+            Content::Points(first, 1) => (self.point_sites[first as usize], 0.0),
+            _ => (cell.ball.centre, cell.ball.radius),
+        };
+        self.nodes.push(Node { centre, radius: radius + self.slack, content });
+        self.above.push(above);
         if self.rule.is_graded() {
             let deficit = self.rule.deficit(cell.root);
             self.deficits.push(deficit);
@@ -248,11 +283,12 @@ impl<'a> Tree<'a> {
         for (index, transition) in state.transitions.iter().enumerate() {
             child.resize(transition.operator.columns(), [0.0; 4]);
             child_points(&parent, &transition.operator, &mut child);
-            self.add(self.rule.attractor().child_cell(&cell, index, &child), &child);
+            self.add(self.rule.attractor().child_cell(&cell, index, &child), &child, id);
         }
         self.scratch = [parent, child];
         let count = self.nodes.len() as u32 - first;
         self.nodes[id as usize].content = Content::Open(first, count);
+        self.tighten(id);
         (first, count)
     }
 
@@ -459,6 +495,7 @@ impl<'a> SiteSearch for Tree<'a> {
     /// candidates of one solid, or of none.
     fn reset(&mut self, candidates: &Candidates) -> Vec<NodeId> {
         self.nodes.clear();
+        self.above.clear();
         self.deficits.clear();
         self.site_deficits.iter_mut().for_each(Vec::clear);
         self.cells.clear();
@@ -475,7 +512,7 @@ impl<'a> SiteSearch for Tree<'a> {
         let order = spatial_order(candidates, |cell| solid_of(cell).map_or(0, |solid| solid + 1));
         for &index in &order {
             let candidate = &candidates.cells[index as usize];
-            self.add(candidate.cell, candidates.points_of(attractor, candidate));
+            self.add(candidate.cell, candidates.points_of(attractor, candidate), NONE);
         }
         let mut level: Vec<NodeId> = (0..self.nodes.len() as NodeId).collect();
         while level.len() > GROUP {
@@ -623,6 +660,12 @@ impl<'a> SiteSearch for Tree<'a> {
         self.exhausted
     }
 }
+
+/// No node.
+const NONE: NodeId = NodeId::MAX;
+
+/// Balls are made smaller where they become no larger than this share of what they were.
+const TIGHTER: f64 = 0.95;
 
 /// A list of starts is refined while it is shorter than this,
 const ENOUGH_NODES: usize = 24;
