@@ -40,7 +40,7 @@ const STEPS: usize = 4;
 type Lid = (Vec<Point>, Vec<[u32; 3]>);
 
 impl Around<'_> {
-    /// A surface with lids over some of its triangles, but where what a lid bounds is not shown to be as near as the outer distance.
+    /// A surface with lids over some of its triangles, but where what a lid bounds is not shown to be as near as the outer distance. With another seed they are shaken in other ways.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -48,6 +48,7 @@ impl Around<'_> {
         &self,
         surface: &BlockSurface,
         triangles: &[u32],
+        seed: u64,
         round: &(impl Fn(f64) -> f64 + Sync),
         budget: &Budget,
     ) -> Result<TriMesh, Stopped> {
@@ -60,7 +61,7 @@ impl Around<'_> {
         }
         let lid = |places: &Vec<Point>| {
             budget.cancel.check()?;
-            Ok(self.lid(places, round))
+            Ok(self.lid(places, seed, round))
         };
         let lids: Vec<Option<Lid>> = gathered(places, reach).par_iter().map(lid).collect::<Result<_, Stopped>>()?;
         let mut mesh =
@@ -74,7 +75,7 @@ impl Around<'_> {
     }
 
     /// A lid over some places; none where what it bounds is not shown to be near enough: what is between its triangles and a place inside is.
-    fn lid(&self, places: &[Point], round: &impl Fn(f64) -> f64) -> Option<Lid> {
+    fn lid(&self, places: &[Point], seed: u64, round: &impl Fn(f64) -> f64) -> Option<Lid> {
         let half = self.half();
         let mean = std::array::from_fn(|axis| places.iter().map(|place| place[axis]).sum::<f64>() / places.len() as f64);
         let top = self.at(&mean, TOP)?;
@@ -98,7 +99,7 @@ impl Around<'_> {
             corners.push(self.at(&beside(below(SIDES - TOP), wide + SLOPE * half, corner), SIDES)?);
         }
         corners.push(below(BOTTOM - TOP));
-        let mut random = Random(corners.iter().flatten().fold(0, |seed, x| mix(seed ^ x.to_bits())));
+        let mut random = Random(corners.iter().flatten().fold(seed, |seed, x| mix(seed ^ x.to_bits())));
         corners.iter_mut().for_each(|corner| *corner = shaken(corner, SHAKEN * half, &mut random).map(round));
         let triangles: Vec<[u32; 3]> = (0..CORNERS)
             .flat_map(|corner| {

@@ -63,13 +63,13 @@ const FACET: f64 = -0.7;
 /// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
 const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
-/// Rounds in which normals are evened where what is left of sheets looks back, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
+/// Rounds in which normals are evened where what is left of sheets looks back and lids do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
 const EVENINGS: usize = 2;
 const FEWER: usize = 2;
 /// Of so many triangles one may be covered by lids.
 const SPARSE: usize = 16;
-/// The round from which on what is too near is left to lids.
-const NEARLY: u32 = 3;
+/// What is too near is left to lids where a round makes fewer than one more triangle for so many.
+const STALLED: usize = 200;
 /// By what share of half the band vertices are shaken, so that triangles do not touch each other.
 const SHAKEN: f64 = 0.01;
 /// What is cut, mended and rounded is off by so many roundings at most, all in all.
@@ -152,6 +152,7 @@ fn along(
     // With other normals, if these are needed: what is shown of the surface does not know them.
     let mut evened: Option<Skin> = None;
     let (mut round_number, mut evenings, mut has_lids, mut may_move_before) = (0, 0, false, false);
+    let mut made_before = 0;
     while round_number < ROUNDS {
         let own = evened.as_ref().unwrap_or(skin);
         let mut coarse = Coarse::new(own, &hidden, radius, column.cos());
@@ -188,30 +189,35 @@ fn along(
             good.clear();
         }
         let faults = around.faults(&sheets, &pieces, &good, if may_move { outer - moved } else { outer }, budget)?;
-        if faults.is_empty() || (round_number >= NEARLY && faults.iter().all(|fault| fault.1)) {
+        let made = sheets.triangles.len();
+        let is_stalled = made - made / STALLED < made_before && faults.iter().all(|fault| fault.1);
+        made_before = made;
+        if faults.is_empty() || is_stalled {
             let mut outcome = Outcome::new(&sheets, pieces, &faults);
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
-            if !flaws.not_left.is_empty() && evenings < EVENINGS {
-                let (feet, evened) = (around.feet(outcome.feet(&flaws.not_left)), evened.get_or_insert_with(|| skin.clone()));
-                evenings += 1;
-                if evened.even(&feet, radius, TURNED * half) {
-                    most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
-                    continue;
-                }
-            }
             if !flaws.is_none() && !may_move {
                 has_lids = true;
                 continue;
             }
+            let bent = outcome.feet(&flaws.not_left);
             let mut before = usize::MAX;
             while !flaws.is_none() {
                 // Where they would be everywhere, or do not leave much less, lids do not help.
                 let is_hopeless = flaws.count() > (before / FEWER).min(outcome.surface.triangles.len() / SPARSE);
                 before = flaws.count();
                 if is_hopeless || !outcome.cover(around, &flaws, round, budget)? {
-                    return Ok(ControlFlow::Break(None));
+                    break;
                 }
                 flaws = outcome.flaws(around, &ways, setting, budget)?;
+            }
+            if !flaws.is_none() {
+                let evened = evened.get_or_insert_with(|| skin.clone());
+                evenings += 1;
+                if bent.is_empty() || evenings > EVENINGS || !evened.even(&around.feet(bent), radius, TURNED * half) {
+                    return Ok(ControlFlow::Break(None));
+                }
+                most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
+                continue;
             }
             if outcome.off > moved {
                 return Ok(ControlFlow::Break(None));

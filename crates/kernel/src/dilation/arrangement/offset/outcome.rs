@@ -19,6 +19,8 @@ use std::collections::{BTreeSet, HashSet};
 
 /// The cosine from which on a triangle looks back.
 const BACK: f64 = 0.05;
+/// How many times lids are shaken until they cross what is there without touching it.
+const TRIES: usize = 3;
 
 /// A closed surface, and of places of sheets the vertices of the surface that these are out from, and the ways from there.
 pub(super) struct Outcome {
@@ -29,6 +31,8 @@ pub(super) struct Outcome {
     /// How far it is from where it was cut at most, all in all.
     pub(super) off: f64,
     is_cut: bool,
+    /// How many times lids were put on it.
+    lids: u64,
 }
 
 /// What is not as it has to be: triangles that are nearer or farther, those that look back, those at vertices whose triangles are no single ring, and those at which no way out is found.
@@ -68,7 +72,7 @@ impl Outcome {
         let surface = BlockSurface { vertices, triangles, ..BlockSurface::default() };
         let good = (0..).zip(owners).filter(|(_, owner)| !is_fault.contains(owner));
         let good = good.map(|(piece, _)| name(surface.corners(piece))).collect();
-        Self { surface, from, good, off, is_cut }
+        Self { surface, from, good, off, is_cut, lids: 0 }
     }
 
     /// The vertices of the surface that some of its triangles are out from.
@@ -122,8 +126,17 @@ impl Outcome {
         round: &(impl Fn(f64) -> f64 + Sync),
         budget: &Budget,
     ) -> Result<bool, Stopped> {
-        let mesh = around.with_lids(&self.surface, &flaws.triangles(), round, budget)?;
-        let Some(mut pieces) = Pieces::outer(&mesh, 0, round, budget)? else { return Ok(false) };
+        let triangles = flaws.triangles();
+        let mut found = None;
+        for _ in 0..TRIES {
+            self.lids += 1;
+            let mesh = around.with_lids(&self.surface, &triangles, self.lids, round, budget)?;
+            found = Pieces::outer(&mesh, 0, round, budget)?;
+            if found.is_some() {
+                break;
+            }
+        }
+        let Some(mut pieces) = found else { return Ok(false) };
         pieces.fill(|part| around.is_filled(part));
         self.off += pieces.off;
         self.is_cut = true;
