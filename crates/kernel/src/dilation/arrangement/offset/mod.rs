@@ -63,7 +63,7 @@ const FACET: f64 = -0.7;
 /// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
 const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
-/// Rounds in which normals are evened where what is left of sheets looks back and lids do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
+/// Rounds in which normals are evened where what is left of sheets looks back, the others where lids do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
 const EVENINGS: usize = 2;
 const FEWER: usize = 2;
 /// Of so many triangles one may be covered by lids.
@@ -195,11 +195,22 @@ fn along(
         if faults.is_empty() || is_stalled {
             let mut outcome = Outcome::new(&sheets, pieces, &faults);
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
+            let (bent, is_first) = (around.feet(outcome.feet(&flaws.not_left)), evenings == 0);
+            let mut even = |most: &mut [f64]| {
+                evenings += 1;
+                let evened = evened.get_or_insert_with(|| skin.clone());
+                let is_changed = !bent.is_empty() && evenings <= EVENINGS && evened.even(&bent, radius, TURNED * half);
+                most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
+                is_changed
+            };
+            // Sheets with other normals have fewer triangles than those with lids.
+            if is_first && !bent.is_empty() && even(&mut most) {
+                continue;
+            }
             if !flaws.is_none() && !may_move {
                 has_lids = true;
                 continue;
             }
-            let bent = outcome.feet(&flaws.not_left);
             let mut before = usize::MAX;
             while !flaws.is_none() {
                 // Where they would be everywhere, or do not leave much less, lids do not help.
@@ -211,13 +222,10 @@ fn along(
                 flaws = outcome.flaws(around, &ways, setting, budget)?;
             }
             if !flaws.is_none() {
-                let evened = evened.get_or_insert_with(|| skin.clone());
-                evenings += 1;
-                if bent.is_empty() || evenings > EVENINGS || !evened.even(&around.feet(bent), radius, TURNED * half) {
-                    return Ok(ControlFlow::Break(None));
+                if even(&mut most) {
+                    continue;
                 }
-                most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
-                continue;
+                return Ok(ControlFlow::Break(None));
             }
             if outcome.off > moved {
                 return Ok(ControlFlow::Break(None));
