@@ -54,7 +54,7 @@ pub(crate) struct SiteRule<'a> {
     tolerance: f64,
     /// The share that sites use of what they may be off.
     coarseness: f64,
-    /// See [`SITE_SHARE`].
+    /// [`SITE_SHARE`], or [`DENSE_SHARE`].
     share: f64,
     choices: Vec<Choice>,
     /// States that roots reach.
@@ -64,8 +64,9 @@ pub(crate) struct SiteRule<'a> {
 }
 
 /// The share of r^2 - (r - e)^2 that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
-/// needs a finer lattice. Where points stand for cells it is fine anyway, and their number decides: their share is what they may be off outwards, nearly.
+/// needs a finer lattice.
 const SITE_SHARE: f64 = 0.3;
+/// The same where points stand for cells: there the lattice is finer anyway, and the number of cells decides. It is nearly as much as they may be off outwards.
 const DENSE_SHARE: f64 = 0.45;
 /// The share of e by which sites may be off the attractor: the lattice's own error is inner only.
 const OUTER_SHARE: f64 = 0.5;

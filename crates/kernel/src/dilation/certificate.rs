@@ -598,7 +598,7 @@ mod tests {
     use crate::attractor::cell::Site;
     use crate::budget::Budget;
     use crate::dilation::plan::{Balls, Plan};
-    use crate::dilation::tree::Tree;
+    use crate::dilation::tree::{Candidates, Tree};
     use crate::model::{AffineMap, Ifs, Model, Shape};
     use crate::split_mix::Random;
     use crate::tolerance::{Radius, Tolerance};
@@ -618,19 +618,25 @@ mod tests {
     const RADIUS: f64 = 1.0;
     const TOLERANCE: f64 = 0.2;
 
-    /// What is told of a tree over the surface, its starts, and all of its sites.
-    fn with_tree(told: impl FnOnce(&mut Tree<'_>, Vec<NodeId>, &[SiteId])) {
+    /// What is told of a tree over the surface, and the cells that it begins with.
+    fn with_candidates(told: impl FnOnce(&mut Tree<'_>, &Candidates)) {
         let (attractor, budget) = (takagi(), Budget::default());
         let balls = Balls { least: Radius::new(RADIUS).unwrap().mm(), most: RADIUS };
         let plan = Plan::new(&attractor, balls, Tolerance::new(TOLERANCE).unwrap(), true, 1.0, &budget).unwrap();
         let setting = plan.setting(plan.pitch(), &budget);
         let space = plan.space(&setting);
-        let mut tree = Tree::of(plan.rule(), &setting);
-        let starts = tree.reset(space.candidates());
-        let mut all = Vec::new();
-        tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
-        assert!(all.len() > 10_000, "{}", all.len());
-        told(&mut tree, starts, &all);
+        told(&mut Tree::of(plan.rule(), &setting), space.candidates());
+    }
+
+    /// The same of one that is expanded as a whole, its starts, and all of its sites.
+    fn with_tree(told: impl FnOnce(&mut Tree<'_>, Vec<NodeId>, &[SiteId])) {
+        with_candidates(|tree, candidates| {
+            let starts = tree.reset(candidates);
+            let mut all = Vec::new();
+            tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
+            assert!(all.len() > 10_000, "{}", all.len());
+            told(tree, starts, &all);
+        });
     }
 
     fn corners(tree: &Tree<'_>, site: SiteId) -> Vec<Point> {
@@ -643,6 +649,33 @@ mod tests {
 
     fn place(random: &mut Random) -> Point {
         [12.0, 12.0, 14.0].map(|wide| wide * random.share() - 1.0)
+    }
+
+    /// Searches expand trees, and make balls in them smaller: what was asked before may not show.
+    #[test]
+    fn the_nearest_site_is_the_same_whatever_was_asked_before() {
+        let mut random = Random(3);
+        let places: Vec<Point> = (0..400).map(|_| place(&mut random)).collect();
+        with_candidates(|tree, candidates| {
+            let mut answers = |order: Vec<usize>, has_seed: bool| {
+                let (starts, mut seed, mut found) = (tree.reset(candidates), None, vec![([0; 3], 0); places.len()]);
+                for place in order {
+                    let hit = tree.nearest(&places[place], &starts, seed, f64::INFINITY, 0.0).unwrap();
+                    seed = has_seed.then_some(hit.node);
+                    found[place] = (hit.closest.map(f64::to_bits), hit.distance_squared.to_bits());
+                }
+                found
+            };
+            let found = answers((0..places.len()).collect(), true);
+            assert_eq!(answers((0..places.len()).rev().collect(), false), found);
+            let starts = tree.reset(candidates);
+            let mut all = Vec::new();
+            tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
+            for (x, (_, square)) in places.iter().zip(found) {
+                let least = all.iter().map(|&site| tree.site(site).distance_squared(x)).fold(f64::INFINITY, f64::min);
+                assert_eq!(f64::from_bits(square), least);
+            }
+        });
     }
 
     #[test]

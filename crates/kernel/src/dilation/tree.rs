@@ -11,6 +11,7 @@ use super::setting::Setting;
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, Site, child_points, distance_squared, dot};
 use crate::attractor::sites::{SiteError, SiteRule};
+use crate::solid::half_edges::NONE;
 
 /// A cell with its control points, as a candidate for holding the nearest site.
 #[derive(Clone, Debug, Default)]
@@ -203,7 +204,7 @@ impl<'a> Tree<'a> {
     fn tighten(&mut self, mut id: NodeId) {
         while id != NONE {
             let Node { radius, content, .. } = self.nodes[id as usize];
-            let Content::Open(first, count) = content else { return };
+            let Content::Open(first, count @ 1..) = content else { return };
             let tight = self.around(first, count);
             if tight.1 > TIGHTER * radius {
                 return;
@@ -485,6 +486,7 @@ impl<'a> SiteSearch for Tree<'a> {
     /// Those of its lists.
     fn bytes(&self) -> usize {
         size_of_val(&*self.nodes)
+            + size_of_val(&*self.above)
             + size_of_val(&*self.cells)
             + size_of_val(&*self.points)
             + size_of_val(&*self.sites)
@@ -660,9 +662,6 @@ impl<'a> SiteSearch for Tree<'a> {
         self.exhausted
     }
 }
-
-/// No node.
-const NONE: NodeId = NodeId::MAX;
 
 /// Balls are made smaller where they become no larger than this share of what they were.
 const TIGHTER: f64 = 0.95;

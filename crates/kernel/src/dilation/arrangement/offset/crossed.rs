@@ -27,8 +27,8 @@ use std::collections::{BTreeMap, HashSet};
 
 /// Pairs of triangles that cross at most, for each triangle.
 const MOST_CROSSINGS: usize = 16;
-/// How far before and behind a piece it is asked how often the surface winds around that, as shares of its longest side: where sheets fold back another one may be nearer than the first.
-const BESIDE: [f64; 3] = [1e-6, 1e-8, 1e-10];
+/// How far before and behind a piece it is asked how often the surface winds around that, as shares of its longest side: the nearest that is not lost to rounding tells, as where sheets fold back others are near.
+const BESIDE: [f64; 3] = [1e-10, 1e-8, 1e-6];
 /// How long a piece is at least, as a share of coordinates, that it is asked at.
 const TOLD: f64 = 1e-7;
 /// Segments of a triangle at most.
@@ -497,12 +497,14 @@ fn labels(mesh: &TriMesh, vertices: &[Point], pieces: &[[u32; 3]], owners: &[u32
         distance_squared(a, b).max(distance_squared(b, c)).max(distance_squared(c, a)).sqrt()
     };
     // How often it winds just before a piece, where that is once less than behind it.
-    let around = |piece: u32, by: f64| {
+    let around = |piece: u32| {
         let [a, b, c] = pieces[piece as usize].map(|corner| &vertices[corner as usize]);
-        let (up, by) = (unit(&normal(owners[piece as usize])), by * long(piece));
-        let beside = |by: f64| DVec3::from_array(std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0 + by * up[axis]));
-        let before = inside.winding(beside(by));
-        (inside.winding(beside(-by)) == before + 1).then_some(before)
+        let (up, long) = (unit(&normal(owners[piece as usize])), long(piece));
+        let winding = |by: f64| {
+            let beside = std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0 + by * long * up[axis]);
+            inside.winding(DVec3::from_array(beside))
+        };
+        BESIDE.into_iter().find_map(|by| Some(winding(by)).filter(|before| winding(-by) == before + 1))
     };
     let mut labels: Vec<Option<i64>> = vec![None; pieces.len()];
     for first in 0..pieces.len() as u32 {
@@ -529,12 +531,12 @@ fn labels(mesh: &TriMesh, vertices: &[Point], pieces: &[[u32; 3]], owners: &[u32
         let Some(best) = all.iter().map(|&group| largest[group as usize]).max_by(|a, b| area(a).total_cmp(&area(b)).then(b.cmp(a))) else {
             continue;
         };
-        let Some(before) = BESIDE.into_iter().find_map(|by| around(best, by)) else { return Ok(None) };
+        let Some(before) = around(best) else { return Ok(None) };
         let more = before - labels[groups[best as usize] as usize].unwrap_or_default();
         // The others have to be so, too, as far as rounding lets it be told.
         let is_so = |&group: &u32| {
             let (piece, label) = (largest[group as usize], labels[group as usize].unwrap_or_default() + more);
-            long(piece) < TOLD * wide || BESIDE.into_iter().any(|by| around(piece, by) == Some(label))
+            long(piece) < TOLD * wide || around(piece) == Some(label)
         };
         if !all.par_iter().all(is_so) {
             return Ok(None);

@@ -63,13 +63,11 @@ const FACET: f64 = -0.7;
 /// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
 const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
-/// Rounds in which normals are evened where what is left of sheets looks back, the others where lids do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
+/// Rounds in which normals are evened where what is left of sheets looks back, the first before lids are tried, the second where these do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
 const EVENINGS: usize = 2;
 const FEWER: usize = 2;
 /// Of so many triangles one may be covered by lids.
 const SPARSE: usize = 16;
-/// What is too near is left to lids where a round makes fewer than one more triangle for so many.
-const STALLED: usize = 200;
 /// By what share of half the band vertices are shaken, so that triangles do not touch each other.
 const SHAKEN: f64 = 0.01;
 /// What is cut, mended and rounded is off by so many roundings at most, all in all.
@@ -152,7 +150,7 @@ fn along(
     // With other normals, if these are needed: what is shown of the surface does not know them.
     let mut evened: Option<Skin> = None;
     let (mut round_number, mut evenings, mut has_lids, mut may_move_before) = (0, 0, false, false);
-    let mut made_before = 0;
+    let mut made_before = None;
     while round_number < ROUNDS {
         let own = evened.as_ref().unwrap_or(skin);
         let mut coarse = Coarse::new(own, &hidden, radius, column.cos());
@@ -189,9 +187,10 @@ fn along(
             good.clear();
         }
         let faults = around.faults(&sheets, &pieces, &good, if may_move { outer - moved } else { outer }, budget)?;
-        let made = sheets.triangles.len();
-        let is_stalled = made - made / STALLED < made_before && faults.iter().all(|fault| fault.1);
-        made_before = made;
+        // What is too near is left to lids where a round does not make as many more triangles as there are of that.
+        let may_go_on = round_number + 1 < ROUNDS && made_before.is_none_or(|before| left.len() >= before + faults.len());
+        let is_stalled = !may_go_on && faults.iter().all(|fault| fault.1);
+        made_before = Some(left.len());
         if faults.is_empty() || is_stalled {
             let mut outcome = Outcome::new(&sheets, pieces, &faults);
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
@@ -205,6 +204,7 @@ fn along(
             };
             // Sheets with other normals have fewer triangles than those with lids.
             if is_first && !bent.is_empty() && even(&mut most) {
+                made_before = None;
                 continue;
             }
             if !flaws.is_none() && !may_move {
@@ -223,6 +223,7 @@ fn along(
             }
             if !flaws.is_none() {
                 if even(&mut most) {
+                    made_before = None;
                     continue;
                 }
                 return Ok(ControlFlow::Break(None));

@@ -31,7 +31,7 @@ pub(super) struct Outcome {
     /// How far it is from where it was cut at most, all in all.
     pub(super) off: f64,
     is_cut: bool,
-    /// How many times lids were put on it.
+    /// How many times lids were tried: they are shaken in another way each time.
     lids: u64,
 }
 
