@@ -628,13 +628,18 @@ mod tests {
         told(&mut Tree::of(plan.rule(), &setting), space.candidates());
     }
 
-    /// The same of one that is expanded as a whole, its starts, and all of its sites.
+    /// Expands a tree as a whole: its starts, and all of its sites.
+    fn expanded(tree: &mut Tree<'_>, candidates: &Candidates) -> (Vec<NodeId>, Vec<SiteId>) {
+        let (starts, mut all) = (tree.reset(candidates), Vec::new());
+        tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
+        assert!(all.len() > 10_000, "{}", all.len());
+        (starts, all)
+    }
+
+    /// What is told of such a tree.
     fn with_tree(told: impl FnOnce(&mut Tree<'_>, Vec<NodeId>, &[SiteId])) {
         with_candidates(|tree, candidates| {
-            let starts = tree.reset(candidates);
-            let mut all = Vec::new();
-            tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
-            assert!(all.len() > 10_000, "{}", all.len());
+            let (starts, all) = expanded(tree, candidates);
             told(tree, starts, &all);
         });
     }
@@ -668,9 +673,7 @@ mod tests {
             };
             let found = answers((0..places.len()).collect(), true);
             assert_eq!(answers((0..places.len()).rev().collect(), false), found);
-            let starts = tree.reset(candidates);
-            let mut all = Vec::new();
-            tree.collect(&[5.0; 3], &starts, 100.0, &mut all);
+            let (_, all) = expanded(tree, candidates);
             for (x, (_, square)) in places.iter().zip(found) {
                 let least = all.iter().map(|&site| tree.site(site).distance_squared(x)).fold(f64::INFINITY, f64::min);
                 assert_eq!(f64::from_bits(square), least);

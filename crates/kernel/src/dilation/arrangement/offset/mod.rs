@@ -196,15 +196,20 @@ fn along(
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
             let (bent, is_first) = (around.feet(outcome.feet(&flaws.not_left)), evenings == 0);
             let mut even = |most: &mut [f64]| {
+                if bent.is_empty() || evenings == EVENINGS {
+                    return false;
+                }
                 evenings += 1;
                 let evened = evened.get_or_insert_with(|| skin.clone());
-                let is_changed = !bent.is_empty() && evenings <= EVENINGS && evened.even(&bent, radius, TURNED * half);
-                most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
+                let is_changed = evened.even(&bent, radius, TURNED * half);
+                if is_changed {
+                    most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
+                    made_before = None;
+                }
                 is_changed
             };
             // Sheets with other normals have fewer triangles than those with lids.
-            if is_first && !bent.is_empty() && even(&mut most) {
-                made_before = None;
+            if is_first && even(&mut most) {
                 continue;
             }
             if !flaws.is_none() && !may_move {
@@ -223,7 +228,6 @@ fn along(
             }
             if !flaws.is_none() {
                 if even(&mut most) {
-                    made_before = None;
                     continue;
                 }
                 return Ok(ControlFlow::Break(None));
@@ -353,6 +357,12 @@ impl Around<'_> {
             true
         });
         found
+    }
+
+    /// Whether a triangle, and what is between it and its feet if there are such, is between distances.
+    fn is_between(&self, triangle: [Point; 3], feet: Option<[Point; 3]>, [inner, outer]: [f64; 2], memory: &mut Memory) -> bool {
+        let offer = |x: &Point| self.closest(x).map(|own| own.0);
+        self.faces.fault_with(offer, &Question { triangle, feet, owners: [NONE; 3], inner, outer }, memory).is_none()
     }
 
     /// How far a triangle looks along the way to its middle from what is closest: a cosine.

@@ -7,7 +7,7 @@ use super::{Around, IN_A_ROW};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::Memory;
-use crate::dilation::arrangement::faces::{Question, numbered};
+use crate::dilation::arrangement::faces::numbered;
 use crate::dilation::setting::Setting;
 use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
@@ -154,12 +154,8 @@ impl Outcome {
         let look = |row: &[u32]| {
             budget.cancel.check()?;
             let mut memory = Memory::default();
-            let mut is_off = |&triangle: &u32| {
-                let triangle = self.surface.corners(triangle);
-                let question = Question { triangle, feet: None, owners: [NONE; 3], inner: around.inner, outer: around.outer };
-                let offer = |x: &Point| around.closest(x).map(|own| own.0);
-                around.faces.fault_with(offer, &question, &mut memory).is_some()
-            };
+            let mut is_off =
+                |&triangle: &u32| !around.is_between(self.surface.corners(triangle), None, [around.inner, around.outer], &mut memory);
             Ok(row.iter().map(&mut is_off).collect())
         };
         let found: Vec<Vec<bool>> = open.par_chunks(IN_A_ROW).map(look).collect::<Result<_, Stopped>>()?;

@@ -5,7 +5,6 @@ use super::skin::upright;
 use crate::attractor::cell::{Point, distance_squared, dot};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::Memory;
-use crate::dilation::arrangement::faces::Question;
 use crate::dilation::surface::BlockSurface;
 use crate::measure::triangle::closest_on_triangle;
 use crate::solid::half_edges::{HalfEdges, NONE, kept, next};
@@ -115,9 +114,7 @@ impl Tidying<'_> {
 
     /// Whether a triangle is between the distances, and what is between it and what it was, or as far from it as told, no farther than the outer one but for what may move.
     fn stays(&mut self, triangle: [Point; 3], feet: Option<[Point; 3]>, beyond: f64) -> bool {
-        let Around { faces, inner, outer, moved, .. } = *self.around;
-        let question = Question { triangle, feet, owners: [NONE; 3], inner, outer: outer - moved - beyond };
-        let offer = |x: &Point| self.around.closest(x).map(|own| own.0);
-        faces.fault_with(offer, &question, &mut self.memory).is_none()
+        let Around { inner, outer, moved, .. } = *self.around;
+        self.around.is_between(triangle, feet, [inner, outer - moved - beyond], &mut self.memory)
     }
 }
