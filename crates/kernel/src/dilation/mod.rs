@@ -16,7 +16,7 @@
 //! Points, segments and triangles of which few are near to each other, wires, panels and the faces of solids, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`) and simplified part by
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
-//! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`).
+//! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`); around solids, and NURBS volumes that are proven to be such (`volume` in `attractor`), there is one outside.
 //! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them.
 //! For graphs over a convex part of a plane that have very many cells, as rough ones do, rays stand that lead down and up from a few of their places (`peaks`): between two sheets is all that is near to these.
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
@@ -109,7 +109,7 @@ pub struct Dilation {
 /// # Errors
 /// [`DilationError`]: a limit, with a value that would pass, or a stop.
 pub fn dilate(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
-    run(attractor, radius, tolerance, budget, true)
+    run(&Order::new(attractor, radius, tolerance, true, budget), budget)
 }
 
 /// As [`dilate`], with the triangles of the lattice: only those that have no area are removed.
@@ -122,7 +122,24 @@ pub fn dilate_unsimplified(
     tolerance: Tolerance,
     budget: &Budget,
 ) -> Result<Dilation, DilationError> {
-    run(attractor, radius, tolerance, budget, false)
+    run(&Order::new(attractor, radius, tolerance, false, budget), budget)
+}
+
+/// The dilation of a surface by other ways than sheets along it: where a sheet on the side that is asked for does not come out.
+///
+/// # Errors
+/// As [`dilate`].
+fn dilate_without_sheets(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Dilation, DilationError> {
+    run(&Order { has_sheets: false, ..Order::new(attractor, radius, tolerance, true, budget) }, budget)
+}
+
+/// The dilation of a solid of triangles by a sheet around it; none where that does not serve it.
+///
+/// # Errors
+/// A stop.
+fn sheets_around(solid: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+    let order = Order { attractor: solid, radius, tolerance, simplify: true, has_sheets: true, finer: None };
+    unless_stopped(order.plan_of(solid, COARSE, budget).and_then(|plan| plan.run_in_sheets(budget)))
 }
 
 /// The share of what they may be off that sites, and triangles of trimmed surfaces, use: for as few of them as possible, and for some times as many, which may tell the topology where the first do not.
@@ -135,8 +152,7 @@ const FEW_CELLS: usize = 20_000;
 /// Cells that finer sites are made of at most, for each of the first: along curves and surfaces that are smooth they are three to eight times as many.
 const MORE_CELLS: u64 = 10;
 
-fn run(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget, simplify: bool) -> Result<Dilation, DilationError> {
-    let order = Order::new(attractor, radius, tolerance, simplify, budget);
+fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
     if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
         return Ok(dilation);
     }
@@ -172,13 +188,15 @@ struct Order<'a> {
     radius: Radius,
     tolerance: Tolerance,
     simplify: bool,
+    /// Whether sheets along it may serve.
+    has_sheets: bool,
     finer: Option<Finer>,
 }
 
 impl<'a> Order<'a> {
     fn new(attractor: &'a Attractor, radius: Radius, tolerance: Tolerance, simplify: bool, budget: &Budget) -> Self {
         let finer = if simplify { Finer::of(attractor, radius, tolerance, budget) } else { None };
-        Self { attractor, radius, tolerance, simplify, finer }
+        Self { attractor, radius, tolerance, simplify, has_sheets: true, finer }
     }
 
     /// What comes of the plan for a smooth surface, or a mesh that is finer than needed; none where it is none, or where sheets do not serve it.
@@ -187,6 +205,9 @@ impl<'a> Order<'a> {
         budget: &Budget,
         work: impl FnOnce(&Plan<'_>) -> Result<Option<T>, DilationError>,
     ) -> Result<Option<T>, DilationError> {
+        if !self.has_sheets {
+            return Ok(None);
+        }
         let smooth = if self.simplify { Drawn::smooth(self.attractor, self.radius, self.tolerance, budget)? } else { None };
         let Some(smooth) = smooth else {
             // Where these serve all of a mesh that is finer than needed, fewer triangles are not asked for.
@@ -223,7 +244,8 @@ impl<'a> Order<'a> {
     /// The plan of a shape with one radius, the attractor or what stands for it.
     fn plan_of<'b>(&self, attractor: &'b Attractor, coarseness: f64, budget: &Budget) -> Result<Plan<'b>, DilationError> {
         let balls = Balls { least: self.radius.mm(), most: self.radius.mm() };
-        Plan::new(attractor, balls, self.tolerance, self.simplify, coarseness, budget)
+        let plan = Plan::new(attractor, balls, self.tolerance, self.simplify, coarseness, budget)?;
+        Ok(if self.has_sheets { plan } else { plan.without_sheets() })
     }
 
     /// What comes of the plan with sites of some coarseness.
@@ -240,7 +262,10 @@ impl<'a> Order<'a> {
             (resolved, _) => resolved,
         };
         match drawn {
-            Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
+            Some(drawn) => {
+                let plan = drawn.plan(simplify, coarseness, budget)?;
+                work(&if self.has_sheets { plan } else { plan.without_sheets() })
+            }
             None => {
                 let whole = self.plan_of(attractor, coarseness, budget)?;
                 match whole.split(budget)? {

@@ -160,6 +160,7 @@ pub(super) struct Plan<'a> {
     rule: SiteRule<'a>,
     meant: Meant,
     clean_only: bool,
+    has_sheets: bool,
 }
 
 /// What a plan's attractor stands for: itself, or another one that it is nearly.
@@ -204,7 +205,20 @@ impl<'a> Plan<'a> {
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
         let meant = Meant { off: 0.0, deviation_mm: 0.0, bounds: bounds.grown(radius) };
-        Ok(Self { balls, radius, aimed: of_least, tolerance: aimed, pitch, least, extra, bounds, rule, meant, clean_only: !simplify })
+        Ok(Self {
+            balls,
+            radius,
+            aimed: of_least,
+            tolerance: aimed,
+            pitch,
+            least,
+            extra,
+            bounds,
+            rule,
+            meant,
+            clean_only: !simplify,
+            has_sheets: true,
+        })
     }
 
     /// The attractor with as many roots as there are leaf cells, where it is made of products that have fewer when they are split along one factor at a time.
@@ -230,6 +244,11 @@ impl<'a> Plan<'a> {
     /// The same for an attractor that stands for another one, within what is left of the tolerance.
     pub(super) fn standing_for(self, meant: Meant) -> Self {
         Self { meant, ..self }
+    }
+
+    /// The same where sheets along the sites do not serve.
+    pub(super) fn without_sheets(self) -> Self {
+        Self { has_sheets: false, ..self }
     }
 
     /// a = R / 0.559 with R^2 the lattice's share of r^2 - (r - e)^2.
@@ -258,7 +277,7 @@ impl<'a> Plan<'a> {
         let thinnest = self.balls.least - self.balls.inner(self.radius - least);
         let taken = self.balls.outer(self.extra) + self.balls.outer(self.rule.outer_reserve());
         let close_in_space = setting.close.max(self.aimed - taken);
-        let setting = Setting { least, thinnest, close_in_space, off: self.meant.off, ..setting };
+        let setting = Setting { least, thinnest, close_in_space, off: self.meant.off, has_sheets: self.has_sheets, ..setting };
         if !self.rule.is_dense() {
             return Setting { clean_only: self.clean_only, ..setting };
         }
@@ -383,7 +402,7 @@ impl<'a> Plan<'a> {
         Ok(made.filter(|made| made.topology_exact))
     }
 
-    /// The dilation of a surface that turns little, by a sheet on each side; none where that does not come out.
+    /// The dilation of a surface that turns little by a sheet on each side, or of a solid by one outside; none where that does not come out.
     pub(super) fn run_in_sheets(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);

@@ -1,12 +1,12 @@
 //! Walls along closed surfaces, and closing: what lies between a surface and the dilation of that surface.
 //!
-//! Let M be a solid and T a mesh of the dilation of its surface by w, with {d <= w - inner} in T in {d <= w + outer}, d the distance from the surface of M. Shells of T
+//! Let M be a solid and T a mesh of the dilation of its surface by w, or of M itself, or of what is outside of M, in a box: on the side that is asked for these are the same. With {d <= w - inner} in T in {d <= w + outer} there, d the distance from the surface of M, shells of T
 //! are nowhere nearer to M's surface than w - inner, so each lies inside of M or outside as a whole. Those inside bound what is left of M when everything
 //! near its surface is taken away: M less the wall, an erosion of M. No boolean is needed, and nothing can cross.
 
 use super::convex::SiteSearch;
 use super::tree::{Candidates, Tree};
-use super::{Dilation, DilationError, dilate, dilate_unsimplified};
+use super::{Dilation, DilationError, dilate, dilate_unsimplified, dilate_without_sheets, sheets_around};
 use crate::attractor::Attractor;
 use crate::attractor::sites::SiteRule;
 use crate::budget::Budget;
@@ -15,7 +15,7 @@ use crate::measure::Interval;
 use crate::measure::bounds::bounding_box;
 use crate::model::{Interior, Model, PolygonMesh, Shape};
 use crate::solid::inside::Inside;
-use crate::solid::{Solid, TriMesh};
+use crate::solid::{Crossings, Solid, TriMesh};
 use crate::tolerance::{Radius, Tolerance};
 use glam::DVec3;
 use std::collections::BinaryHeap;
@@ -58,13 +58,11 @@ pub fn wall(
     simplify: bool,
     budget: &Budget,
 ) -> Result<Wall, DilationError> {
-    let surface = surface_of(solid.mesh());
-    let make = if simplify { dilate } else { dilate_unsimplified };
-    let around = make(&surface, thickness, tolerance, &budget.aside())?;
     let inside = Inside::new(solid.mesh());
+    let around = beside(solid.mesh(), side, thickness, tolerance, simplify, budget)?;
     let other = shells(around.solid.mesh(), |vertex| (inside.winding(vertex) > 0) == (side == Side::Inward));
     if other.triangles.is_empty() {
-        return Err(no_hollow(&surface, &inside, thickness, budget));
+        return Err(no_hollow(&surface_of(solid.mesh()), &inside, thickness, budget));
     }
     let mut mesh = solid.mesh().clone();
     if side == Side::Outward {
@@ -104,8 +102,8 @@ pub fn close(
     // The solid that is left is as thin as r, and its error must stay below that.
     let aimed = tolerance.mm().min(0.5 * attractor.radii(radius.mm())[0]);
     let swollen = make(&attractor.with_grown_radii(ball.mm()), grown, half(0.5 * aimed), &budget.aside())?;
-    let surface = surface_of(swollen.solid.mesh());
-    let around = make(&surface, ball, half(aimed - swollen.inner_mm.max(swollen.outer_mm)), &budget.aside())?;
+    let rest = half(aimed - swollen.inner_mm.max(swollen.outer_mm));
+    let around = beside(swollen.solid.mesh(), Side::Inward, ball, rest, simplify, budget)?;
     let inside = Inside::new(swollen.solid.mesh());
     let mut left = shells(around.solid.mesh(), |vertex| inside.winding(vertex) > 0);
     left.reverse();
@@ -127,6 +125,33 @@ pub fn close(
         topology_exact: false,
     })
 }
+
+/// A dilation whose surfaces on one side of a closed mesh are those of the dilation of that: of what is on the other side, if a sheet serves that, or of the mesh itself.
+fn beside(
+    mesh: &TriMesh,
+    side: Side,
+    thickness: Radius,
+    tolerance: Tolerance,
+    simplify: bool,
+    budget: &Budget,
+) -> Result<Dilation, DilationError> {
+    let budget = &budget.aside();
+    if !simplify {
+        return dilate_unsimplified(&surface_of(mesh), thickness, tolerance, budget);
+    }
+    if Crossings::of(mesh, budget)?.count > 0 {
+        return dilate(&surface_of(mesh), thickness, tolerance, budget);
+    }
+    let other = match side {
+        Side::Inward => mesh.complement(FAR * (thickness.mm() + tolerance.mm())),
+        Side::Outward => mesh.clone(),
+    };
+    let other = Attractor::of_triangles(&other, true).map(|other| sheets_around(&other, thickness, tolerance, budget)).transpose()?;
+    other.flatten().map_or_else(|| dilate_without_sheets(&surface_of(mesh), thickness, tolerance, budget), Ok)
+}
+
+/// How far away the box around what is outside is, in units of how far it is looked at.
+const FAR: f64 = 2.5;
 
 /// A mesh as a shape of triangles that bound nothing.
 fn surface_of(mesh: &TriMesh) -> Attractor {
@@ -213,4 +238,69 @@ fn largest_ball(surface: &Attractor, inside: &Inside<'_>, budget: &Budget) -> Re
     }
     best.high = best.low;
     Ok(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::mass::volume;
+    use std::f64::consts::PI;
+
+    /// A ball around the origin, by longitude and latitude.
+    fn ball(around: u32, radius: f64) -> TriMesh {
+        let half = around / 2;
+        let at = |i: u32, j: u32| {
+            let ((s, c), (t, d)) =
+                ((2.0 * PI * f64::from(i) / f64::from(around)).sin_cos(), (PI * f64::from(j) / f64::from(half)).sin_cos());
+            radius * DVec3::new(t * c, t * s, -d)
+        };
+        let mut mesh = TriMesh { vertices: vec![at(0, 0), at(0, half)], triangles: Vec::new() };
+        mesh.vertices.extend((1..half).flat_map(|j| (0..around).map(move |i| at(i, j))));
+        let number = |i: u32, j: u32| {
+            if j == 0 {
+                0
+            } else if j == half {
+                1
+            } else {
+                2 + (j - 1) * around + i % around
+            }
+        };
+        for (i, j) in (0..around).flat_map(|i| (0..half).map(move |j| (i, j))) {
+            let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+            mesh.triangles.extend([[a, b, c], [a, c, d]].into_iter().filter(|[a, b, c]| a != b && b != c && c != a));
+        }
+        mesh
+    }
+
+    /// Walls of a ball, and of a hollow one, which has a hollow on both sides: their volumes are those of balls, but for the bounds and what is between the mesh and the ball.
+    #[test]
+    fn walls_of_balls() {
+        let (budget, e) = (Budget::default(), 0.05);
+        let mut hollow = ball(96, 12.0);
+        let mut inner = ball(96, 6.0);
+        inner.reverse();
+        hollow.append(&inner);
+        let content = |radius: f64| 4.0 / 3.0 * PI * radius.powi(3);
+        let shells = |radii: &[[f64; 2]]| radii.iter().map(|own| content(own[1]) - content(own[0])).sum::<f64>();
+        let cases = [
+            (ball(96, 12.0), Side::Inward, shells(&[[11.0, 12.0]]), 2),
+            (ball(96, 12.0), Side::Outward, shells(&[[12.0, 13.0]]), 2),
+            (hollow.clone(), Side::Inward, shells(&[[11.0, 12.0], [6.0, 7.0]]), 4),
+            (hollow, Side::Outward, shells(&[[12.0, 13.0], [5.0, 6.0]]), 4),
+        ];
+        for (case, (mesh, side, expected, count)) in cases.into_iter().enumerate() {
+            let solid = Solid::rounded(&mesh, &budget).unwrap().solid;
+            let other = match side {
+                Side::Inward => solid.mesh().complement(2.5),
+                Side::Outward => solid.mesh().clone(),
+            };
+            let other = Attractor::of_triangles(&other, true).unwrap();
+            let (thickness, tolerance) = (Radius::new(1.0).unwrap(), Tolerance::new(e).unwrap());
+            assert!(sheets_around(&other, thickness, tolerance, &budget).unwrap().is_some(), "{case}");
+            let wall = wall(&solid, side, thickness, tolerance, true, &budget).unwrap();
+            assert!(wall.inner_mm <= e && wall.outer_mm <= e && wall.crossings == 0);
+            let (own, shells) = (volume(wall.solid.mesh()), wall.solid.topology().shells);
+            assert!((own / expected - 1.0).abs() < 0.06 && shells == count, "{case}: {own} {expected} {shells}");
+        }
+    }
 }

@@ -4,10 +4,8 @@ use super::LevelError;
 use super::growth::Surface;
 use super::lattice::{Lattice, Point};
 use crate::budget::{Budget, Stopped};
+use crate::solid::BOX_FACES;
 use std::collections::BTreeSet;
-
-/// Faces of a box over its corners, whose bits tell which are upper: outward.
-pub(super) const BOX_FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// A convex body that holds the primitive and its own images.
 pub(super) struct Body {

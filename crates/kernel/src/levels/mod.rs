@@ -22,7 +22,7 @@ use crate::measure::mass::{area_within, volume_within};
 use crate::measure::{AxisBox, Interval};
 use crate::model::polygon;
 use crate::model::{Ifs, Primitive};
-use crate::solid::{Crossings, Solid, SolidError, TriMesh, fans, rounding};
+use crate::solid::{BOX_FACES, Crossings, Solid, SolidError, TriMesh, fans, rounding};
 use disjoint::Body;
 use glam::DVec3;
 use growth::{Growth, Surface};
@@ -422,7 +422,7 @@ fn default_box(bounds: &AxisBox) -> Result<(Vec<DVec3>, Vec<Vec<u32>>), LevelErr
         return Err(LevelError::NoPrimitive { reason: "its attractor is flat, so that its box encloses nothing either" });
     }
     let corner = |code: usize| DVec3::from_array(std::array::from_fn(|axis| ends[code >> axis & 1][axis]));
-    Ok(((0..8).map(corner).collect(), disjoint::BOX_FACES.map(|face| face.to_vec()).to_vec()))
+    Ok(((0..8).map(corner).collect(), BOX_FACES.map(|face| face.to_vec()).to_vec()))
 }
 
 /// The number with the fewest decimals in an interval; its middle where it holds none with 15.

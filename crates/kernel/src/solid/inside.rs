@@ -41,9 +41,11 @@ impl<'a> Inside<'a> {
     /// How far a point is from what the surface encloses: 0 inside, else the distance of the nearest triangle, up to a few roundings of the coordinates. Cost: log n or so.
     #[must_use]
     pub fn distance(&self, x: DVec3) -> f64 {
-        if self.mesh.triangles.is_empty() || self.winding(x) > 0 {
-            return 0.0;
-        }
+        if self.mesh.triangles.is_empty() || self.winding(x) > 0 { 0.0 } else { self.surface_distance(x) }
+    }
+
+    /// How far a point is from the surface, up to a few roundings of the coordinates; infinitely far from none. Cost: log n or so.
+    pub(crate) fn surface_distance(&self, x: DVec3) -> f64 {
         let mut nearest = f64::INFINITY;
         let entry = |around: &Box32| {
             let [low, high] = [around.low, around.high].map(|end| end.as_dvec3());

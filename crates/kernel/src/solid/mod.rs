@@ -19,7 +19,7 @@ use crate::budget::{Budget, Stopped};
 use crate::measure::mass::{volume, volume_within};
 pub use crossings::Crossings;
 pub use flat::without_flat_shells;
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 pub use inside::Inside;
 pub use repair::{Repair, RepairError, Repaired, Unfilled, repair};
 pub use shells::{MisplacedShell, misplaced_shell};
@@ -62,6 +62,23 @@ impl TriMesh {
         firsts
     }
 
+    /// A box from one corner to the opposite one, its triangles outwards.
+    pub(crate) fn cuboid(low: DVec3, high: DVec3) -> Self {
+        let corner = |code: u32| DVec3::select(BVec3::new(code & 1 != 0, code & 2 != 0, code & 4 != 0), high, low);
+        let triangles = BOX_FACES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Self { vertices: (0..8).map(corner).collect(), triangles }
+    }
+
+    /// The surface of what is outside of a closed mesh, within a box that is as far away as a length.
+    pub(crate) fn complement(&self, far: f64) -> Self {
+        let low = self.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min) - far;
+        let high = self.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max) + far;
+        let mut other = self.clone();
+        other.reverse();
+        other.append(&Self::cuboid(low, high));
+        other
+    }
+
     /// Turns every triangle around: what was outside is inside.
     pub fn reverse(&mut self) {
         self.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
@@ -77,6 +94,9 @@ pub struct Solid {
     mesh: TriMesh,
     topology: Topology,
 }
+
+/// The faces of a box, outwards; bit k of a corner says whether it is at the upper end of axis k.
+pub(crate) const BOX_FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// How far a position moves when it becomes a single-precision number: half a unit in the last place along every axis, at coordinates up to `extent`.
 pub(crate) fn rounding(extent: f64) -> f64 {

@@ -100,11 +100,7 @@ pub(super) mod tests {
     pub(in super::super) fn cubes(ends: &[[f64; 2]]) -> TriMesh {
         let mut mesh = TriMesh::default();
         for &[low, high] in ends {
-            let start = mesh.vertices.len() as u32;
-            let end = |code: usize, axis: usize| if code >> axis & 1 == 0 { low } else { high };
-            mesh.vertices.extend((0..8).map(|code| DVec3::new(end(code, 0), end(code, 1), end(code, 2))));
-            let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-            mesh.triangles.extend(faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).map(|corners| corners.map(|k| start + k)));
+            mesh.append(&TriMesh::cuboid(DVec3::splat(low), DVec3::splat(high)));
         }
         mesh
     }

@@ -180,7 +180,8 @@ impl Arrangement {
         setting.off += kinds.off();
         let flat = match planar::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)? {
             None => match height_field::surface(&kinds.list, &setting, &|x| copies.rounded(x), budget)? {
-                None => offset::surface(&kinds.list, &setting, |x| copies.rounded(x), budget)?,
+                None if setting.has_sheets => offset::surface(&kinds.list, &surfaces, &setting, |x| copies.rounded(x), budget)?,
+                None => None,
                 made => made,
             },
             made => made,
@@ -226,8 +227,9 @@ impl Arrangement {
         let Some((mut sites, _)) = Sites::of(rule, candidates, most_of(MOST_POLYTOPES, budget), budget)? else { return Ok(None) };
         sites.is_exact = setting.off + sites.off() == 0.0;
         let copies = Copies::default();
-        let Some(flat) = offset::surface(&sites.list, setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
-        let mut arrangement = Self::empty(sites, setting.clone(), rule.attractor().surfaces(), Arc::new(copies));
+        let surfaces = rule.attractor().surfaces();
+        let Some(flat) = offset::surface(&sites.list, &surfaces, setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
+        let mut arrangement = Self::empty(sites, setting.clone(), surfaces, Arc::new(copies));
         arrangement.take(flat);
         Ok(Some(arrangement))
     }

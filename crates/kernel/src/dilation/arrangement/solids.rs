@@ -11,23 +11,23 @@ use glam::DVec3;
 
 /// Leaves out the surfaces inside of solids. False, with nothing changed, where a solid's own surface winds around one otherwise than once: then it crosses itself.
 pub(super) fn leave_out(solids: &[Inside<'_>], surface: &mut BlockSurface) -> bool {
-    if solids.is_empty() {
-        return true;
-    }
+    let is_outside = |x: DVec3| {
+        let mut windings = solids.iter().map(|solid| solid.winding(x));
+        windings.try_fold(true, |is_outside, winding| (0..=1).contains(&winding).then_some(is_outside && winding == 0))
+    };
+    solids.is_empty() || keep(surface, is_outside)
+}
+
+/// Keeps the connected surfaces of which a vertex is wanted. False, with nothing changed, where that is not known of one.
+pub(super) fn keep(surface: &mut BlockSurface, is_wanted: impl Fn(DVec3) -> Option<bool>) -> bool {
     let groups = Groups::of_triangles(surface.vertices.len(), &surface.triangles).all();
-    let mut is_inside = vec![false; groups.len()];
+    let mut is_kept = vec![false; groups.len()];
     // A group is called by the least of its vertices.
     for (vertex, _) in (0..).zip(&groups).filter(|&(vertex, &group)| vertex == group) {
-        let x = DVec3::from_array(surface.vertices[vertex as usize]);
-        for solid in solids {
-            match solid.winding(x) {
-                0 => {}
-                1 => is_inside[vertex as usize] = true,
-                _ => return false,
-            }
-        }
+        let Some(is_so) = is_wanted(DVec3::from_array(surface.vertices[vertex as usize])) else { return false };
+        is_kept[vertex as usize] = is_so;
     }
-    surface.triangles.retain(|triangle| !is_inside[groups[triangle[0] as usize] as usize]);
+    surface.triangles.retain(|triangle| is_kept[groups[triangle[0] as usize] as usize]);
     surface.drop_unused();
     true
 }

@@ -1,4 +1,4 @@
-//! Fewer triangles for a surface: such that both sheets, as far out as the radius, follow it.
+//! Fewer triangles for a surface: such that its sheets, as far out as the radius, follow it.
 
 use super::seams::Hidden;
 use super::skin::Skin;
@@ -124,8 +124,8 @@ impl Side {
             let turned = subtract(&ways[1][k], &ways[0][k]);
             dot(&lifted(&way, &turned, side), &turned).abs() / 8.0
         };
-        let sag = bend(0, radius).max(bend(0, -radius)).max(bend(1, radius)) / STRIP;
-        Some(Self { ends: places, ways, along: unit(&way), is_seam, sag })
+        let up = skin.sides.iter().map(|side| bend(0, side * radius)).fold(0.0, f64::max);
+        Some(Self { ends: places, ways, along: unit(&way), is_seam, sag: up.max(bend(1, radius)) / STRIP })
     }
 
     /// How far a vertex is off the side, as far out as the radius along the normals and the way out.
@@ -146,11 +146,11 @@ impl Side {
             (dot(&all, &all) - dot(&all, &self.along).powi(2)).max(0.0).sqrt()
         };
         let [up, out] = [turned(0), turned(1)];
-        across(&up, radius).max(across(&up, -radius)).max(across(&out, radius)) / STRIP
+        skin.sides.iter().map(|side| across(&up, side * radius)).fold(across(&out, radius), f64::max) / STRIP
     }
 }
 
-/// A triangle: its corners as places on it and as far out on both sides, with the normals there, and how far sides are off sheets that turn evenly.
+/// A triangle: its corners as places on it and as far out on its sides, with the normals there, and how far sides are off sheets that turn evenly.
 struct Triangle {
     corners: [Point; 3],
     normal: Point,
@@ -179,8 +179,8 @@ impl Triangle {
         let mut sheets = [([0.0; 3], [0.0; 3]); 2];
         let (mut sag, mut is_inverted) = (0.0_f64, [false; 2]);
         let ups: [Point; 3] = std::array::from_fn(|k| skin.ups[corners[k] as usize].map(|part| part * cosines[k].signum()));
-        for ((sheet, is_inverted), side) in sheets.iter_mut().zip(&mut is_inverted).zip([radius, -radius]) {
-            let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side));
+        for ((sheet, is_inverted), side) in sheets.iter_mut().zip(&mut is_inverted).zip(skin.sides) {
+            let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side * radius));
             let own = unit(&across(&out));
             let cosine = dot(&own, &normal);
             *is_inverted = cosine < LEAST_COSINE;
@@ -207,7 +207,7 @@ impl Triangle {
         all.iter().fold(f64::INFINITY, |least, &own| least.min(own)) / all.iter().sum::<f64>()
     }
 
-    /// How far a vertex is off the sheets on both sides.
+    /// How far a vertex is off the sheets.
     fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
         let (x, up) = (&skin.places[vertex as usize], &skin.ups[vertex as usize]);
         let own = radius.copysign(dot(&self.normal, up));
@@ -215,7 +215,7 @@ impl Triangle {
         let off = |(at, normal): &(Point, Point), side: f64| {
             if dot(normal, &self.normal) < 0.0 { 0.0 } else { dot(normal, &subtract(&lifted(x, up, side * own), at)).abs() }
         };
-        off(&self.sheets[0], 1.0).max(off(&self.sheets[1], -1.0))
+        self.sheets.iter().zip(skin.sides).map(|(sheet, &side)| off(sheet, side)).fold(0.0, f64::max)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Surfaces that turn little from face to face but at seams, such as fine meshes of smooth ones with sharp edges: a sheet on each side, as far out as the radius, and strips around their borders that join both.
 //!
-//! At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
+//! Around solids there is the sheet outside alone, and all that is said here of places is said of those outside; closed surfaces whose seams leave no triangles for both sides are made of two such, one around what is outside of them. At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
 //!
 //! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
 //! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
-//! * Each way from a place of the sheets to the place with the same shares in the feet of its corners has d <= t - m (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of the sheets: where no cell is, these wind around nothing. Where sheets cross each other they are cut (`crossed`), and M is what they wind around once or more: so M is in D_t(S), as what cuts, mending and rounding move is moved by less than m.
+//! * Each way from a place of the sheets to the place with the same shares in the feet of its corners has d <= t - m (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of the sheets: where no cell is, these wind around nothing. A sheet outside alone winds there as the T do (`inward`). Where sheets cross each other they are cut (`crossed`), and M is what they wind around once or more: so M is in D_t(S), as what cuts, mending and rounding move is moved by less than m.
 //!   So is what else is added: closed parts that are filled, and lids (`lids`) over places where sheets are too near, look back, or touch, each with a place inside such that what is between that and the lid has d <= t - m; and what is between slivers and what they become (`tidy`).
 //! * All triangles of its boundary have s <= d <= t. It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
 //! * Wherever s <= d(x) <= t there is a direction w with w . (x - c) > 0 for all places c of S that are closest to x; and at places of the boundary of M there is one that leaves it through all facets there, too (`ways`).
@@ -15,6 +15,7 @@
 
 mod coarse;
 mod crossed;
+mod inward;
 mod lids;
 mod outcome;
 mod seams;
@@ -26,25 +27,26 @@ mod tidy;
 mod ways;
 
 use super::between::{Memory, middle, radius};
-use super::faces::{Faces, Fault, Question, without_lines};
+use super::faces::{Faces, Fault, Question, numbered, without_lines};
 use super::figure::{self, Figure};
+use super::solids::keep;
 use super::sum::is_embedded;
 use super::{BYTES_PER_TRIANGLE, Flat};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::dilation::setting::Setting;
-use crate::dilation::surface::BlockSurface;
+use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
 use crate::solid::half_edges::NONE;
-use crate::solid::{Inside, TriMesh};
+use crate::solid::{Crossings, Inside, Solid, SolidError, TriMesh, misplaced_shell, repair};
 use coarse::Coarse;
 use crossed::Pieces;
 use glam::DVec3;
 use outcome::Outcome;
 use rayon::prelude::*;
 use sheets::{Name, Shape, Sheets};
-use skin::{Skin, upright};
+use skin::{BOTH_SIDES, OUTER, Sides, Skin, edges, upright};
 use std::cell::Cell;
 use std::collections::{BTreeSet, HashSet};
 use std::ops::ControlFlow;
@@ -63,6 +65,8 @@ const FACET: f64 = -0.7;
 /// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
 const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
+/// Rounds in which strips that are too near are left to finer ones.
+const ROUNDS_OF_STRIPS: u32 = 4;
 /// Rounds in which normals are evened where what is left of sheets looks back, the first before lids are tried, the second where these do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
 const EVENINGS: usize = 2;
 const FEWER: usize = 2;
@@ -76,15 +80,18 @@ const MOVED: f64 = 128.0;
 const IN_A_ROW: usize = 64;
 /// Within how many times the outer distance what is closest is sought.
 const AWAY: f64 = 1.5;
+/// How far away the box around what is outside of closed surfaces is, in units of the outer distance.
+const FAR: f64 = 2.5;
 /// Directions across which the width of what may be filled is asked, besides the axes.
 const MOST_NORMALS: usize = 32;
 
-/// The surface around figures that are the faces of a surface that turns little, with coordinates that are rounded; none where they are not, or the proof does not come out.
+/// The surface around figures that are the faces of a surface that turns little, with coordinates that are rounded; none where they are not, or the proof does not come out. Around what bounds solids, of those that are given, it is outside of these.
 ///
 /// # Errors
 /// [`Stopped`].
 pub(super) fn surface(
     figures: &[Figure],
+    solids: &[TriMesh],
     setting: &Setting,
     round: impl Fn(f64) -> f64 + Sync,
     budget: &Budget,
@@ -97,28 +104,113 @@ pub(super) fn surface(
         return Ok(None);
     }
     let [inner, outer] = [setting.least + setting.slack, setting.outer - setting.slack];
+    let along = |triangles: &[[Point; 3]], sides: Sides| with_seams(triangles, sides, [inner, outer], setting, &round, budget);
+    if let Some(outward) = outward(&triangles, solids)
+        && solid_of(&outward, budget)?.is_some()
+        && let (made, false) = along(&outward, OUTER)?
+    {
+        return Ok(made);
+    }
+    match along(&triangles, BOTH_SIDES)? {
+        (None, true) if solids.is_empty() => side_by_side(&triangles, FAR * outer, along, budget),
+        (made, _) => Ok(made),
+    }
+}
+
+/// Outward triangles as a mesh that bounds a solid and does not meet itself; none where they do not.
+fn solid_of(triangles: &[[Point; 3]], budget: &Budget) -> Result<Option<TriMesh>, Stopped> {
+    let (places, triangles) = numbered(triangles);
+    let mesh = TriMesh { vertices: places.into_iter().map(DVec3::from_array).collect(), triangles };
+    let mesh = match Solid::new(mesh, budget) {
+        Ok(solid) => solid.into_mesh(),
+        Err(SolidError::Stopped(stopped)) => return Err(stopped),
+        Err(_) => return Ok(None),
+    };
+    Ok((Crossings::of(&mesh, budget)?.count == 0 && misplaced_shell(&mesh).is_none()).then_some(mesh))
+}
+
+/// The surface around what closed surfaces bound, and the one around what is outside of these, of which the part inside is kept: each side has triangles of its own then, so that what has to go at the hollow side of seams is not in the way of the other one. None where they are no such surfaces, meet themselves, or one of both does not come out.
+fn side_by_side(
+    triangles: &[[Point; 3]],
+    far: f64,
+    along: impl Fn(&[[Point; 3]], Sides) -> Result<(Option<Flat>, bool), Stopped>,
+    budget: &Budget,
+) -> Result<Option<Flat>, Stopped> {
+    let (places, corners) = numbered(triangles);
+    if edges(&corners).chunk_by(|a, b| a.ends == b.ends).any(|edge| edge.len() != 2) {
+        return Ok(None);
+    }
+    let mesh = TriMesh { vertices: places.into_iter().map(DVec3::from_array).collect(), triangles: corners };
+    let Ok(repaired) = repair(&mesh, budget) else { return budget.cancel.check().map(|()| None) };
+    let mesh = repaired.solid.map_or(mesh, Solid::into_mesh);
+    if mesh.triangles.len() != triangles.len() {
+        return Ok(None);
+    }
+    let faces = |mesh: &TriMesh| (0..mesh.triangles.len() as u32).map(|triangle| mesh.points_of(triangle)).collect::<Vec<[Point; 3]>>();
+    let Some(mesh) = solid_of(&faces(&mesh), budget)? else { return Ok(None) };
+    let (inside, mut surface, mut are_steady) = (Inside::new(&mesh), BlockSurface::default(), true);
+    for (solid, winding) in [(&mesh, 0), (&mesh.complement(far), 1)] {
+        let mut own = match along(&faces(solid), OUTER)?.0 {
+            Some(Flat::Made(own)) => {
+                are_steady = false;
+                own
+            }
+            Some(Flat::Steady(own)) => own,
+            other => return Ok(other),
+        };
+        keep(&mut own, |x| Some(inside.winding(x) == winding));
+        let first = surface.vertices.len() as u32;
+        surface.vertices.append(&mut own.vertices);
+        surface.triangles.extend(own.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+    }
+    Ok(Some(if are_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) }))
+}
+
+/// Triangles as solids have them; none where some are of none, or of two.
+fn outward(triangles: &[[Point; 3]], solids: &[TriMesh]) -> Option<Vec<[Point; 3]>> {
+    if solids.is_empty() {
+        return None;
+    }
+    let name = |corners: &[Point; 3]| {
+        let mut name = corners.map(|corner| corner.map(|x| (x + 0.0).to_bits()));
+        name.sort_unstable();
+        name
+    };
+    let mut all: NameMap<[[u64; 3]; 3], Option<[Point; 3]>> = NameMap::default();
+    for corners in solids.iter().flat_map(|solid| (0..solid.triangles.len() as u32).map(|triangle| solid.points_of(triangle))) {
+        all.entry(name(&corners)).and_modify(|own| *own = None).or_insert(Some(corners));
+    }
+    triangles.iter().map(|corners| all.get(&name(corners)).copied().flatten()).collect()
+}
+
+/// The surface around triangles, with seams or others, and whether other triangles, or those for both sides, may serve where none comes out: at seams, or where those on one side do not tell enough.
+fn with_seams(
+    triangles: &[[Point; 3]],
+    sides: Sides,
+    [inner, outer]: [f64; 2],
+    setting: &Setting,
+    round: &(impl Fn(f64) -> f64 + Sync),
+    budget: &Budget,
+) -> Result<(Option<Flat>, bool), Stopped> {
     let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
-    let mut last = None;
+    let (mut last, mut is_open) = (None, false);
     for share in SEAMS {
-        let Some(skin) = Skin::new(&triangles, radius, TURNED * half, share, setting.slack) else {
+        let Some(skin) = Skin::new(triangles, sides, radius, TURNED * half, share, setting.slack) else {
             continue;
         };
-        // With as many seams as before there are the same.
-        if last.replace(skin.seams.all.len()) == Some(skin.seams.all.len()) {
+        // With as many seams as before there are the same; a solid has no border.
+        if last.replace(skin.seams.all.len()) == Some(skin.seams.all.len()) || (sides == OUTER && !skin.borders.is_empty()) {
             continue;
         }
         budget.cancel.check()?;
-        let made = along(
-            &Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer, moved: MOVED * setting.rounding },
-            setting,
-            &round,
-            budget,
-        )?;
-        if let ControlFlow::Break(made) = made {
-            return Ok(made);
+        let around = Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer, moved: MOVED * setting.rounding };
+        match along(&around, setting, round, budget)? {
+            ControlFlow::Break(Some(made)) => return Ok((Some(made), false)),
+            ControlFlow::Break(None) => return Ok((None, last > Some(0))),
+            ControlFlow::Continue(()) => is_open = true,
         }
     }
-    Ok(None)
+    Ok((None, last > Some(0) || (is_open && sides == OUTER)))
 }
 
 /// The same, given the surface with its seams: what is made, or that it cannot be, unless other seams may serve.
@@ -188,7 +280,10 @@ fn along(
         }
         let faults = around.faults(&sheets, &pieces, &good, if may_move { outer - moved } else { outer }, budget)?;
         // What is too near is left to lids where a round does not make as many more triangles as there are of that.
-        let may_go_on = round_number + 1 < ROUNDS && made_before.is_none_or(|before| left.len() >= before + faults.len());
+        let is_finer = made_before.is_none_or(|before| left.len() >= before + faults.len());
+        let is_strip = |fault: &(u32, bool)| sheets.owners[fault.0 as usize] == NONE;
+        let has_finer_strips = round_number < ROUNDS_OF_STRIPS && faults.iter().any(is_strip);
+        let may_go_on = round_number + 1 < ROUNDS && (is_finer || has_finer_strips);
         let is_stalled = !may_go_on && faults.iter().all(|fault| fault.1);
         made_before = Some(left.len());
         if faults.is_empty() || is_stalled {
@@ -234,6 +329,9 @@ fn along(
             }
             if outcome.off > moved {
                 return Ok(ControlFlow::Break(None));
+            }
+            if skin.sides == OUTER && !around.wind_inside(&left, budget)? {
+                return Ok(ControlFlow::Continue(()));
             }
             let mut surface = outcome.surface;
             let is_shown = is_embedded(&mut surface, budget)? && holds(&surface, skin);

@@ -1,7 +1,7 @@
 //! Sides at which a surface turns much: it is taken apart there, so that what is left turns little, and each part has normals of its own.
 
 use super::coarse::lifted;
-use super::skin::{Edge, Skin};
+use super::skin::{Edge, Sides, Skin};
 use crate::attractor::cell::{Point, cross, distance_squared, dot, subtract, unit};
 use crate::dilation::arrangement::faces::Faces;
 use crate::dilation::convex::Convex;
@@ -128,8 +128,8 @@ impl Seams {
         self.places.get(&self.first(vertex)).map(Vec::as_slice)
     }
 
-    /// Finds what is around the places of seams, given normals of triangles and vertices; false where it is not closed, or hollow and not.
-    pub(super) fn find_rings(&mut self, normals: &[Point], ups: &[Point]) -> bool {
+    /// Finds what is around the places of seams on some sides, given normals of triangles and vertices; false where it is not closed, or hollow and not.
+    pub(super) fn find_rings(&mut self, normals: &[Point], ups: &[Point], sides: Sides) -> bool {
         let mut next: BTreeMap<Corner, Vec<(Corner, bool)>> = BTreeMap::new();
         for Seam { ends: [own, other], triangles, inwards } in &self.all {
             let [normal, other_normal] = triangles.map(|triangle| &normals[triangle as usize]);
@@ -138,7 +138,7 @@ impl Seams {
             for k in 0..2 {
                 let (a, b) = (own[k], other[if is_aligned { 1 - k } else { k }]);
                 let [up, other_up] = [(normal, a), (other_normal, b)].map(|(normal, vertex)| dot(normal, &ups[vertex as usize]) > 0.0);
-                for is_above in [true, false] {
+                for is_above in sides.iter().map(|&side| side > 0.0) {
                     let [one, another] = across([a, b], [up, other_up], is_aligned, is_above);
                     next.entry(one).or_default().push((another, is_hollow == is_above));
                     next.entry(another).or_default().push((one, is_hollow == is_above));
@@ -169,7 +169,7 @@ impl Seams {
             }
             self.rings.push(Ring { corners, is_border, is_hollow });
         }
-        // Both sides of all parts at a place are in one ring each.
+        // All parts at a place are in one ring on each side.
         self.rings.iter().all(|ring| self.copies(ring.corners[0].0).is_some_and(|copies| copies.len() == ring.corners.len()))
     }
 
@@ -217,7 +217,7 @@ impl Skin {
         Some(x)
     }
 
-    /// What other parts hide, as far out as the radius, from one of both sides. Cost: some microseconds for each vertex near to seams.
+    /// What other parts hide, as far out as the radius, from one of the sides. Cost: some microseconds for each vertex near to seams.
     pub(super) fn hidden(&self, valleys: &Valleys, faces: &Faces, radius: f64, half: f64) -> Hidden {
         let mut hidden = Hidden { is_hidden: vec![false; self.places.len()], all: Vec::new() };
         let is_near = |x: &Point, least: f64| {
@@ -252,8 +252,8 @@ impl Skin {
                     continue;
                 }
                 is_seen[other as usize] = true;
-                let is_over = |is_up: &bool| is_near(&lifted(place, &self.up((other, *is_up)), far), far - NEARER * half);
-                if [true, false].iter().any(is_over) {
+                let is_over = |is_up: bool| is_near(&lifted(place, &self.up((other, is_up)), far), far - NEARER * half);
+                if self.sides.iter().map(|&side| side > 0.0).any(is_over) {
                     hidden.add(other);
                 }
                 open.push_back((other, at, wide));

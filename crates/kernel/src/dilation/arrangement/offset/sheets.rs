@@ -1,4 +1,4 @@
-//! Both sheets of a surface, strips around its border that join them, and strips along its seams that join those of its parts.
+//! The sheets of a surface, one on each of its sides, strips around its border that join them, and strips along its seams that join those of its parts.
 
 use super::coarse::lifted;
 use super::seams::{Corner, Ring, Valleys, across};
@@ -60,7 +60,7 @@ impl Shape {
         borders.sort_unstable();
         borders.dedup();
         let columns = borders.iter().map(|&corner| 1.0 + skin.turns[corner as usize].clamp(-1.0, 1.0).acos() / self.column);
-        2.0 * (triangles.len() as f64 + self.rows() as f64 * columns.sum::<f64>())
+        skin.sides.len() as f64 * (triangles.len() as f64 + self.rows() as f64 * columns.sum::<f64>())
     }
 }
 
@@ -97,11 +97,12 @@ impl Sheets {
         };
         for (owner, corners) in (0..).zip(triangles) {
             let normal = normal(corners);
-            let [upper, lower] = [true, false].map(|is_upper| {
-                corners.map(|corner| vertex(&mut sheets, corner, (dot(&normal, &skin.ups[corner as usize]) > 0.0) == is_upper))
-            });
-            sheets.triangles.extend([upper, [lower[0], lower[2], lower[1]]]);
-            sheets.owners.extend([owner; 2]);
+            for &side in skin.sides {
+                let is_up = |corner: u32| side * dot(&normal, &skin.ups[corner as usize]) > 0.0;
+                let [a, b, c] = corners.map(|corner| vertex(&mut sheets, corner, is_up(corner)));
+                sheets.triangles.push(if side > 0.0 { [a, b, c] } else { [a, c, b] });
+                sheets.owners.push(owner);
+            }
         }
         let all = edges(triangles);
         let singles: Vec<Outline> = all
@@ -194,7 +195,7 @@ impl Sheets {
         for seam in seams {
             let &[(ends, is_up), (others, other_up)] = seam.as_slice() else { return None };
             let is_aligned = skin.seams.first(ends[0]) != skin.seams.first(others[0]);
-            for is_above in [true, false] {
+            for is_above in skin.sides.iter().map(|&side| side > 0.0) {
                 let corners = [0, 1].map(|k| {
                     let j = if is_aligned { 1 - k } else { k };
                     across([ends[k], others[j]], [is_up[k], other_up[j]], is_aligned, is_above)

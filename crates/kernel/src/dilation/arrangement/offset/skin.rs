@@ -22,12 +22,21 @@ const ACUTE: f64 = 0.9;
 /// Sides that are shorter than this, as a share of the longest ones at both ends, may have one normal: noise and marching cubes turn the triangles there, and sheets would fold.
 const SHORT: f64 = 0.2;
 
+/// The share of inner sides that may be flat, and around solids.
+const FLAT: f64 = 0.5;
+const SOLID_FLAT: f64 = 0.94;
 /// Of so many inner sides one is a seam at most.
 const MOST_SHARP: usize = 4;
+
+/// The sides of a surface on which sheets are: where normals lead, and the other one. Around a solid there is a sheet outside alone.
+pub(super) type Sides = &'static [f64];
+pub(super) const BOTH_SIDES: Sides = &[1.0, -1.0];
+pub(super) const OUTER: Sides = &[1.0];
 
 /// A surface of triangles with its normals.
 #[derive(Clone)]
 pub(super) struct Skin {
+    pub(super) sides: Sides,
     pub(super) places: Vec<Point>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// The same, joined where neighbours have a side in opposite directions, and behind them one for each side of the border, with a corner that all of these have and no other: so that nearly all that is around a vertex is closed.
@@ -37,7 +46,7 @@ pub(super) struct Skin {
     pub(super) ups: Vec<Point>,
     /// What those of corners were at first, but one for all that short sides join.
     shared: Vec<Point>,
-    /// By how much less than the radius the triangles at a corner, no others, are away from the places that are as far out along its normal, on either side, at most.
+    /// By how much less than the radius the triangles at a corner, no others, are away from the places that are as far out along its normal, on its sides, at most.
     pub(super) lost: Vec<f64>,
     pub(super) around: Incidence,
     /// The sides that one triangle alone has, as it has them, and which it is; seams are none of these.
@@ -50,9 +59,9 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    /// The surface of some triangles, with seams where it turns by so many times the angle by which a normal may be off that of a corner, so that as much of a radius is lost as may be; none where more is lost at a corner, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, where parts meet at seams in other ways than along whole ones that are all hollow on a side, or all not, or where most inner sides are flat, by no more than `flatness`, or many are seams:
+    /// The surface of some triangles, outward ones if it has one side, with seams where it turns by so many times the angle by which a normal may be off that of a corner, so that as much of a radius is lost as may be; none where more is lost at a corner, where a side has more than two of them, where there are slivers, or more triangles at a corner than is usual, where parts meet at seams in other ways than along whole ones that are all hollow on a side, or all not, or where more inner sides are flat, by no more than `flatness`, or seams than may be:
     /// then there are few faces. Cost: some tenths of a microsecond for each.
-    pub(super) fn new(faces: &[[Point; 3]], radius: f64, most_lost: f64, seams: f64, flatness: f64) -> Option<Self> {
+    pub(super) fn new(faces: &[[Point; 3]], sides: Sides, radius: f64, most_lost: f64, seams: f64, flatness: f64) -> Option<Self> {
         let least = (seams * (1.0 - most_lost / radius).acos()).cos().max(SMOOTH);
         let (mut places, mut triangles) = numbered(faces);
         let normals: Vec<Point> = faces.iter().map(upright).collect::<Option<_>>()?;
@@ -80,7 +89,9 @@ impl Skin {
             }
         }
         let inner = smooth.len() + sharp.len();
-        if 2 * flat >= inner || MOST_SHARP * sharp.len() >= inner {
+        // Most sides of cylinders are flat, too.
+        let most_flat = if sides == OUTER { SOLID_FLAT } else { FLAT };
+        if flat as f64 >= most_flat * inner as f64 || MOST_SHARP * sharp.len() >= inner {
             return None;
         }
         let mut seams = Seams::part(&mut places, &mut triangles, &sharp, &inwards, &smooth);
@@ -104,7 +115,7 @@ impl Skin {
         let lost_with = |vertex: usize, up: &Point| {
             let cosines = around.at(vertex as u32).iter().map(|&triangle| dot(&normals[triangle as usize], up).abs());
             let of_planes = radius * (1.0 - cosines.fold(1.0, f64::min));
-            if of_planes <= most_lost { of_planes } else { lost(&places[vertex], up, radius, near(vertex)) }
+            if of_planes <= most_lost { of_planes } else { lost(&places[vertex], up, sides, radius, near(vertex)) }
         };
         let shared = shared(&places, &triangles, &ups);
         let choose = |vertex: usize| {
@@ -116,15 +127,15 @@ impl Skin {
             if with <= own { (shared[vertex], with) } else { (ups[vertex], own) }
         };
         let (ups, lost): (Vec<Point>, Vec<f64>) = (0..places.len()).into_par_iter().map(choose).unzip();
-        if lost.iter().any(|&lost| lost > most_lost) || !seams.find_rings(&normals, &ups) {
+        if lost.iter().any(|&lost| lost > most_lost) || !seams.find_rings(&normals, &ups, sides) {
             return None;
         }
         let (mut outs, mut turns) = (vec![[0.0; 3]; places.len()], vec![1.0; places.len()]);
         // Where seams end at the border, that one tells.
         let mut is_at_border = vec![false; places.len()];
         borders.iter().flat_map(|edge| edge.of(&triangles)).for_each(|end| is_at_border[end as usize] = true);
-        let sides = borders.iter().map(|edge| (edge, true)).chain(sharp.iter().flatten().map(|edge| (edge, false)));
-        for (edge, is_border) in sides {
+        let all = borders.iter().map(|edge| (edge, true)).chain(sharp.iter().flatten().map(|edge| (edge, false)));
+        for (edge, is_border) in all {
             let out = edge.inward(&places, &triangles, &normals).map(|part| -part);
             for end in edge.of(&triangles).into_iter().filter(|&end| is_border || !is_at_border[end as usize]) {
                 let sum = &mut outs[end as usize];
@@ -139,10 +150,10 @@ impl Skin {
         let borders: Vec<([u32; 2], u32)> = borders.iter().map(|edge| (edge.of(&triangles), edge.triangle)).collect();
         outs.iter_mut().for_each(|out| *out = unit(out));
         let beyond = places.len() as u32;
-        let sides = borders.iter().map(|(ends, _)| ends).chain(seams.all.iter().flat_map(|seam| &seam.ends));
-        let more: Vec<[u32; 3]> = sides.map(|&[a, b]| [b, a, beyond]).collect();
+        let ends = borders.iter().map(|(ends, _)| ends).chain(seams.all.iter().flat_map(|seam| &seam.ends));
+        let more: Vec<[u32; 3]> = ends.map(|&[a, b]| [b, a, beyond]).collect();
         let mesh = HalfEdges::new([places.as_slice(), &[[0.0; 3]]].concat(), &[triangles.as_slice(), &more].concat());
-        Some(Self { places, triangles, mesh, normals, ups, shared, lost, around, borders, outs, turns, seams })
+        Some(Self { sides, places, triangles, mesh, normals, ups, shared, lost, around, borders, outs, turns, seams })
     }
 
     /// Makes the normals of some corners those that short sides share, or, where they are these already, the means of those around them, where no more than told is lost of a radius; whether any is another one now. So they take turns: means of means alone left pebble of the peers' comparison folded at r/40.
@@ -153,7 +164,7 @@ impl Skin {
             let sum = beside.clone().flatten().fold([0.0; 3], |sum: Point, other| add(&sum, &self.ups[other as usize], own));
             let faces: Vec<[Point; 3]> = beside.map(|corners| corners.map(|other| self.places[other as usize])).collect();
             [self.shared[corner as usize], unit(&sum)].into_iter().filter(|up| up != own).find_map(|up| {
-                let lost = lost(&self.places[corner as usize], &up, radius, faces.iter());
+                let lost = lost(&self.places[corner as usize], &up, self.sides, radius, faces.iter());
                 (lost <= most_lost).then_some((corner, up, lost))
             })
         };
@@ -162,6 +173,22 @@ impl Skin {
             (self.ups[corner as usize], self.lost[corner as usize]) = (up, lost);
         }
         !all.is_empty()
+    }
+
+    /// The pseudo-normal of a vertex of a solid: what has it closest is outside where it is above (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005).
+    pub(super) fn outward(&self, vertex: u32) -> Point {
+        let Skin { triangles, places, normals, around, seams, .. } = self;
+        let own = [vertex];
+        let mut sum = [0.0; 3];
+        for &copy in seams.copies(vertex).unwrap_or(&own) {
+            for &triangle in around.at(copy) {
+                let (corners, normal) = (triangles[triangle as usize], &normals[triangle as usize]);
+                let k = corners.iter().position(|&corner| corner == copy).unwrap_or_default();
+                let [a, b] = [1, 2].map(|step| subtract(&places[corners[(k + step) % 3] as usize], &places[copy as usize]));
+                sum = lifted(&sum, normal, dot(&cross(&a, &b), normal).atan2(dot(&a, &b)));
+            }
+        }
+        unit(&sum)
     }
 
     /// The corner that none of its triangles has.
@@ -207,14 +234,14 @@ impl Skin {
     }
 }
 
-/// By how much less than a radius triangles are away from the places that are as far out from another one along a normal, on either side.
-fn lost<'a>(at: &Point, up: &Point, radius: f64, near: impl Iterator<Item = &'a [Point; 3]> + Clone) -> f64 {
+/// By how much less than a radius triangles are away from the places that are as far out from another one along a normal, on these sides.
+fn lost<'a>(at: &Point, up: &Point, sides: Sides, radius: f64, near: impl Iterator<Item = &'a [Point; 3]> + Clone) -> f64 {
     let of = |side: f64| {
         let out = lifted(at, up, side);
         let squares = near.clone().map(|[a, b, c]| distance_squared(&out, &closest_on_triangle(&out, a, b, c)));
         radius - squares.fold(f64::INFINITY, f64::min).sqrt()
     };
-    of(radius).max(of(-radius))
+    sides.iter().map(|side| of(side * radius)).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Adds a normal to a sum, turned to the side of another one.

@@ -2,8 +2,8 @@ use super::super::testing::{
     arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, lowered_as,
     on_lattice, place, plan, topology,
 };
-use super::skin::Skin;
-use super::surface;
+use super::skin::{BOTH_SIDES, Skin};
+use super::{solid_of, surface};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Point, Site, dot, subtract, unit};
 use crate::budget::Budget;
@@ -11,7 +11,7 @@ use crate::dilation::arrangement::figure::Figure;
 use crate::dilation::tree::Weighted;
 use crate::measure::triangle::closest_on_triangle;
 use crate::model::Interior;
-use crate::solid::Inside;
+use crate::solid::{Inside, TriMesh, repair};
 use crate::split_mix::Random;
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
@@ -239,14 +239,29 @@ impl Mesh {
         self.faces.iter().map(|face| [0, 1, 2].map(|k| self.vertices[face[k] as usize].to_array())).collect()
     }
 
+    /// What it bounds, with its triangles outwards: so that the orientation is not that of how it was made.
+    fn solid(&self) -> (Self, Attractor) {
+        let triangles = self.faces.iter().map(|face| [0, 1, 2].map(|k| face[k])).collect();
+        let mesh = TriMesh { vertices: self.vertices.clone(), triangles };
+        let mesh = repair(&mesh, &Budget::default()).unwrap().solid.map_or(mesh, |solid| solid.into_mesh());
+        let faces: Vec<Vec<u32>> = mesh.triangles.iter().map(|corners| corners.to_vec()).collect();
+        let shape = lowered_as(Interior::Solid, &mesh.vertices, faces.clone()).unwrap();
+        (Self { vertices: mesh.vertices, faces }, shape)
+    }
+
     /// Whether sheets are made around it.
     fn is_made(&self, radius: f64, tolerance: f64) -> bool {
-        let (shape, budget) = (self.lowered(), Budget::default());
-        let plan = plan(&shape, radius, tolerance);
+        self.is_made_around(&self.lowered(), radius, tolerance)
+    }
+
+    /// The same around a shape that it is the surface of.
+    fn is_made_around(&self, shape: &Attractor, radius: f64, tolerance: f64) -> bool {
+        let budget = Budget::default();
+        let plan = plan(shape, radius, tolerance);
         let setting = plan.setting(plan.pitch(), &budget);
         let figures: Vec<Figure> =
             self.corners().into_iter().map(|corners| Weighted { site: Site::Triangle(corners), deficit: 0.0 }.into()).collect();
-        surface(&figures, &setting, |x| f64::from(x as f32), &budget).unwrap().is_some()
+        surface(&figures, &shape.surfaces(), &setting, |x| f64::from(x as f32), &budget).unwrap().is_some()
     }
 
     fn distance(&self, x: DVec3) -> f64 {
@@ -451,20 +466,95 @@ fn what_is_no_smooth_surface_is_left_to_others() {
     assert!(holds_everywhere(&dilation, 1.0, |x| mixed.distance(x), &mut random));
 }
 
-/// A solid's surface is thickened outwards only.
+/// A solid, with the components, the cavities and the Euler number of its dilation by a radius, and that: inside of most of them a sheet would fold, or meet itself.
+fn solid(case: usize) -> (Mesh, (u64, u64, i64), f64) {
+    let hollow = || Mesh::ball(36, 18, 12.0, 0.0).and(Mesh::ball(36, 18, 7.5, 0.0));
+    let wave = |x: DVec3| 0.8 * (0.6 * x.x + 0.4).sin() * (0.6 * x.y + 0.2).sin() * (0.6 * x.z).cos();
+    match case {
+        0 => (Mesh::torus(40, 24, [15.0, 6.0]), (1, 0, 0), 1.0),
+        1 => (Mesh::torus(80, 48, [15.0, 1.0]), (1, 0, 0), 1.0),
+        2 => (Mesh::torus(80, 48, [15.0, 0.7]), (1, 0, 0), 2.0),
+        3 => (Mesh::ball(36, 18, 12.0, 0.05), (1, 0, 2), 1.4),
+        4 => (hollow(), (1, 1, 4), 1.0),
+        5 => (Mesh::lens(60, 20, 12.0, 0.9), (1, 0, 2), 1.0),
+        6 => (Mesh::lens(60, 20, 12.0, 0.5), (1, 0, 2), 3.0),
+        7 => (Mesh::drum(48, 12, 8.0, 2.0), (1, 0, 2), 0.7),
+        8 => (Mesh::drum(48, 12, 8.0, -2.0), (1, 0, 2), 6.0),
+        9 => (Mesh::cushion(20, 10.0, 1.5), (1, 0, 2), 1.2),
+        10 => (Mesh::cushion(16, 8.0, -1.0), (1, 0, 2), 5.0),
+        11 => (Mesh::level_set(60, 15.6, |x| x.length() - 12.0 + wave(x)), (1, 0, 2), 1.5),
+        _ => (Mesh::torus(60, 32, [15.0, 4.0]).and(Mesh::torus(60, 32, [15.0, 4.0]).moved(DVec3::new(45.0, 0.0, 3.0))), (2, 0, 0), 0.6),
+    }
+}
+
+/// Around solids there is a sheet outside alone, whatever is inside.
 #[test]
-fn solids_have_no_sheet_inside() {
-    let mesh = Mesh::torus(40, 24, [15.0, 6.0]);
-    let solid = lowered_as(Interior::Solid, &mesh.vertices, mesh.faces).unwrap();
-    assert!(is_flat(&solid, 1.0, 0.1));
-    let dilation = arranged(&solid, 1.0, 0.1);
-    assert_eq!(topology(&dilation), (1, 0, 0));
-    // Pappus: 2 pi^2 R (a + r)^2, but for the band and for what is between the mesh and the torus.
-    let volume = 2.0 * PI * PI * 15.0 * 7.0_f64.powi(2);
-    let mesh = dilation.solid.mesh();
-    let corners = mesh.triangles.iter().map(|triangle| triangle.map(|corner| mesh.vertices[corner as usize]));
-    let own = corners.map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0;
-    assert!((own / volume - 1.0).abs() < 0.05, "{own} {volume}");
+fn sheets_around_solids_are_outside() {
+    let mut random = Random(191);
+    for case in 0..13 {
+        let (mesh, expected, radius) = solid(case);
+        let tolerance = [0.1, 0.2][case % 2] * radius;
+        let (mesh, shape) = mesh.turned(&mut random).solid();
+        assert!(mesh.is_made_around(&shape, radius, tolerance) && is_flat(&shape, radius, tolerance), "{case}");
+        let dilation = arranged(&shape, radius, tolerance);
+        assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
+        assert_eq!(topology(&dilation), expected, "{case}");
+        let surfaces = shape.surfaces();
+        let solids: Vec<Inside> = surfaces.iter().map(Inside::new).collect();
+        let distance = |x: DVec3| solids.iter().map(|solid| solid.distance(x)).fold(f64::INFINITY, f64::min);
+        assert!(holds_everywhere(&dilation, radius, distance, &mut random), "{case}");
+        let inside = Inside::new(dilation.solid.mesh());
+        for _ in 0..300 {
+            let x = mesh.near(radius, &mut random);
+            assert_bounds(case, &inside, &dilation, radius, x, distance(x));
+            let within = mesh.vertices[random.next() as usize % mesh.vertices.len()].lerp(x, random.share());
+            assert_bounds(case, &inside, &dilation, radius, within, distance(within));
+        }
+    }
+}
+
+/// Where what is hidden inside of seams is in the way outside, each side has a sheet with triangles of its own, whichever way the surface's faces run.
+#[test]
+fn sides_of_closed_surfaces_are_made_apart() {
+    let mut random = Random(197);
+    // As in the comparison with peers, where triangles for both sides are too coarse for the outer one.
+    let mut mesh = Mesh::cushion(48, 10.0, 2.5).turned(&mut random);
+    mesh.faces.iter_mut().filter(|_| random.share() < 0.5).for_each(|face| face.reverse());
+    let (radius, tolerance) = (0.433, 0.433 / 40.0);
+    assert!(mesh.is_made(radius, tolerance));
+    let dilation = arranged(&mesh.lowered(), radius, tolerance);
+    assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance);
+    assert_eq!(topology(&dilation), (1, 1, 4));
+    let surface = mesh.solid().1.surfaces().swap_remove(0);
+    let surface = Inside::new(&surface);
+    assert!(holds_everywhere(&dilation, radius, |x| surface.surface_distance(x), &mut random));
+    let inside = Inside::new(dilation.solid.mesh());
+    for _ in 0..1_000 {
+        let x = mesh.near(radius, &mut random);
+        assert_bounds(0, &inside, &dilation, radius, x, surface.surface_distance(x));
+    }
+}
+
+/// One side is not asked for alone where it is not known which is outside: a tube that meets itself, a ball with another one in it, and a ball inside out.
+#[test]
+fn solids_that_meet_themselves_have_both_sides() {
+    let budget = Budget::default();
+    let is_solid = |mesh: &Mesh| solid_of(&mesh.corners(), &budget).unwrap().is_some();
+    assert!(is_solid(&Mesh::torus(40, 24, [15.0, 6.0]).solid().0));
+    let spindle = Mesh::torus(40, 24, [3.0, 6.0]).solid().0;
+    let ball = |radius: f64| Mesh::ball(24, 12, radius, 0.0).solid().0;
+    let mut inward = ball(5.0);
+    inward.faces.iter_mut().for_each(|face| face.reverse());
+    assert!(is_solid(&ball(9.0).and(inward.clone())));
+    for (case, mesh) in [spindle, ball(9.0).and(ball(5.0)), inward].iter().enumerate() {
+        assert!(!is_solid(mesh), "{case}");
+    }
+}
+
+#[test]
+fn sheets_around_solids_do_not_depend_on_threads() {
+    assert_steady(&Mesh::drum(48, 12, 8.0, -2.0).solid().1, 1.0, 0.1);
+    assert_limited(&Mesh::cushion(20, 10.0, 1.5).solid().1, 1.0, 0.1);
 }
 
 /// Few triangles are left of a fine mesh: as many as the tolerance asks for.
@@ -484,7 +574,7 @@ fn faces_below_places_are_found() {
     let mut random = Random(139);
     let mesh = Mesh::torus(40, 24, [15.0, 6.0]);
     let corners = mesh.corners();
-    let skin = Skin::new(&corners, 1.0, 0.03, 2.0, 1e-9).unwrap();
+    let skin = Skin::new(&corners, BOTH_SIDES, 1.0, 0.03, 2.0, 1e-9).unwrap();
     let mut found = 0;
     for _ in 0..300 {
         let from = random.next() as u32 % corners.len() as u32;

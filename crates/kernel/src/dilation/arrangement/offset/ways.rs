@@ -2,7 +2,7 @@
 
 use super::coarse::lifted;
 use super::seams::Seam;
-use super::skin::{Skin, upright};
+use super::skin::{OUTER, Skin, upright};
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::{Body, lowest, middle};
@@ -127,10 +127,10 @@ impl<'a> Ways<'a> {
         Ok(all(&left, budget, |&face| ways.lead_from_parts(face, &is_left, &rays, &cones))?
             && all(&skin.borders, budget, |(ends, triangle)| ways.lead_beyond(&ends.map(at), &skin.normals[*triangle as usize]))?
             && all(&skin.seams.all, budget, |seam| ways.lead_over(seam))?
-            && all(&borders, budget, |&vertex| ways.lead_around(&at(vertex), &rays(vertex), &cones))?)
+            && all(&borders, budget, |&vertex| ways.lead_around(vertex, &rays(vertex), &cones))?)
     }
 
-    /// Whether it is so on both sides of some faces, for the directions away from the inside of these and around corners within.
+    /// Whether it is so on the sides of some faces, for the directions away from the inside of these and around corners within.
     fn lead_from(&self, group: &[u32]) -> bool {
         let Skin { triangles, normals, around, .. } = self.skin;
         let first = normals[group[0] as usize];
@@ -144,7 +144,7 @@ impl<'a> Ways<'a> {
             return false;
         }
         let places: Vec<Point> = corners.map(|corner| self.skin.places[corner as usize]).collect();
-        [up, up.map(|part| -part)].into_iter().all(|axis| self.lead_along(&places, &Cone::new(axis, cosine)))
+        self.skin.sides.iter().all(|side| self.lead_along(&places, &Cone::new(up.map(|part| side * part), cosine)))
     }
 
     /// Whether it is so of the places that what is between some of a surface is closest to, in the directions of a cone: of all together, or of the parts of a side or a triangle.
@@ -201,7 +201,7 @@ impl<'a> Ways<'a> {
         halves(ways, true).iter().all(|half| self.lead_apart(places, half, [from, to]))
     }
 
-    /// Likewise of the inside of a face, and of its inner sides and corners, on both sides of it, each in the directions that belong to it: of those that no face has which is not left, and no earlier one.
+    /// Likewise of the inside of a face, and of its inner sides and corners, on the sides of it, each in the directions that belong to it: of those that no face has which is not left, and no earlier one.
     fn lead_from_parts(&self, face: u32, is_left: &[bool], rays: &impl Fn(u32) -> Vec<Point>, cones: &[Cone]) -> bool {
         let Skin { triangles, places, normals, mesh, around, .. } = self.skin;
         let (corners, normal) = (triangles[face as usize], normals[face as usize]);
@@ -232,10 +232,10 @@ impl<'a> Ways<'a> {
             let cosine = all.iter().map(|way| dot(way, &axis)).fold(1.0, f64::min) - NOISE;
             match cosine > FRAC_1_SQRT_2 {
                 true => self.lead_apart(&[at[k]], &Cone::new(axis, cosine).around(), between),
-                false => self.lead_around(&at[k], &rays(corners[k]), cones),
+                false => self.lead_around(corners[k], &rays(corners[k]), cones),
             }
         };
-        [1.0, -1.0].into_iter().all(|side: f64| {
+        self.skin.sides.iter().all(|&side| {
             self.lead_apart(&at, &[along(face, side)], between)
                 && (0..3).all(|k| is_side_left(k, side))
                 && (0..3).all(|k| is_corner_left(k, side))
@@ -300,11 +300,14 @@ impl<'a> Ways<'a> {
         Ways { outer: self.outer + beside, ..*self }.leaves(&points, axis, height)
     }
 
-    /// Likewise of a place from which the surface goes on along some rays, in all directions.
-    fn lead_around(&self, place: &Point, rays: &[Point], cones: &[Cone]) -> bool {
+    /// Likewise of a vertex from which the surface goes on along some rays, in all directions, or all that lead out of a solid.
+    fn lead_around(&self, vertex: u32, rays: &[Point], cones: &[Cone]) -> bool {
+        let Skin { places, sides, .. } = self.skin;
+        let outward = if *sides == OUTER { Some(self.skin.outward(vertex)) } else { None };
         // No place out along such a direction has this one closest: going along a ray leads closer.
         let is_beside = |cone: &Cone| rays.iter().any(|ray| dot(ray, &cone.axis) > cone.sine + NOISE);
-        cones.iter().all(|cone| is_beside(cone) || self.lead_somewhere(&[*place], cone))
+        let is_inside = |cone: &Cone| outward.is_some_and(|outward| dot(&outward, &cone.axis) < -cone.sine - NOISE);
+        cones.iter().all(|cone| is_beside(cone) || is_inside(cone) || self.lead_somewhere(&[places[vertex as usize]], cone))
     }
 
     /// Likewise of the inside of a side of the border, given the normal of its triangle: in all directions across the side that do not lead over the triangle.
@@ -321,6 +324,10 @@ impl<'a> Ways<'a> {
     /// Likewise of the inside of a seam: in all directions across it that lead over neither of its triangles.
     fn lead_over(&self, seam: &Seam) -> bool {
         let ends = seam.ends[0].map(|end| self.skin.places[end as usize]);
+        let is_concave = dot(&self.skin.normals[seam.triangles[0] as usize], &seam.inwards[1]) > 0.0;
+        if is_concave && self.skin.sides == OUTER {
+            return true;
+        }
         // Normals of both triangles on the side with room between them.
         let [from, to] = [0, 1].map(|k| {
             let normal = self.skin.normals[seam.triangles[k] as usize];
