@@ -26,6 +26,7 @@ mod refine;
 pub(crate) mod sites;
 mod tangent;
 pub(crate) mod trim;
+mod volume;
 mod walk;
 
 use crate::automaton::topology::{Topology, TopologyError};

@@ -64,15 +64,23 @@ const SPLINES: [Spline<'static>; 8] = [
 ];
 
 impl Attractor {
+    /// The Bezier points of every curve that is proven to have some, with all that it leads to, and by how much equations miss.
+    pub(crate) fn bezier_curves(&self) -> (Vec<Option<SubdivisionOperator>>, f64) {
+        let ids = || (0..self.automaton().states().len()).map(StateId::new);
+        let curves: Vec<Option<SubdivisionOperator>> = ids().map(|id| self.curve_points(id)).collect();
+        let halved: Vec<Option<f64>> = ids().map(|id| self.halved(id, &curves)).collect();
+        let holds = self.automaton().hereditary(halved.iter().map(Option::is_some).collect());
+        let miss = halved.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
+        (curves.into_iter().zip(holds).map(|(curve, holds)| curve.filter(|_| holds)).collect(), miss)
+    }
+
     /// The Bezier points of every state that is proven to have some, with all that it leads to.
     ///
     /// Cost: for every face state some products of its operators.
     pub(crate) fn bezier_patches(&self) -> Vec<Option<BezierPatch>> {
         let ids = || (0..self.automaton().states().len()).map(StateId::new);
-        let curves: Vec<Option<SubdivisionOperator>> = ids().map(|id| self.curve_points(id)).collect();
-        let halved: Vec<Option<f64>> = ids().map(|id| self.halved(id, &curves)).collect();
-        let holds = self.automaton().hereditary(halved.iter().map(Option::is_some).collect());
-        let curve = |id: StateId| curves[id.index()].as_ref().filter(|_| holds[id.index()]);
+        let (curves, missed) = self.bezier_curves();
+        let curve = |id: StateId| curves[id.index()].as_ref();
         let patch = |id: StateId| match self.automaton().factors(id) {
             [] => self.spline_patch(id),
             &[u, v] => {
@@ -87,7 +95,7 @@ impl Attractor {
         let quartered: Vec<Option<f64>> = ids().map(|id| if product(id) { Some(0.0) } else { self.quartered(id, &patches) }).collect();
         let holds = self.automaton().hereditary(quartered.iter().map(Option::is_some).collect());
         // In a product the equations of two factors miss.
-        let miss = quartered.iter().flatten().fold(2.0 * halved.iter().flatten().fold(0.0_f64, |a, &b| a.max(b)), |a, &b| a.max(b));
+        let miss = quartered.iter().flatten().fold(2.0 * missed, |a, &b| a.max(b));
         let kept = |(patch, holds): (Option<BezierPatch>, bool)| patch.filter(|_| holds).map(|patch| BezierPatch { miss, ..patch });
         patches.into_iter().zip(holds).map(kept).collect()
     }

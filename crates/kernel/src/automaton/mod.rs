@@ -220,6 +220,17 @@ impl Automaton {
         Ok(Self { states, claims: BTreeMap::new(), products })
     }
 
+    /// The automaton with a state that leads nowhere, or with one of its own that is as good, and which that is.
+    pub(crate) fn with_state(&self, state: State, is_as_good: impl Fn(&State) -> bool) -> (Self, StateId) {
+        let mut own = self.clone();
+        let place = own.states.iter().position(is_as_good).unwrap_or_else(|| {
+            own.states.push(state);
+            own.products.push(Vec::new());
+            own.states.len() - 1
+        });
+        (own, StateId::new(place))
+    }
+
     /// The states, in order of their ids.
     #[must_use]
     pub fn states(&self) -> &[State] {

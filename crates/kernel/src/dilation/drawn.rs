@@ -1,4 +1,4 @@
-//! Shapes that stand for others: triangles for trimmed and for smooth surfaces, fewer of them for fine meshes, and roots with one radius each.
+//! Shapes that stand for others: triangles for trimmed and for smooth surfaces and around volumes, fewer of them for fine meshes, and roots with one radius each.
 
 use super::DilationError;
 use super::arrangement::without_lines;
@@ -13,7 +13,7 @@ use crate::solid::TriMesh;
 use crate::tolerance::{Radius, Tolerance};
 use std::borrow::Cow;
 
-/// Share of the tolerance that triangles which stand for trimmed surfaces may use.
+/// Share of the tolerance that triangles which stand for trimmed surfaces, or around volumes, may use.
 const TRIM_SHARE: f64 = 0.1;
 
 /// Share of the tolerance by which radii may be off where they vary.
@@ -52,7 +52,7 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Draws trimmed surfaces to their share of the tolerance, times `coarseness`, and splits roots whose radius varies; `None` when there are none.
+    /// Draws trimmed surfaces and the faces of volumes to their share of the tolerance, times `coarseness`, and splits roots whose radius varies; `None` when there are none.
     pub(super) fn resolved(
         attractor: &Attractor,
         radius: Radius,
@@ -61,20 +61,25 @@ impl Drawn {
         budget: &Budget,
     ) -> Result<Option<Self>, DilationError> {
         let is_trimmed = !attractor.trimmed().is_empty();
-        if !is_trimmed && !attractor.has_own_radii() {
+        if !is_trimmed && !attractor.has_own_radii() && !attractor.has_volumes() {
             return Ok(None);
         }
         let length = |mm: f64| Tolerance::new(mm).unwrap_or(tolerance);
         let [least, most] = attractor.radii(radius.mm());
         let balls = Balls { least, most };
         let aimed = tolerance.mm().min(0.5 * balls.least);
-        let (changed, mut deviation_mm) = if is_trimmed {
-            let share = coarseness * TRIM_SHARE;
-            let (resolved, deviation_mm) = attractor.resolved(length(share * aimed), budget).map_err(|error| refused(error, share))?;
-            (Cow::Owned(resolved), deviation_mm)
-        } else {
-            (Cow::Borrowed(attractor), 0.0)
-        };
+        let share = coarseness * TRIM_SHARE;
+        let (mut changed, mut deviation_mm) = (Cow::Borrowed(attractor), 0.0);
+        if is_trimmed {
+            let (resolved, off) = attractor.resolved(length(share * aimed), budget).map_err(|error| refused(error, share))?;
+            (changed, deviation_mm) = (Cow::Owned(resolved), off);
+        } else if let Some((filled, off)) =
+            unless_stopped(attractor.filled(length(share * aimed), budget).map_err(|error| refused(error, share)))?
+        {
+            (changed, deviation_mm) = (Cow::Owned(filled), off);
+        } else if !attractor.has_own_radii() {
+            return Ok(None);
+        }
         if attractor.has_own_radii() {
             let graded = changed.graded(radius.mm(), GRADE_SHARE * aimed, budget).map_err(|error| refused(error, GRADE_SHARE))?;
             deviation_mm += graded.deviation_mm;
@@ -89,14 +94,15 @@ impl Drawn {
         Ok(Some(Self { attractor: changed.into_owned(), balls, meant, rest: length(aimed - deviation_mm) }))
     }
 
-    /// Draws a surface with a B-rep to its share of the tolerance; `None` where it is no such surface, or has more cells than one that is smooth for balls of this radius: another way may do with fewer.
+    /// Draws a surface with a B-rep, or what volumes are bounded by, to its share of the tolerance; `None` where it is no such shape, or has more cells than one that is smooth for balls of this radius: another way may do with fewer.
     pub(super) fn smooth(
         attractor: &Attractor,
         radius: Radius,
         tolerance: Tolerance,
         budget: &Budget,
     ) -> Result<Option<Self>, DilationError> {
-        if !attractor.is_surface() {
+        let is_surface = attractor.is_surface();
+        if !is_surface && (!attractor.has_volumes() || attractor.has_own_radii()) {
             return Ok(None);
         }
         let radius = radius.mm();
@@ -106,8 +112,13 @@ impl Drawn {
         let [x, y, z] = std::array::from_fn(|axis| bounds.high[axis].high - bounds.low[axis].low);
         let cells = (FEW_CELLS + CELLS_PER_SQUARE * (x * y + y * z + z * x) / (radius * aimed)) as u64;
         let limits = Limits { cells: cells.min(budget.limits.memory_bytes / BYTES_PER_CELL).min(budget.limits.cells), ..budget.limits };
-        let drawn = attractor.drawn(share, &Budget { limits, ..budget.clone() }).map_err(|error| refused(error, SMOOTH_SHARE));
-        let Some((mesh, deviation_mm)) = unless_stopped(drawn.map(Some))? else { return Ok(None) };
+        let few = Budget { limits, ..budget.clone() };
+        let came = |error| refused(error, SMOOTH_SHARE);
+        if !is_surface {
+            let filled = unless_stopped(attractor.filled(share, &few).map_err(came))?;
+            return Ok(filled.and_then(|(filled, deviation_mm)| Self::near(filled, &bounds, radius, aimed, deviation_mm)));
+        }
+        let Some((mesh, deviation_mm)) = unless_stopped(attractor.drawn(share, &few).map(Some).map_err(came))? else { return Ok(None) };
         let (mesh, moved) = unfolded(mesh, UNFOLDED_SHARE * aimed);
         let deviation_mm = deviation_mm + moved;
         Ok(Attractor::of_triangles(&mesh, false).and_then(|drawn| Self::near(drawn, &bounds, radius, aimed, deviation_mm)))
