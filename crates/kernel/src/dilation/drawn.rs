@@ -52,7 +52,7 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Draws trimmed surfaces and the faces of volumes to their share of the tolerance, times `coarseness`, and splits roots whose radius varies; `None` when there are none.
+    /// Draws trimmed surfaces and the faces of volumes to their share of the tolerance, times `coarseness`, and splits roots whose radius varies; `None` when there are none, or no volumes that are proven to be solids.
     pub(super) fn resolved(
         attractor: &Attractor,
         radius: Radius,

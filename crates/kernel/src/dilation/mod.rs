@@ -16,7 +16,7 @@
 //! Points, segments and triangles of which few are near to each other, wires, panels and the faces of solids, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`) and simplified part by
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
-//! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`); around solids, and NURBS volumes that are proven to be such (`volume` in `attractor`), there is one outside.
+//! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`); around most solids, and NURBS volumes that are proven to be such (`volume` in `attractor`), there is one outside.
 //! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them.
 //! For graphs over a convex part of a plane that have very many cells, as rough ones do, rays stand that lead down and up from a few of their places (`peaks`): between two sheets is all that is near to these.
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
@@ -125,7 +125,7 @@ pub fn dilate_unsimplified(
     run(&Order::new(attractor, radius, tolerance, false, budget), budget)
 }
 
-/// The dilation of a surface by other ways than sheets along it: where a sheet on the side that is asked for does not come out.
+/// The dilation of a surface by other ways than sheets along it, where a sheet on the side that is asked for does not come out; along fewer triangles that stand for it they may yet.
 ///
 /// # Errors
 /// As [`dilate`].
@@ -262,10 +262,7 @@ impl<'a> Order<'a> {
             (resolved, _) => resolved,
         };
         match drawn {
-            Some(drawn) => {
-                let plan = drawn.plan(simplify, coarseness, budget)?;
-                work(&if self.has_sheets { plan } else { plan.without_sheets() })
-            }
+            Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
             None => {
                 let whole = self.plan_of(attractor, coarseness, budget)?;
                 match whole.split(budget)? {

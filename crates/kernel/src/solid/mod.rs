@@ -69,8 +69,9 @@ impl TriMesh {
         Self { vertices: (0..8).map(corner).collect(), triangles }
     }
 
-    /// The surface of what is outside of a closed mesh, within a box that is as far away as a length.
-    pub(crate) fn complement(&self, far: f64) -> Self {
+    /// The surface of what is outside of a closed mesh, within a box that is so far away that nothing within a length of one of them is near to the other.
+    pub(crate) fn complement(&self, reach: f64) -> Self {
+        let far = FAR * reach;
         let low = self.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min) - far;
         let high = self.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max) + far;
         let mut other = self.clone();
@@ -94,6 +95,9 @@ pub struct Solid {
     mesh: TriMesh,
     topology: Topology,
 }
+
+/// How far away a box is, in units of a length within which nothing is near to both it and what is in it.
+const FAR: f64 = 2.5;
 
 /// The faces of a box, outwards; bit k of a corner says whether it is at the upper end of axis k.
 pub(crate) const BOX_FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];

@@ -28,8 +28,9 @@ struct Face {
     points: Vec<ControlPoint>,
     rational: bool,
     sides: [[u32; 2]; 2],
-    /// Of both directions, whether all points along it are one place.
+    /// Of both directions, whether all points along it are one place, and by how much these may differ.
     constant: [bool; 2],
+    limit: f64,
     /// Of the sides, whether all points of it are one place.
     collapsed: [[bool; 2]; 2],
 }
@@ -46,10 +47,10 @@ fn sign(boundary: usize) -> bool {
 
 /// Whether control points are the same but for a factor, as those of faces are that are one.
 fn are_alike(one: &[ControlPoint], other: &[ControlPoint]) -> bool {
-    let largest = one.iter().flat_map(|point| &point[..3]).fold(0.0_f64, |most, x| most.max(x.abs()));
+    let largest = one.iter().flat_map(|point| [0, 1, 2].map(|k| point[k] / point[3])).fold(0.0_f64, |most, x| most.max(x.abs()));
     let is_same = |(a, b): (&ControlPoint, &ControlPoint)| {
         let scale = one[0][3] / other[0][3];
-        (0..4).all(|k| (a[k] - scale * b[k]).abs() <= ALIKE * if k < 3 { largest } else { a[3].abs() })
+        (0..4).all(|k| (a[k] - scale * b[k]).abs() <= ALIKE * if k < 3 { largest * a[3].abs() } else { a[3].abs() })
     };
     one.len() == other.len() && one.iter().zip(other).all(is_same)
 }
@@ -108,11 +109,12 @@ impl Attractor {
     pub(super) fn boundary_of(&self, group: &Group) -> Option<Self> {
         let (topology, start) = self.brep()?;
         let faces: Vec<Face> = group.outer.iter().map(|&place| self.face(start, place)).collect::<Option<_>>()?;
-        let mut sides = Groups::new(start.count());
+        let (mut sides, mut seam_mm) = (Groups::new(start.count()), self.seam_mm);
         for face in &faces {
             for direction in (0..2).filter(|&direction| face.constant[direction]) {
                 let [from, to] = face.sides[direction];
                 sides.join(from as usize, to as usize);
+                seam_mm = seam_mm.max(face.limit);
             }
         }
         let (mut roots, mut gluings, mut collapsed) = (Vec::new(), Vec::new(), Vec::new());
@@ -134,7 +136,8 @@ impl Attractor {
         let mut topology = topology.clone();
         let start = Start::new(&mut topology, &self.automaton, &roots, &gluings, &collapsed).ok()?;
         let brep = Some((Arc::new(topology), start));
-        let surface = Self { roots, solids: Vec::new(), brep, trimmed: Vec::new(), trims: Vec::new(), radii: Vec::new(), ..self.clone() };
+        let surface =
+            Self { roots, solids: Vec::new(), brep, trimmed: Vec::new(), trims: Vec::new(), radii: Vec::new(), seam_mm, ..self.clone() };
         surface.is_surface().then_some(surface)
     }
 
@@ -193,6 +196,6 @@ impl Attractor {
                 ends.iter().all(|end| are_one(end, &ends[0]))
             })
         });
-        Some(Face { state: own.state, rational: root_cell.rational, points, sides, constant, collapsed })
+        Some(Face { state: own.state, rational: root_cell.rational, points, sides, constant, limit, collapsed })
     }
 }

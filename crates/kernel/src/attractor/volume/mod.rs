@@ -20,8 +20,7 @@ mod tests;
 use super::cell::Ball;
 use super::{Attractor, OwnRadius, RefineError, Root, SolidSurface, StateId, roots_of};
 use crate::automaton::{Automaton, LeafPrimitive, State, SubdivisionOperator};
-use crate::budget::{Budget, Stopped};
-use crate::groups::Groups;
+use crate::budget::Budget;
 use crate::measure::mass::volume;
 use crate::solid::{Crossings, Inside, Solid, SolidError, TriMesh};
 use crate::tolerance::Tolerance;
@@ -35,7 +34,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const ROUNDING: f64 = 1e-9;
 
 impl Attractor {
-    /// The attractor with solids of triangles for volumes that hang together, of which it is proven that these are no farther from each other than what is told; none where there is no such volume.
+    /// The attractor with solids of triangles for volumes that hang together, of which it is proven that dilations of these by no less than what is told differ by no more than that; none where there is no such volume.
     ///
     /// Cost: that of drawing their faces, and the square of eight times as many control points as each has.
     ///
@@ -65,7 +64,7 @@ impl Attractor {
         self.brep().is_some_and(|(topology, _)| self.roots.iter().any(|root| topology.state(root.state).dimension == 3))
     }
 
-    /// The solid that stands for a group of volumes, and how far they are from each other; none where that is not proven.
+    /// The solid that stands for a group of volumes, and by how much dilations of both may differ; none where that is not proven.
     fn filled_group(
         &self,
         group: &Group,
@@ -90,14 +89,12 @@ impl Attractor {
             mesh.reverse();
         }
         let mesh = match Solid::new(mesh, budget) {
+            Ok(solid) if solid.topology().shells > 1 => return Ok(None),
             Ok(solid) => solid.into_mesh(),
             Err(SolidError::Stopped(stopped)) => return Err(stopped.into()),
             Err(_) => return Ok(None),
         };
-        let mut shells = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles).all();
-        shells.sort_unstable();
-        shells.dedup();
-        if shells.len() > 1 || Crossings::of(&mesh, budget)?.count > 0 {
+        if Crossings::of(&mesh, budget)?.count > 0 {
             return Ok(None);
         }
         let inside = Inside::new(&mesh);
@@ -116,8 +113,9 @@ impl Attractor {
             (gap - radius > within).then_some(false)
         };
         let sign = volumes[0].sign();
-        let keep = volumes.into_par_iter().map(|volume| volume.keeps_sign(sign, look, budget));
-        let keep_sign = keep.collect::<Result<Vec<bool>, Stopped>>()?.into_iter().all(|keeps_sign| keeps_sign);
+        let looked_at = volumes.into_par_iter().map(|volume| volume.keeps_sign(sign, look, budget));
+        // The first that is found to fail ends it.
+        let keep_sign = looked_at.find_any(|own| !matches!(own, Ok(true))).unwrap_or(Ok(true))?;
         let deviation_mm = if is_beside.into_inner() { within } else { deviation_mm };
         Ok(keep_sign.then_some((mesh, deviation_mm)))
     }

@@ -108,7 +108,7 @@ fn balls_are_filled() {
     assert!(filled(&ball(4, [2.0, 5.0]), 0.02).is_none());
 }
 
-/// Of volumes by chance all places are in the solid or as near to it as is told, and what is deeper in it is one of theirs: about as much of it as the volumes have.
+/// Of volumes by chance all places are in the solid or as near to it as is told, and most are in it.
 #[test]
 fn places_are_where_the_volume_is() {
     let mut random = Random(17);

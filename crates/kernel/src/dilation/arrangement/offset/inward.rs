@@ -57,10 +57,11 @@ impl Around<'_> {
                 })
             })
             .collect();
-        let mut vertices = vec![DVec3::ZERO; numbers.len()];
+        let (mut vertices, mut feet) = (vec![DVec3::ZERO; numbers.len()], vec![DVec3::ZERO; numbers.len()]);
         for (&place, &number) in &numbers {
             let Some(inward) = skin.inward(place, by) else { return Ok(false) };
             vertices[number as usize] = DVec3::from_array(inward);
+            feet[number as usize] = DVec3::from_array(skin.places[place as usize]);
         }
         let inward = TriMesh { vertices, triangles: corners };
         let look = |row: &[u32]| {
@@ -95,9 +96,11 @@ impl Around<'_> {
         let mut sums = vec![0; others.len()];
         for part in parts {
             budget.cancel.check()?;
-            let triangles = inward.triangles.iter().copied().filter(|corners| own[corners[0] as usize] == part).collect();
+            let triangles: Vec<[u32; 3]> = inward.triangles.iter().copied().filter(|corners| own[corners[0] as usize] == part).collect();
+            // Which way a part faces is told by its feet, as where it is cut.
+            let side = if volume(&TriMesh { vertices: feet.clone(), triangles: triangles.clone() }) > 0.0 { 1 } else { -1 };
             let part = TriMesh { vertices: inward.vertices.clone(), triangles };
-            let (side, part) = (if volume(&part) > 0.0 { 1 } else { -1 }, Inside::new(&part));
+            let part = Inside::new(&part);
             for (sum, &other) in sums.iter_mut().zip(&others) {
                 let winding = part.winding(DVec3::from_array(skin.places[other as usize]));
                 if winding != 0 && winding != side {

@@ -1,6 +1,6 @@
 //! Surfaces that turn little from face to face but at seams, such as fine meshes of smooth ones with sharp edges: a sheet on each side, as far out as the radius, and strips around their borders that join both.
 //!
-//! Around solids there is the sheet outside alone, and all that is said here of places is said of those outside; closed surfaces whose seams leave no triangles for both sides are made of two such, one around what is outside of them. At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
+//! Around solids that do not meet themselves there is the sheet outside alone, and all that is said here of places is said of those outside, unless that one does not come out; closed surfaces whose seams leave no triangles for both sides are made of two such, one around what is outside of them. At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
 //!
 //! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
 //! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
@@ -80,12 +80,10 @@ const MOVED: f64 = 128.0;
 const IN_A_ROW: usize = 64;
 /// Within how many times the outer distance what is closest is sought.
 const AWAY: f64 = 1.5;
-/// How far away the box around what is outside of closed surfaces is, in units of the outer distance.
-const FAR: f64 = 2.5;
 /// Directions across which the width of what may be filled is asked, besides the axes.
 const MOST_NORMALS: usize = 32;
 
-/// The surface around figures that are the faces of a surface that turns little, with coordinates that are rounded; none where they are not, or the proof does not come out. Around what bounds solids, of those that are given, it is outside of these.
+/// The surface around figures that are the faces of a surface that turns little, with coordinates that are rounded; none where they are not, or the proof does not come out. Around what bounds solids, of those that are given, it may be outside of these alone.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -112,7 +110,7 @@ pub(super) fn surface(
         return Ok(made);
     }
     match along(&triangles, BOTH_SIDES)? {
-        (None, true) if solids.is_empty() => side_by_side(&triangles, FAR * outer, along, budget),
+        (None, true) if solids.is_empty() => side_by_side(&triangles, outer, along, budget),
         (made, _) => Ok(made),
     }
 }
@@ -132,7 +130,7 @@ fn solid_of(triangles: &[[Point; 3]], budget: &Budget) -> Result<Option<TriMesh>
 /// The surface around what closed surfaces bound, and the one around what is outside of these, of which the part inside is kept: each side has triangles of its own then, so that what has to go at the hollow side of seams is not in the way of the other one. None where they are no such surfaces, meet themselves, or one of both does not come out.
 fn side_by_side(
     triangles: &[[Point; 3]],
-    far: f64,
+    outer: f64,
     along: impl Fn(&[[Point; 3]], Sides) -> Result<(Option<Flat>, bool), Stopped>,
     budget: &Budget,
 ) -> Result<Option<Flat>, Stopped> {
@@ -149,7 +147,7 @@ fn side_by_side(
     let faces = |mesh: &TriMesh| (0..mesh.triangles.len() as u32).map(|triangle| mesh.points_of(triangle)).collect::<Vec<[Point; 3]>>();
     let Some(mesh) = solid_of(&faces(&mesh), budget)? else { return Ok(None) };
     let (inside, mut surface, mut are_steady) = (Inside::new(&mesh), BlockSurface::default(), true);
-    for (solid, winding) in [(&mesh, 0), (&mesh.complement(far), 1)] {
+    for (solid, winding) in [(&mesh, 0), (&mesh.complement(outer), 1)] {
         let mut own = match along(&faces(solid), OUTER)?.0 {
             Some(Flat::Made(own)) => {
                 are_steady = false;
@@ -198,8 +196,8 @@ fn with_seams(
         let Some(skin) = Skin::new(triangles, sides, radius, TURNED * half, share, setting.slack) else {
             continue;
         };
-        // With as many seams as before there are the same; a solid has no border.
-        if last.replace(skin.seams.all.len()) == Some(skin.seams.all.len()) || (sides == OUTER && !skin.borders.is_empty()) {
+        // With as many seams as before there are the same.
+        if last.replace(skin.seams.all.len()) == Some(skin.seams.all.len()) {
             continue;
         }
         budget.cancel.check()?;

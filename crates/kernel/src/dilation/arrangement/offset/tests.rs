@@ -535,9 +535,9 @@ fn sides_of_closed_surfaces_are_made_apart() {
     }
 }
 
-/// One side is not asked for alone where it is not known which is outside: a tube that meets itself, a ball with another one in it, and a ball inside out.
+/// What is no solid, so that one side is not asked for alone: a tube that meets itself, a ball with another one in it, and a ball inside out.
 #[test]
-fn solids_that_meet_themselves_have_both_sides() {
+fn what_meets_itself_is_no_solid() {
     let budget = Budget::default();
     let is_solid = |mesh: &Mesh| solid_of(&mesh.corners(), &budget).unwrap().is_some();
     assert!(is_solid(&Mesh::torus(40, 24, [15.0, 6.0]).solid().0));
