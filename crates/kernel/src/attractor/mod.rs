@@ -383,9 +383,7 @@ impl Attractor {
         let drawn = trim::refine(self, tolerance, budget)?;
         let uncut: Vec<usize> = (0..self.roots.len()).filter(|&root| self.trim_of(root).is_none()).collect();
         let mut roots: Vec<Root> = uncut.iter().map(|&root| self.roots[root].clone()).collect();
-        let triangle = |state: &State| state.leaf == LeafPrimitive::Simplex && state.dimension == 3;
-        let state = self.automaton.states().iter().position(triangle).map(StateId::new);
-        roots.extend(state.into_iter().flat_map(|state| roots_of(&drawn.vertices, &drawn.triangles, state)));
+        roots.extend(self.automaton.simplex(3).into_iter().flat_map(|state| roots_of(&drawn.vertices, &drawn.triangles, state)));
         let deviation = deviation_of(&drawn);
         let mut solids = self.solids.clone();
         for solid in &mut solids {

@@ -4,7 +4,7 @@ use super::cell::{Cell, ControlPoint, Site, child_points};
 use super::refine::{RefineError, rounding_mm};
 use super::sites::reachable;
 use super::{Attractor, Root, StateBound};
-use crate::automaton::{LeafPrimitive, StateId};
+use crate::automaton::StateId;
 use crate::budget::Budget;
 use std::borrow::Cow;
 
@@ -99,7 +99,7 @@ impl Attractor {
             kept: Vec::new(),
             radii: Vec::new(),
             deviation_mm: 0.0,
-            simplices: [1, 2, 3].map(|corners| self.simplex_state(corners)),
+            simplices: [1, 2, 3].map(|corners| self.automaton.simplex(corners)),
         };
         for (index, root) in self.roots.iter().enumerate() {
             let cell = self.root_cell(index);
@@ -138,12 +138,6 @@ impl Attractor {
         };
         let trims = vec![None; roots.len()];
         Ok(Graded { attractor: Self { roots, solids, brep: None, trims, radii: own, ..self.clone() }, radii, deviation_mm })
-    }
-
-    /// The state of points, segments or triangles.
-    fn simplex_state(&self, corners: usize) -> Option<StateId> {
-        let is_it = |state: &crate::automaton::State| state.leaf == LeafPrimitive::Simplex && state.dimension == corners;
-        self.automaton.states().iter().position(is_it).map(StateId::new)
     }
 }
 

@@ -220,15 +220,21 @@ impl Automaton {
         Ok(Self { states, claims: BTreeMap::new(), products })
     }
 
-    /// The automaton with a state that leads nowhere, or with one of its own that is as good, and which that is.
-    pub(crate) fn with_state(&self, state: State, is_as_good: impl Fn(&State) -> bool) -> (Self, StateId) {
+    /// The state of points, segments or triangles, by the number of their corners.
+    pub(crate) fn simplex(&self, corners: usize) -> Option<StateId> {
+        let is_it = |state: &State| state.leaf == LeafPrimitive::Simplex && state.dimension == corners;
+        self.states.iter().position(is_it).map(StateId::new)
+    }
+
+    /// The automaton with such a state, and which that is.
+    pub(crate) fn with_simplex(&self, corners: usize) -> (Self, StateId) {
         let mut own = self.clone();
-        let place = own.states.iter().position(is_as_good).unwrap_or_else(|| {
-            own.states.push(state);
+        let state = own.simplex(corners).unwrap_or_else(|| {
+            own.states.push(State::simplex(corners));
             own.products.push(Vec::new());
-            own.states.len() - 1
+            StateId::new(own.states.len() - 1)
         });
-        (own, StateId::new(place))
+        (own, state)
     }
 
     /// The states, in order of their ids.

@@ -19,7 +19,7 @@ mod tests;
 
 use super::cell::Ball;
 use super::{Attractor, OwnRadius, RefineError, Root, SolidSurface, StateId, roots_of};
-use crate::automaton::{Automaton, LeafPrimitive, State, SubdivisionOperator};
+use crate::automaton::{Automaton, State, SubdivisionOperator};
 use crate::budget::Budget;
 use crate::measure::mass::volume;
 use crate::solid::{Crossings, Inside, Solid, SolidError, TriMesh};
@@ -130,7 +130,7 @@ impl Attractor {
         let (automaton, state) = if roots.is_empty() {
             (Automaton::new(vec![State::simplex(3)]).ok()?, StateId::new(0))
         } else {
-            self.automaton.with_state(State::simplex(3), |state| state.leaf == LeafPrimitive::Simplex && state.dimension == 3)
+            self.automaton.with_simplex(3)
         };
         let mut solids = self.solids.clone();
         for solid in &mut solids {

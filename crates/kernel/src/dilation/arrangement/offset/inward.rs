@@ -69,15 +69,15 @@ impl Around<'_> {
             let mut memory = Memory::default();
             let mut is_so = |&triangle: &u32| {
                 let feet = triangles[triangle as usize];
-                let owner = skin.around.at(feet[0])[0];
+                let owners = feet.map(|foot| skin.around.at(foot)[0]);
                 let question = Question {
                     triangle: inward.points_of(triangle),
                     feet: Some(feet.map(|foot| skin.places[foot as usize])),
-                    owners: feet.map(|foot| skin.around.at(foot)[0]),
+                    owners,
                     inner: LEAST * by,
                     outer: self.outer - self.moved,
                 };
-                self.faces.fault_with(|place| Some(skin.near(owner, place)), &question, &mut memory).is_none()
+                self.faces.fault_with(|place| Some(skin.near(owners[0], place)), &question, &mut memory).is_none()
             };
             Ok(row.iter().all(&mut is_so))
         };
