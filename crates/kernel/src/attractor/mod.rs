@@ -12,6 +12,7 @@ mod defect;
 mod deviation;
 mod early;
 mod enclosure;
+mod framed;
 pub(crate) mod graph;
 mod hull;
 mod invariant;

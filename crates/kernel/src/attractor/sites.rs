@@ -204,7 +204,7 @@ impl<'a> SiteRule<'a> {
             }
         };
         let least = self.radius - self.tolerance;
-        let allowed = least * least + self.coarseness * self.share * (self.radius * self.radius - least * least);
+        let allowed = least * least + self.room();
         let deficit = self.deficit(cell.root);
         if deficit == 0.0 {
             let square = (least + error.inner).powi(2) + error.inner_square;
@@ -217,6 +217,17 @@ impl<'a> SiteRule<'a> {
         let farthest = in_space(self.radius + self.tolerance);
         let outer = (2.0 * farthest * error.outer + error.outer * error.outer) / (2.0 * self.radius);
         (square <= allowed && outer <= self.most_outer()).then_some(SiteError { square, outer, ..error })
+    }
+
+    /// (r - e)^2 and what sites may use.
+    pub(crate) fn least_square(&self) -> f64 {
+        (self.radius - self.tolerance).powi(2) + self.room()
+    }
+
+    /// What sites may use of r^2 - (r - e)^2.
+    pub(crate) fn room(&self) -> f64 {
+        let least = self.radius - self.tolerance;
+        self.coarseness * self.share * (self.radius * self.radius - least * least)
     }
 
     /// The largest of the roots' own radii, as far as points stand for their cells.

@@ -12,6 +12,7 @@
 //! Where points stand for cells, as in most fractals, there are too many of them to be told apart. There the least squared distance at the lattice's vertices alone decides
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
 //! Its cubes are larger than that asks where one site serves all that is filled. Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
+//! Where all of these points are in one plane, there are far fewer that matter, and a sheet over the plane is the surface (`dense` and `planar` in `arrangement`); cells with few control points are seen as affine frames for that, see `framed` in `attractor`.
 //!
 //! Points, segments and triangles of which few are near to each other, wires, panels and the faces of solids, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`) and simplified part by
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
@@ -146,6 +147,10 @@ fn sheets_around(solid: &Attractor, radius: Radius, tolerance: Tolerance, budget
 const COARSE: f64 = 1.0;
 const FINER: [f64; 2] = [0.35, 0.125];
 
+/// How many times as many leaf cells there are at least without frames where these serve, and where nothing else does.
+const FEWER_FRAMES: usize = 2;
+const FAR_FEWER_FRAMES: usize = 16;
+
 /// Few cells of a graph; few are those of products, too, that are split along one factor at a time.
 const FEW_CELLS: usize = 20_000;
 
@@ -153,6 +158,10 @@ const FEW_CELLS: usize = 20_000;
 const MORE_CELLS: u64 = 10;
 
 fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
+    let framed = order.framed(budget)?;
+    if let Some(dilation) = order.by_frames(framed.as_ref(), budget, |plan| plan.run_alone(budget), |plan| plan.run_in_plane(budget))? {
+        return Ok(dilation);
+    }
     if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
         return Ok(dilation);
     }
@@ -172,7 +181,11 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
         }
         Ok(None)
     };
-    order.planned(COARSE, budget, |plan| plan.run(finer, || by_rays(Cells::Few), budget))
+    let instead = || match (by_rays(Cells::Few)?, &framed) {
+        (None, Some(framed)) => order.plan_of(&framed.attractor, COARSE, budget)?.run_alone(budget).map(Some),
+        (made, _) => Ok(made),
+    };
+    order.planned(COARSE, budget, |plan| plan.run(finer, instead, budget))
 }
 
 /// Cells of a graph. Many are left to rays at once; few serve better themselves, unless they need a lattice.
@@ -180,6 +193,21 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
 enum Cells {
     Few,
     Many,
+}
+
+/// A shape by frames.
+struct Framed {
+    attractor: Attractor,
+    serves: Serves,
+}
+
+/// Where points that stand for cells serve better than other sites.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Serves {
+    /// In a plane, and where a lattice is needed anyway.
+    InPlane,
+    /// Everywhere: others are so many.
+    Alone,
 }
 
 /// What is asked for.
@@ -217,6 +245,36 @@ impl<'a> Order<'a> {
             };
         };
         unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
+    }
+
+    /// The same shape by frames, for points to stand for its cells; none where there are not far fewer of these.
+    fn framed(&self, budget: &Budget) -> Result<Option<Framed>, DilationError> {
+        let Some(attractor) = self.simplify.then(|| self.attractor.framed()).flatten() else { return Ok(None) };
+        let most = usize::try_from(budget.limits.cells).unwrap_or(usize::MAX);
+        let Some(cells) = self.plan_of(&attractor, COARSE, budget)?.leaves(most, budget)? else { return Ok(None) };
+        let own = self.plan_of(self.attractor, COARSE, budget)?;
+        let are_fewer = |share: usize| own.leaves(cells.saturating_mul(share), budget).map(|leaves| leaves.is_none());
+        if !are_fewer(FEWER_FRAMES)? {
+            return Ok(None);
+        }
+        let serves = if are_fewer(FAR_FEWER_FRAMES)? { Serves::Alone } else { Serves::InPlane };
+        Ok(Some(Framed { attractor, serves }))
+    }
+
+    /// What comes of the plan for frames: where only these serve, or in a plane; none elsewhere.
+    fn by_frames<T>(
+        &self,
+        framed: Option<&Framed>,
+        budget: &Budget,
+        alone: impl FnOnce(&Plan<'_>) -> Result<T, DilationError>,
+        in_plane: impl FnOnce(&Plan<'_>) -> Result<Option<T>, DilationError>,
+    ) -> Result<Option<T>, DilationError> {
+        let Some(Framed { attractor, serves }) = framed else { return Ok(None) };
+        let plan = self.plan_of(attractor, COARSE, budget)?;
+        match serves {
+            Serves::Alone => alone(&plan).map(Some),
+            Serves::InPlane => in_plane(&plan),
+        }
     }
 
     /// What it is the graph of over a convex part of a plane, and of how many cells; none where it is none.
@@ -311,6 +369,12 @@ pub fn predict(
     budget: &Budget,
 ) -> Result<Prediction, DilationError> {
     let order = Order::new(attractor, radius, tolerance, simplify, budget);
+    let framed = order.framed(budget)?;
+    if let Some(prediction) =
+        order.by_frames(framed.as_ref(), budget, |plan| plan.predict_alone(budget), |plan| plan.predict_in_plane(budget))?
+    {
+        return Ok(prediction);
+    }
     if let Some(prediction) = order.in_sheets(budget, |plan| plan.predict_in_sheets(budget))? {
         return Ok(prediction);
     }
@@ -318,6 +382,12 @@ pub fn predict(
     let by_rays = |cells: Cells| order.over_graph(graph.as_ref(), cells, budget, |plan, graph| plan.predict_over(graph, budget));
     match by_rays(Cells::Many)? {
         Some(prediction) => Ok(prediction),
-        None => order.planned(COARSE, budget, |plan| plan.predict(|| by_rays(Cells::Few), budget)),
+        None => {
+            let instead = || match (by_rays(Cells::Few)?, &framed) {
+                (None, Some(framed)) => order.plan_of(&framed.attractor, COARSE, budget)?.predict_alone(budget).map(Some),
+                (made, _) => Ok(made),
+            };
+            order.planned(COARSE, budget, |plan| plan.predict(instead, budget))
+        }
     }
 }

@@ -330,6 +330,18 @@ impl<'a> Plan<'a> {
         })
     }
 
+    /// The same where there is no other way.
+    pub(super) fn predict_alone(&self, budget: &Budget) -> Result<Prediction, DilationError> {
+        self.predict(|| Ok(None), budget)
+    }
+
+    /// The same for what lies in a plane, see [`Plan::run_in_plane`].
+    pub(super) fn predict_in_plane(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let arrangement = Arrangement::new(&setting, &self.rule, &self.space(&setting).candidates, budget)?;
+        Ok(arrangement.map(|arrangement| self.predicted(&arrangement)))
+    }
+
     /// The same for sheets along a surface, see [`Plan::run_in_sheets`].
     pub(super) fn predict_in_sheets(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
         let setting = self.setting(self.pitch, budget);
@@ -375,7 +387,7 @@ impl<'a> Plan<'a> {
         let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
         let leaves = arrangement.as_ref().map(Arrangement::leaves).filter(|&leaves| leaves <= FEW_LEAVES);
         let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
-        let stands_for_another = self.meant.off.is_finite() && (self.meant.off > 0.0 || !self.rule.is_exact());
+        let stands_for_another = !setting.dense && self.meant.off.is_finite() && (self.meant.off > 0.0 || !self.rule.is_exact());
         if let Some(leaves) = leaves
             && stands_for_another
             && !made.as_ref().is_some_and(|made| made.topology_exact)
@@ -387,6 +399,11 @@ impl<'a> Plan<'a> {
         made.map_or_else(|| self.on_lattice(&setting, &space, budget), Ok)
     }
 
+    /// The same where there is no other way.
+    pub(super) fn run_alone(&self, budget: &Budget) -> Result<Dilation, DilationError> {
+        self.run(|_| Ok(None), || Ok(None), budget)
+    }
+
     /// The dilation without a lattice, where its topology is told.
     pub(super) fn run_if_told(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let setting = self.setting(self.pitch, budget);
@@ -394,12 +411,20 @@ impl<'a> Plan<'a> {
         let mut arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
         // Asked first: all else takes longer.
         if let Some(arrangement) = &mut arrangement
-            && !arrangement.is_of_another(&self.rule.attractor().surfaces(), budget)?
+            && !arrangement.is_of_another(&self.rule, budget)?
         {
             return Ok(None);
         }
         let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
         Ok(made.filter(|made| made.topology_exact))
+    }
+
+    /// The dilation of what lies in a plane, where points stand for cells; none where that does not come out.
+    pub(super) fn run_in_plane(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let space = self.space(&setting);
+        let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
+        self.of_arrangement(arrangement, &setting, &space, budget)
     }
 
     /// The dilation of a surface that turns little by a sheet on each side, or of a solid by one outside; none where that does not come out.
@@ -535,7 +560,12 @@ impl<'a> Plan<'a> {
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
-        let is_exact = uncertain == 0 && arrangement.is_of_another(&self.rule.attractor().surfaces(), budget)?;
+        let is_exact = uncertain == 0
+            && if setting.dense {
+                arrangement::is_told(&surface, self.rule.attractor(), &space.candidates, setting, budget)?
+            } else {
+                arrangement.is_of_another(&self.rule, budget)?
+            };
         let (index, narrower, copies) = arrangement.into_index();
         self.prove(setting, surface.site_error, surface.triangles.len() as u64, budget);
         if is_done {
@@ -713,7 +743,7 @@ impl<'a> Plan<'a> {
             leaf_cells,
             bounds: self.meant.bounds,
             uncertain,
-            topology_exact: is_exact && !setting.dense && uncertain == 0 && crossings == 0,
+            topology_exact: is_exact && uncertain == 0 && crossings == 0,
         })
     }
 }

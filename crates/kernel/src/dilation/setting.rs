@@ -60,6 +60,8 @@ pub(crate) struct Setting {
     pub(super) tolerance: f64,
     /// How far places of the shape that sites stand for are from these, and sites from it, at most: 0 where sites are the shape.
     pub(super) off: f64,
+    /// The least side of the shape's box, or more.
+    pub(super) width: f64,
     /// Whether sheets along the sites may serve.
     pub(super) has_sheets: bool,
     /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
@@ -108,6 +110,7 @@ impl Setting {
             clean_only: false,
             tolerance,
             off: 0.0,
+            width: (0..3).map(|axis| bounds.high[axis].high - bounds.low[axis].low).fold(f64::INFINITY, f64::min),
             has_sheets: true,
             cells,
         }

@@ -12,6 +12,7 @@ mod cells;
 mod copies;
 mod covering;
 mod cubes;
+mod dense;
 mod ellipsoid;
 mod engine;
 mod faces;
@@ -53,6 +54,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 pub(super) use copies::Copies;
+pub(super) use dense::is_told;
 use engine::{Engine, Forms, Run, State, TRIALS};
 pub(super) use faces::{Face, Faces, without_lines};
 use figure::{Figure, Outline};
@@ -156,8 +158,11 @@ impl Arrangement {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn new(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, budget: &Budget) -> Result<Option<Self>, Stopped> {
-        if setting.dense || setting.clean_only {
+        if setting.clean_only {
             return Ok(None);
+        }
+        if setting.dense {
+            return Self::of_dense(setting, rule, candidates, budget);
         }
         let memory = budget.limits.memory_bytes as f64;
         let few = ((memory / (BYTES_PER_TRIANGLE * LEAST_TRIANGLES)) as usize).min(MOST_POLYTOPES);
@@ -466,11 +471,11 @@ impl Arrangement {
         Ok(None)
     }
 
-    /// Whether the dilation of what its sites stand for has the topology of theirs, given the surfaces of solids. False where that is not shown.
+    /// Whether the dilation of what its sites stand for has the topology of theirs. False where that is not shown.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn is_of_another(&mut self, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn is_of_another(&mut self, rule: &SiteRule<'_>, budget: &Budget) -> Result<bool, Stopped> {
         if self.sites.is_exact || self.is_steady {
             return Ok(true);
         }
@@ -482,7 +487,7 @@ impl Arrangement {
         let is_within = off + slack <= reach - least;
         // Parts that are like others are apart by twice the outer distance: what is in question around one of them must not reach another.
         let is_apart = self.copies.is_empty() || 2.0 * (off + slack) <= outer - reach;
-        self.is_steady = is_within && is_apart && are_steady(self.figures(), &self.setting, off, solids, budget)?;
+        self.is_steady = is_within && is_apart && are_steady(self.figures(), &self.setting, off, &rule.attractor().surfaces(), budget)?;
         Ok(self.is_steady)
     }
 
@@ -517,7 +522,7 @@ pub(super) fn is_of_sites(setting: &Setting, rule: &SiteRule<'_>, candidates: &C
 /// The same of figures that are off by so much, given the surfaces of solids.
 fn are_steady(figures: &[Figure], setting: &Setting, off: f64, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
     let solids: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
-    Steady { figures, radius: setting.reach, moved: off + setting.slack, solids: &solids }.is_shown(budget)
+    Steady { figures, radius: setting.reach, moved: off + setting.slack, solids: &solids, plane: None }.is_shown(budget)
 }
 
 /// The figures that are near to each other, given how far beyond their ends they are cut; none where a lattice serves better, as too many are.

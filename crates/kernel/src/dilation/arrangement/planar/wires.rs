@@ -16,6 +16,9 @@ use std::f64::consts::{PI, TAU};
 const LEAST_NEAR: f64 = 3.0;
 /// Bodies near to each other at most, as a mean over all, and in any case.
 const MOST_NEAR: usize = 200;
+/// The same of points, of which most are covered by a few others.
+const MOST_NEAR_TO_POINTS: usize = 1_000;
+const BYTES_PER_NEAR: u64 = 64;
 const FEW_NEAR: usize = 100_000;
 /// Near to one of them at most: what is asked of a body grows with the square.
 const MOST_OF_ONE: usize = 4_096;
@@ -380,7 +383,9 @@ impl Wires {
             found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             Ok(is_plain.then_some(found))
         };
-        let most = MOST_NEAR * bodies.len() + FEW_NEAR;
+        let each = if self.segments == 0 { MOST_NEAR_TO_POINTS } else { MOST_NEAR };
+        let room = usize::try_from(budget.limits.memory_bytes / BYTES_PER_NEAR).unwrap_or(usize::MAX);
+        let most = (each * bodies.len() + FEW_NEAR).min(room);
         let (mut near, mut starts): (Vec<(f32, u32)>, Vec<u32>) = (Vec::new(), vec![0]);
         let numbers: Vec<usize> = (0..bodies.len()).collect();
         for some in numbers.chunks(1 << 12) {

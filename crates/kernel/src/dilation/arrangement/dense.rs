@@ -1,0 +1,284 @@
+//! Points that stand for cells, as of most fractals: where they are in one plane, what is around them needs no lattice, see `planar`.
+//!
+//! They are so far apart that critical points of their distance say little of the attractor A's. Where its topology is asked for, smaller cells tell it: with F the centres of balls of a radius e around cells of which A is the union, moved into the plane, every place of A or F is within e of one of the other, what they were moved included.
+//! Let A be within w of the plane. What is higher above it than w is farther up than all places of A and F: straight up leads away from all of these, as `steady` asks. What is lower is within w of a place of the plane, where distances differ by no more. So if it is shown in the plane, for e + 2 w, A's dilation has the topology of F's,
+//! which has as many components and handles as its contour in the plane has components and holes, and no voids.
+
+use super::figure::{Figure, Outline};
+use super::planar::{self, Thinned, Thinning};
+use super::steady::Steady;
+use super::{Arrangement, BYTES_PER_SITE, Copies, Sites, most_of};
+use crate::attractor::Attractor;
+use crate::attractor::cell::{Cell, ControlPoint, Point};
+use crate::attractor::sites::SiteRule;
+use crate::budget::{Budget, Stopped};
+use crate::dilation::setting::Setting;
+use crate::dilation::surface::BlockSurface;
+use crate::dilation::tree::Candidates;
+use crate::groups::Groups;
+use std::sync::Arc;
+
+/// How far points may be off a plane, as a share of half the band.
+const FLAT: f64 = 1.0 / 256.0;
+/// How far they are moved, likewise: those that are closer are one.
+const CLOSE: f64 = 1.0 / 64.0;
+/// e, in units of the radius, as it is tried, and cells of a size at most.
+const SMALL: [f64; 4] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0];
+const MOST_CELLS: usize = 150_000;
+/// Shares of the radius from which on no dilation changes where points among others are left out, one after the other: of few it takes less to find who is among whom.
+const AMONG: [f64; 3] = [0.15, 0.4, 0.9];
+
+impl Arrangement {
+    /// What lies in one plane of dense sites; none where they do not, or it does not come out.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of_dense(
+        setting: &Setting,
+        rule: &SiteRule<'_>,
+        candidates: &Candidates,
+        budget: &Budget,
+    ) -> Result<Option<Self>, Stopped> {
+        let flat = FLAT * setting.half_band();
+        if setting.width > flat {
+            return Ok(None);
+        }
+        let most = (budget.limits.memory_bytes as f64 / BYTES_PER_SITE) as usize;
+        let Some((mut sites, _)) = Sites::of(rule, candidates, most_of(most, budget), budget)? else { return Ok(None) };
+        let (room, least_square) = (rule.room(), rule.least_square());
+        let thinning = Thinning {
+            flat,
+            close: CLOSE * setting.half_band(),
+            between: (least_square - sites.error.square).max(0.0).sqrt(),
+            among: room.sqrt(),
+        };
+        let Some(Thinned { figures, moved }) = thinning.of(&sites.list, budget)? else { return Ok(None) };
+        sites.list = figures;
+        // All that sites may be off is used.
+        sites.error.inner_square = sites.error.inner_square.max(room);
+        sites.error.square = sites.error.square.max(least_square);
+        let setting = setting.narrower(moved, setting.slack);
+        let copies = Copies::default();
+        let Some(flat) = planar::surface(&sites.list, &setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
+        let mut arrangement = Self::empty(sites, setting, Vec::new(), Arc::new(copies));
+        arrangement.take(flat);
+        Ok(Some(arrangement))
+    }
+}
+
+/// Whether a surface around an attractor in a plane has as many components and holes as its dilation, and that no voids. False where that is not shown.
+///
+/// # Errors
+/// [`Stopped`].
+pub(in crate::dilation) fn is_told(
+    surface: &BlockSurface,
+    attractor: &Attractor,
+    candidates: &Candidates,
+    setting: &Setting,
+    budget: &Budget,
+) -> Result<bool, Stopped> {
+    let mut known = 0;
+    for share in SMALL {
+        let Some((centres, small)) = centres(attractor, candidates, share * setting.reach, budget)? else { return Ok(false) };
+        let Some((axis, figures)) = in_plane(&centres, setting) else { return Ok(false) };
+        if figures.len() == known {
+            continue;
+        }
+        known = figures.len();
+        let moved = small + 3.0 * setting.width + setting.slack;
+        let steady = Steady { figures: &figures, radius: setting.reach, moved, solids: &[], plane: Some(axis) };
+        if steady.is_shown(budget)? {
+            let counts = planar::counts(&figures, setting, AMONG.map(|share| share * setting.reach), budget)?;
+            return Ok(counts == Some(counts_of(surface)));
+        }
+    }
+    Ok(false)
+}
+
+/// Components and handles of a surface without voids.
+fn counts_of(surface: &BlockSurface) -> [u64; 2] {
+    let mut groups = Groups::of_triangles(surface.vertices.len(), &surface.triangles);
+    let components = (0..surface.vertices.len()).filter(|&vertex| groups.of(vertex) == vertex as u32).count() as u64;
+    let faces = surface.triangles.len() as u64;
+    // V - E + F = 2 (c - g), with E = 3 F / 2.
+    [components, (2 * components + faces / 2 - surface.vertices.len() as u64) / 2]
+}
+
+/// Centres of balls, none larger than told, around cells below some candidates, of which the attractor is the union, and how large they are; none where there are too many.
+fn centres(attractor: &Attractor, candidates: &Candidates, small: f64, budget: &Budget) -> Result<Option<(Vec<Point>, f64)>, Stopped> {
+    let (mut centres, mut largest) = (Vec::new(), 0.0_f64);
+    let candidates = candidates.cells.iter().map(|candidate| (candidate.cell, candidates.points_of(attractor, candidate).to_vec()));
+    let mut open: Vec<(Cell, Vec<ControlPoint>)> = candidates.collect();
+    while let Some((cell, points)) = open.pop() {
+        if cell.ball.radius <= small {
+            centres.push(cell.ball.centre);
+            largest = largest.max(cell.ball.radius);
+            continue;
+        }
+        budget.cancel.check()?;
+        open.extend(attractor.children(&cell, &points));
+        if centres.len() + open.len() > most_of(MOST_CELLS, budget) {
+            return Ok(None);
+        }
+    }
+    Ok(Some((centres, largest)))
+}
+
+/// Points as figures in one plane across an axis, if they are, but for little.
+fn in_plane(points: &[Point], setting: &Setting) -> Option<(usize, Vec<Figure>)> {
+    let (axis, [low, high]) = super::planar::axis_of(points.iter(), FLAT * setting.half_band())?;
+    let figure = |point: &Point| {
+        let mut at = *point;
+        at[axis] = 0.5 * (low + high);
+        Figure { outline: Outline::Point(at), deficit: 0.0 }
+    };
+    Some((axis, points.iter().map(figure).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{
+        arranged, arranged_unless_left, assert_limited, assert_steady, holds_everywhere, is_flat, lowered, on_lattice, topology,
+    };
+    use super::*;
+    use crate::attractor::cell::distance_squared;
+    use crate::model::{AffineMap, Ifs, Model, Shape};
+    use crate::solid::Inside;
+    use crate::split_mix::Random;
+    use glam::{DMat3, DVec3};
+
+    fn system(maps: Vec<AffineMap>) -> Attractor {
+        Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) }.lower().unwrap().attractor
+    }
+
+    /// Copies of the plane across an axis at a height, by a share, turned, to places.
+    fn copies(maps: &[(f64, f64, [f64; 2])], axis: usize, height: f64) -> Attractor {
+        let axes = [(axis + 1) % 3, (axis + 2) % 3];
+        let map = |&(share, turn, to): &(f64, f64, [f64; 2])| {
+            let (sine, cosine) = turn.sin_cos();
+            let mut linear = [[0.0; 3]; 3];
+            (linear[axes[0]][axes[0]], linear[axes[0]][axes[1]]) = (share * cosine, share * sine);
+            (linear[axes[1]][axes[0]], linear[axes[1]][axes[1]]) = (-share * sine, share * cosine);
+            linear[axis][axis] = share;
+            let mut translation = DVec3::ZERO;
+            (translation[axes[0]], translation[axes[1]], translation[axis]) = (to[0], to[1], (1.0 - share) * height);
+            AffineMap { linear: DMat3::from_cols_array_2d(&linear), translation }
+        };
+        system(maps.iter().map(map).collect())
+    }
+
+    /// Copies to the corners of a triangle with sides of 100 mm.
+    fn triangle() -> Attractor {
+        copies(&[(0.5, 0.0, [0.0, 0.0]), (0.5, 0.0, [50.0, 0.0]), (0.5, 0.0, [25.0, 1_875.0_f64.sqrt()])], 2, 0.0)
+    }
+
+    /// How far a place is from an attractor, but for so little: from the centres of balls around cells, of which those go that are farther than another.
+    fn distance(attractor: &Attractor, x: DVec3, little: f64) -> f64 {
+        let roots = attractor.roots().iter().enumerate();
+        let mut open: Vec<(Cell, Vec<ControlPoint>)> =
+            roots.map(|(index, root)| (attractor.root_cell(index), root.points.clone())).collect();
+        let from = |cell: &Cell| distance_squared(&x.to_array(), &cell.ball.centre).sqrt();
+        let mut best = f64::INFINITY;
+        while let Some((cell, points)) = open.pop() {
+            if from(&cell) - cell.ball.radius >= best {
+                continue;
+            }
+            if cell.ball.radius <= little {
+                best = best.min(from(&cell));
+                continue;
+            }
+            let mut children: Vec<_> = attractor.children(&cell, &points).collect();
+            children.sort_by(|a, b| from(&b.0).total_cmp(&from(&a.0)));
+            open.extend(children);
+        }
+        best
+    }
+
+    /// Some maps, which shrink by half or so.
+    fn some(random: &mut Random) -> Vec<(f64, f64, [f64; 2])> {
+        let count = 2 + random.next() % 3;
+        let turn = |random: &mut Random| [0.0, 1.0, std::f64::consts::FRAC_PI_2, 6.0 * random.share()][(random.next() % 4) as usize];
+        (0..count).map(|_| (0.3 + 0.35 * random.share(), turn(random), [40.0 * random.share(), 40.0 * random.share()])).collect()
+    }
+
+    #[test]
+    fn random_systems_in_a_plane_keep_their_bounds_and_have_the_topology_of_small_balls() {
+        let mut random = Random(3);
+        let (mut told, mut compared) = (0, 0);
+        let turned = DMat3::from_rotation_z(0.3) * DMat3::from_rotation_x(0.7);
+        for round in 0..15 {
+            let shape = copies(&some(&mut random), round % 3, [0.0, 0.1, -40.3][round / 3 % 3]);
+            let (radius, share) = ([4.0, 7.0, 12.0][round / 2 % 3], [0.1, 0.05][round % 2]);
+            let tolerance = share * radius;
+            if !is_flat(&shape, radius, tolerance) {
+                continue;
+            }
+            let made = arranged(&shape, radius, tolerance);
+            assert!(made.inner_mm <= tolerance && made.outer_mm <= tolerance && made.pitch_mm.is_none(), "{round}");
+            // Nothing crosses, and no place is beyond the bounds but for what is not known of the distance.
+            let little = 0.01 * tolerance;
+            let [inner, outer] = [radius - made.inner_mm - little, radius + made.outer_mm + little];
+            let within = |x: DVec3| if (inner..=outer).contains(&distance(&shape, x, little)) { radius } else { f64::INFINITY };
+            assert!(holds_everywhere(&made, radius, within, &mut random), "{round}");
+            let inside = Inside::new(made.solid.mesh());
+            for _ in 0..100 {
+                let x = DVec3::from_array(std::array::from_fn(|_| 120.0 * random.share() - 40.0));
+                let d = distance(&shape, x, little);
+                let expected = if d < inner { Some(1) } else { (d > outer).then_some(0) };
+                assert!(expected.is_none_or(|expected| inside.winding(x) == expected), "{round}: {x}, {d}");
+            }
+            told += usize::from(made.topology_exact);
+            // By the centres of small balls, out of the plane.
+            let candidates = candidates(&shape);
+            let Some((centres, small)) = super::centres(&shape, &candidates, 0.02 * radius, &Budget::default()).unwrap() else { continue };
+            if !made.topology_exact || centres.len() > 400 {
+                continue;
+            }
+            let centres: Vec<DVec3> = centres.iter().map(|&at| turned * DVec3::from_array(at)).collect();
+            let other = on_lattice(&lowered(&centres, (0..centres.len() as u32).map(|k| vec![k]).collect()), radius, 0.1 * radius);
+            assert!(small <= 0.02 * radius);
+            if other.topology_exact {
+                assert_eq!(topology(&made), topology(&other), "{round}");
+                compared += 1;
+            }
+        }
+        assert!(told >= 7 && compared >= 3, "{told} told, {compared} compared");
+    }
+
+    fn candidates(shape: &Attractor) -> Candidates {
+        let mut candidates = Candidates::default();
+        for (index, root) in shape.roots().iter().enumerate() {
+            candidates.push(shape.root_cell(index), &root.points, false);
+        }
+        candidates
+    }
+
+    /// Sierpinski's triangle leaves the triangles open whose inscribed circle is wider than the ball: a side of 100 mm / 2^k has one of 100 mm / (2^k 2 sqrt 3).
+    #[test]
+    fn a_triangle_leaves_as_many_holes_as_circles_fit_in() {
+        let shape = triangle();
+        let inscribed = |k: i32| 100.0 / (2.0_f64.powi(k) * 12.0_f64.sqrt());
+        for (radius, holes) in [(1.03 * inscribed(1), 0), (0.97 * inscribed(1), 1), (1.03 * inscribed(3), 4), (0.97 * inscribed(3), 13)] {
+            let made = arranged_unless_left(&shape, radius, 0.1 * radius).unwrap_or_else(|| panic!("{radius}"));
+            assert!(made.topology_exact, "{radius}");
+            assert_eq!(topology(&made), (1, 0, 2 - 2 * holes), "{radius}");
+        }
+        // Nothing is told where a hole opens just there.
+        assert!(arranged_unless_left(&shape, inscribed(3), 0.1).is_none_or(|made| !made.topology_exact));
+    }
+
+    #[test]
+    fn what_lies_in_a_plane_does_not_depend_on_threads_and_keeps_limits() {
+        let shape = triangle();
+        assert!(is_flat(&shape, 4.0, 0.4));
+        assert_steady(&shape, 4.0, 0.4);
+        assert_limited(&shape, 4.0, 0.4);
+    }
+
+    #[test]
+    fn what_leaves_its_plane_is_left_to_the_lattice() {
+        let map = |to: [f64; 3]| AffineMap { linear: DMat3::from_diagonal(DVec3::splat(0.5)), translation: DVec3::from_array(to) };
+        assert!(!is_flat(&system(vec![map([0.0; 3]), map([50.0, 0.0, 0.0]), map([20.0, 40.0, 0.5])]), 4.0, 0.4));
+        assert!(is_flat(&system(vec![map([0.0; 3]), map([50.0, 0.0, 0.0]), map([20.0, 40.0, 0.0])]), 4.0, 0.4));
+    }
+}
