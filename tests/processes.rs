@@ -119,8 +119,8 @@ fn a_question_that_exceeds_its_memory_is_refused_alone() {
     let processes = service.answering();
     assert_eq!(processes.len(), 1, "a process of its own");
     let before = service.resident_bytes();
-    // Its maps overlap: every vertex of a block has a thousand sites nearby.
-    let large = order("ifs/segment");
+    // It winds through space: blocks of a lattice have very many cells.
+    let large = order("ifs/hilbert_curve");
     for _ in 0..3 {
         let answer = service.post("/v1/plan", &large);
         let problem = answer.json();

@@ -3,7 +3,7 @@
 //! A cell with n <= 4 control points p_0 .. p_(n-1) has its attractor in what is affine in these. With 4 - n more points, p_0 + e_j for vectors e_j across the others, they are a frame (o, o + e_1, ...) of space, in which the attractor has none of the e_j:
 //! so where a child has them does not matter. They shrink by as much as the cell does, so that what is a similarity stays one.
 
-use super::sites::reachable;
+use super::sites::used;
 use super::{Attractor, Root};
 use crate::automaton::{Automaton, LeafPrimitive, State, StateId, SubdivisionOperator, Transition};
 use glam::{DMat3, DVec3};
@@ -12,22 +12,22 @@ use glam::{DMat3, DVec3};
 const FRAME: usize = 4;
 
 impl Attractor {
-    /// The same attractor by frames; none where cells have more control points than a frame, or weights, or are finite, or where roots are more than themselves: solids, trimmed or with radii of their own.
-    pub(crate) fn framed(&self) -> Option<Self> {
-        if !self.solids.is_empty() || !self.trimmed.is_empty() || self.has_own_radii() || self.roots.iter().any(|root| root.rational) {
-            return None;
-        }
-        let states = self.automaton.states();
-        let mut used: Vec<usize> = self.roots.iter().flat_map(|root| reachable(&self.automaton, root.state)).collect();
-        used.sort_unstable();
-        used.dedup();
+    /// Whether it has frames, as cells have no more control points than these, nor weights, and are not finite, and roots are no more than themselves: no solids, not trimmed, without radii of their own.
+    pub(crate) fn has_frames(&self) -> bool {
         let has_few_points = |&index: &usize| {
-            let state = &states[index];
+            let state = &self.automaton.states()[index];
             !state.frame && (2..=FRAME).contains(&state.dimension) && !state.transitions.is_empty()
         };
-        if !used.iter().all(has_few_points) {
+        let are_plain = self.solids.is_empty() && self.trimmed.is_empty() && !self.has_own_radii();
+        are_plain && self.roots.iter().all(|root| !root.rational) && used(self).iter().all(has_few_points)
+    }
+
+    /// The same attractor by frames, if it has some.
+    pub(crate) fn framed(&self) -> Option<Self> {
+        if !self.has_frames() {
             return None;
         }
+        let (states, used) = (self.automaton.states(), used(self));
         let place = |state: StateId| used.binary_search(&state.index()).ok().map(StateId::new);
         let framed = |&index: &usize| {
             let state = &states[index];

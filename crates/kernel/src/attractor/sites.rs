@@ -79,18 +79,13 @@ const MANY: usize = 10_000;
 impl<'a> SiteRule<'a> {
     /// The rule for a dilation by `radius`, the largest of the roots' own, to `tolerance`, both in mm. Sites use a share of what they may be off, `coarseness`: 1 for as few as possible.
     pub(crate) fn new(attractor: &'a Attractor, radius: f64, tolerance: f64, coarseness: f64) -> Self {
-        let mut starts: Vec<usize> = attractor.roots().iter().map(|root| root.state.index()).collect();
-        starts.sort_unstable();
-        starts.dedup();
-        let mut used: Vec<usize> = starts.iter().flat_map(|&state| reachable(attractor.automaton(), StateId::new(state))).collect();
-        used.sort_unstable();
-        used.dedup();
         let deficit = |root: usize| match attractor.own_radius(root) {
             Some(OwnRadius::Constant(own)) => (radius * radius - own * own).max(0.0),
             _ => 0.0,
         };
         let deficits = if attractor.has_own_radii() { (0..attractor.roots().len()).map(deficit).collect() } else { Vec::new() };
-        let mut rule = Self { attractor, radius, tolerance, coarseness, share: SITE_SHARE, choices: Vec::new(), used, deficits };
+        let mut rule =
+            Self { attractor, radius, tolerance, coarseness, share: SITE_SHARE, choices: Vec::new(), used: used(attractor), deficits };
         choose(&mut rule);
         if rule.is_dense() {
             rule.share = DENSE_SHARE;
@@ -99,12 +94,17 @@ impl<'a> SiteRule<'a> {
         if rule.is_along_curves()
             && let Ok(Some(leaves)) = rule.leaves(MANY, &never)
         {
-            let finer = Self { coarseness: ALONG_CURVES * coarseness, ..rule.clone() };
+            let finer = rule.finer(ALONG_CURVES);
             if let Ok(Some(_)) = finer.leaves((MORE_ALONG_CURVES * leaves as f64) as usize, &never) {
                 return finer;
             }
         }
         rule
+    }
+
+    /// The same with sites that use only a share of what they may be off.
+    pub(crate) fn finer(&self, share: f64) -> Self {
+        Self { coarseness: share * self.coarseness, ..self.clone() }
     }
 
     /// Whether segments, or points, stand for curves.
@@ -357,6 +357,17 @@ fn expected_sites(rule: &SiteRule<'_>, root: usize) -> f64 {
         total += weight * sites;
     }
     total / f64::from(PATHS)
+}
+
+/// The states that roots reach, in order.
+pub(super) fn used(attractor: &Attractor) -> Vec<usize> {
+    let sorted = |mut states: Vec<usize>| {
+        states.sort_unstable();
+        states.dedup();
+        states
+    };
+    let starts = sorted(attractor.roots().iter().map(|root| root.state.index()).collect());
+    sorted(starts.into_iter().flat_map(|state| reachable(attractor.automaton(), StateId::new(state))).collect())
 }
 
 /// All states that paths from a state meet.

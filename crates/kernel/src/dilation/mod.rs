@@ -96,7 +96,7 @@ pub struct Dilation {
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain, as far as they were looked at: others beside them are not; without a lattice, sets of sites whose dilations may or may not
     /// have a common point. Not counted where points stand for cells: critical points of theirs are not those of the attractor.
     pub uncertain: u64,
-    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`): of points, wires, surfaces and solids of these, where nothing was uncertain,
+    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` and `dense` in `arrangement`): of points, wires, surfaces and solids of these, and of fractals in a plane, where nothing was uncertain,
     /// no triangles cross, and what stands for curves and smooth surfaces is near enough to them (see `steady` there).
     pub topology_exact: bool,
 }
@@ -147,9 +147,12 @@ fn sheets_around(solid: &Attractor, radius: Radius, tolerance: Tolerance, budget
 const COARSE: f64 = 1.0;
 const FINER: [f64; 2] = [0.35, 0.125];
 
-/// How many times as many leaf cells there are at least without frames where these serve, and where nothing else does.
+/// How many times as many leaf cells there are at least without frames where these serve, and where nothing else does; and how many of them are counted.
 const FEWER_FRAMES: usize = 2;
 const FAR_FEWER_FRAMES: usize = 16;
+const MOST_COUNTED: usize = 1_000_000;
+/// So few cells of what lies in a plane need no frames.
+const FEW_IN_PLANE: usize = 256;
 
 /// Few cells of a graph; few are those of products, too, that are split along one factor at a time.
 const FEW_CELLS: usize = 20_000;
@@ -159,7 +162,9 @@ const MORE_CELLS: u64 = 10;
 
 fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
     let framed = order.framed(budget)?;
-    if let Some(dilation) = order.by_frames(framed.as_ref(), budget, |plan| plan.run_alone(budget), |plan| plan.run_in_plane(budget))? {
+    if let Some(framed) = &framed
+        && let Some(dilation) = unless_stopped(order.plan_of(&framed.attractor, COARSE, budget)?.run_in_plane(budget))?
+    {
         return Ok(dilation);
     }
     if let Some(dilation) = order.in_sheets(budget, |plan| plan.run_in_sheets(budget))? {
@@ -169,6 +174,10 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
     let by_rays = |cells: Cells| order.over_graph(graph.as_ref(), cells, budget, |plan, graph| plan.run_over(graph, budget));
     if let Some(dilation) = by_rays(Cells::Many)? {
         return Ok(dilation);
+    }
+    let on_lattice = |framed: &Framed| order.plan_of(&framed.attractor, COARSE, budget)?.run_on_lattice(budget);
+    if let Some(framed) = framed.as_ref().filter(|framed| framed.are_far_fewer) {
+        return on_lattice(framed);
     }
     let finer = |cells: u64| {
         let limits = Limits { cells: budget.limits.cells.min(MORE_CELLS * cells), ..budget.limits };
@@ -182,7 +191,7 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
         Ok(None)
     };
     let instead = || match (by_rays(Cells::Few)?, &framed) {
-        (None, Some(framed)) => order.plan_of(&framed.attractor, COARSE, budget)?.run_alone(budget).map(Some),
+        (None, Some(framed)) => on_lattice(framed).map(Some),
         (made, _) => Ok(made),
     };
     order.planned(COARSE, budget, |plan| plan.run(finer, instead, budget))
@@ -195,19 +204,11 @@ enum Cells {
     Many,
 }
 
-/// A shape by frames.
+/// A shape by frames, for points to stand for its cells: in a plane, and where a lattice is needed anyway.
 struct Framed {
     attractor: Attractor,
-    serves: Serves,
-}
-
-/// Where points that stand for cells serve better than other sites.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Serves {
-    /// In a plane, and where a lattice is needed anyway.
-    InPlane,
-    /// Everywhere: others are so many.
-    Alone,
+    /// Whether a lattice of these serves better than all that is made of other sites, as these are so many.
+    are_far_fewer: bool,
 }
 
 /// What is asked for.
@@ -247,34 +248,22 @@ impl<'a> Order<'a> {
         unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
     }
 
-    /// The same shape by frames, for points to stand for its cells; none where there are not far fewer of these.
+    /// The same shape by frames; none where there are not far fewer cells of these.
     fn framed(&self, budget: &Budget) -> Result<Option<Framed>, DilationError> {
-        let Some(attractor) = self.simplify.then(|| self.attractor.framed()).flatten() else { return Ok(None) };
-        let most = usize::try_from(budget.limits.cells).unwrap_or(usize::MAX);
-        let Some(cells) = self.plan_of(&attractor, COARSE, budget)?.leaves(most, budget)? else { return Ok(None) };
-        let own = self.plan_of(self.attractor, COARSE, budget)?;
-        let are_fewer = |share: usize| own.leaves(cells.saturating_mul(share), budget).map(|leaves| leaves.is_none());
-        if !are_fewer(FEWER_FRAMES)? {
+        if !self.simplify || !self.attractor.has_frames() {
             return Ok(None);
         }
-        let serves = if are_fewer(FAR_FEWER_FRAMES)? { Serves::Alone } else { Serves::InPlane };
-        Ok(Some(Framed { attractor, serves }))
-    }
-
-    /// What comes of the plan for frames: where only these serve, or in a plane; none elsewhere.
-    fn by_frames<T>(
-        &self,
-        framed: Option<&Framed>,
-        budget: &Budget,
-        alone: impl FnOnce(&Plan<'_>) -> Result<T, DilationError>,
-        in_plane: impl FnOnce(&Plan<'_>) -> Result<Option<T>, DilationError>,
-    ) -> Result<Option<T>, DilationError> {
-        let Some(Framed { attractor, serves }) = framed else { return Ok(None) };
-        let plan = self.plan_of(attractor, COARSE, budget)?;
-        match serves {
-            Serves::Alone => alone(&plan).map(Some),
-            Serves::InPlane => in_plane(&plan),
+        let own = self.plan_of(self.attractor, COARSE, budget)?;
+        let few = if own.is_thin(budget) { FEW_IN_PLANE } else { FEW_CELLS };
+        if own.leaves(few, budget)?.is_some() {
+            return Ok(None);
         }
+        let Some(attractor) = self.attractor.framed() else { return Ok(None) };
+        // What frames are too coarse for, others may do.
+        let Some(plan) = unless_stopped(self.plan_of(&attractor, COARSE, budget).map(Some))? else { return Ok(None) };
+        let cells = plan.leaves(MOST_COUNTED, budget)?.unwrap_or(MOST_COUNTED);
+        let are_fewer = |times: usize| own.leaves(times * cells, budget).map(|leaves| leaves.is_none());
+        Ok(if are_fewer(FEWER_FRAMES)? { Some(Framed { attractor, are_far_fewer: are_fewer(FAR_FEWER_FRAMES)? }) } else { None })
     }
 
     /// What it is the graph of over a convex part of a plane, and of how many cells; none where it is none.
@@ -370,8 +359,8 @@ pub fn predict(
 ) -> Result<Prediction, DilationError> {
     let order = Order::new(attractor, radius, tolerance, simplify, budget);
     let framed = order.framed(budget)?;
-    if let Some(prediction) =
-        order.by_frames(framed.as_ref(), budget, |plan| plan.predict_alone(budget), |plan| plan.predict_in_plane(budget))?
+    if let Some(framed) = &framed
+        && let Some(prediction) = unless_stopped(order.plan_of(&framed.attractor, COARSE, budget)?.predict_in_plane(budget))?
     {
         return Ok(prediction);
     }
@@ -380,14 +369,16 @@ pub fn predict(
     }
     let graph = order.graph(budget)?;
     let by_rays = |cells: Cells| order.over_graph(graph.as_ref(), cells, budget, |plan, graph| plan.predict_over(graph, budget));
-    match by_rays(Cells::Many)? {
-        Some(prediction) => Ok(prediction),
-        None => {
-            let instead = || match (by_rays(Cells::Few)?, &framed) {
-                (None, Some(framed)) => order.plan_of(&framed.attractor, COARSE, budget)?.predict_alone(budget).map(Some),
-                (made, _) => Ok(made),
-            };
-            order.planned(COARSE, budget, |plan| plan.predict(instead, budget))
-        }
+    if let Some(prediction) = by_rays(Cells::Many)? {
+        return Ok(prediction);
     }
+    let on_lattice = |framed: &Framed| order.plan_of(&framed.attractor, COARSE, budget)?.predict_on_lattice(budget);
+    if let Some(framed) = framed.as_ref().filter(|framed| framed.are_far_fewer) {
+        return on_lattice(framed);
+    }
+    let instead = || match (by_rays(Cells::Few)?, &framed) {
+        (None, Some(framed)) => on_lattice(framed).map(Some),
+        (made, _) => Ok(made),
+    };
+    order.planned(COARSE, budget, |plan| plan.predict(instead, budget))
 }

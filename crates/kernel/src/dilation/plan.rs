@@ -236,6 +236,11 @@ impl<'a> Plan<'a> {
         Ok(is_fewer.then_some(split))
     }
 
+    /// Whether it may lie in a plane.
+    pub(super) fn is_thin(&self, budget: &Budget) -> bool {
+        arrangement::is_thin(&self.setting(self.pitch, budget))
+    }
+
     /// How many leaf cells there are, if no more than `most`.
     pub(super) fn leaves(&self, most: usize, budget: &Budget) -> Result<Option<usize>, Stopped> {
         self.rule.leaves(most, &budget.cancel)
@@ -300,6 +305,18 @@ impl<'a> Plan<'a> {
         instead: impl FnOnce() -> Result<Option<Prediction>, DilationError>,
         budget: &Budget,
     ) -> Result<Prediction, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        if let Some(arrangement) = Arrangement::new(&setting, &self.rule, &self.space(&setting).candidates, budget)? {
+            return Ok(self.predicted(&arrangement));
+        }
+        match instead()? {
+            Some(prediction) => Ok(prediction),
+            None => self.predict_on_lattice(budget),
+        }
+    }
+
+    /// The same from a sample of the lattice's blocks.
+    pub(super) fn predict_on_lattice(&self, budget: &Budget) -> Result<Prediction, DilationError> {
         let unlimited = Budget {
             limits: crate::budget::Limits { cells: u64::MAX, triangles: u64::MAX, memory_bytes: u64::MAX, ..budget.limits },
             progress: None,
@@ -307,12 +324,6 @@ impl<'a> Plan<'a> {
         };
         let setting = self.setting(self.pitch, &unlimited);
         let (space, grading) = (self.space(&setting), Grading::default());
-        if let Some(arrangement) = Arrangement::new(&setting, &self.rule, &space.candidates, budget)? {
-            return Ok(self.predicted(&arrangement));
-        }
-        if let Some(prediction) = instead()? {
-            return Ok(prediction);
-        }
         let pass = self.pass(&setting, &grading, Task::Whole, &unlimited, space.blocks);
         let expected = pass.expected(space.blocks, &space.candidates, !self.clean_only)?;
         let memory_bytes = expected.made.max(expected.triangles) * BYTES_PER_TRIANGLE;
@@ -328,11 +339,6 @@ impl<'a> Plan<'a> {
             least_thickness_mm: self.least_thickness(),
             pitch_mm: Some(self.pitch),
         })
-    }
-
-    /// The same where there is no other way.
-    pub(super) fn predict_alone(&self, budget: &Budget) -> Result<Prediction, DilationError> {
-        self.predict(|| Ok(None), budget)
     }
 
     /// The same for what lies in a plane, see [`Plan::run_in_plane`].
@@ -399,9 +405,10 @@ impl<'a> Plan<'a> {
         made.map_or_else(|| self.on_lattice(&setting, &space, budget), Ok)
     }
 
-    /// The same where there is no other way.
-    pub(super) fn run_alone(&self, budget: &Budget) -> Result<Dilation, DilationError> {
-        self.run(|_| Ok(None), || Ok(None), budget)
+    /// The same on a lattice.
+    pub(super) fn run_on_lattice(&self, budget: &Budget) -> Result<Dilation, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        self.on_lattice(&setting, &self.space(&setting), budget)
     }
 
     /// The dilation without a lattice, where its topology is told.

@@ -60,7 +60,8 @@ pub(crate) struct Setting {
     pub(super) tolerance: f64,
     /// How far places of the shape that sites stand for are from these, and sites from it, at most: 0 where sites are the shape.
     pub(super) off: f64,
-    /// The least side of the shape's box, or more.
+    /// The axis along which the shape's box has its least side, and how long this is at most.
+    pub(super) thin: usize,
     pub(super) width: f64,
     /// Whether sheets along the sites may serve.
     pub(super) has_sheets: bool,
@@ -83,6 +84,8 @@ impl Setting {
         let largest = ((near + 1.001 * pitch).powi(2) - theta).max(theta);
         let inverse_unit = (MOST - 2 * MOST_NOISE) as f64 / largest;
         let integer = |square: f64| (square * inverse_unit).ceil() as i64;
+        let side = |axis: usize| bounds.high[axis].high - bounds.low[axis].low;
+        let thin = if side(0) <= side(1).min(side(2)) { 0 } else { 1 + usize::from(side(2) < side(1)) };
         Self {
             lattice: Lattice { origin, pitch },
             reach: radius,
@@ -110,7 +113,8 @@ impl Setting {
             clean_only: false,
             tolerance,
             off: 0.0,
-            width: (0..3).map(|axis| bounds.high[axis].high - bounds.low[axis].low).fold(f64::INFINITY, f64::min),
+            thin,
+            width: side(thin),
             has_sheets: true,
             cells,
         }

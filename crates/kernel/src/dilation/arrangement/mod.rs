@@ -54,7 +54,7 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 pub(super) use copies::Copies;
-pub(super) use dense::is_told;
+pub(super) use dense::{is_thin, is_told};
 use engine::{Engine, Forms, Run, State, TRIALS};
 pub(super) use faces::{Face, Faces, without_lines};
 use figure::{Figure, Outline};
@@ -115,6 +115,8 @@ pub(super) struct Arrangement {
     flat: Option<BlockSurface>,
     /// Whether its topology is shown to be that of what the sites stand for: kept, as it takes long to show.
     is_steady: bool,
+    /// How many points there were of which these are left, where points stand for cells.
+    thinned: usize,
     /// Those that a first trial begins with.
     polytopes: Polytopes,
     /// The surfaces of solids, whose triangles are among the sites, and about which share of what is around the sites is inside of these.
@@ -292,6 +294,7 @@ impl Arrangement {
             copies,
             flat: None,
             is_steady: false,
+            thinned: 0,
             polytopes: Polytopes::default(),
             solids,
             inside: 0.0,
@@ -393,7 +396,8 @@ impl Arrangement {
 
     /// Bytes held at most: for what is made, for what is put elsewhere, too, and for what is known of the sites where there are no polytopes.
     pub(super) fn memory_bytes(&self) -> f64 {
-        let of_sites = if self.flat.is_some() { self.sites.list.len() as f64 * BYTES_PER_SITE } else { 0.0 };
+        let of_sites =
+            if self.flat.is_some() { self.sites.list.len() as f64 * BYTES_PER_SITE + self.thinned as f64 * BYTES_PER_POINT } else { 0.0 };
         (self.made * BYTES_PER_TRIANGLE).max(self.triangles * plan::BYTES_PER_TRIANGLE).max(of_sites)
     }
 
@@ -553,6 +557,9 @@ fn few_near(
 
 /// Bytes held at most for each site where no polytopes are made; each way has limits of its own, too.
 const BYTES_PER_SITE: f64 = 1_600.0;
+
+/// The same for each point of which fewer are left.
+const BYTES_PER_POINT: f64 = 250.0;
 
 /// Triangles of a polytope that little is near to, about: with more sites than memory has room for that many, polytopes are not even begun.
 const LEAST_TRIANGLES: f64 = 24.0;

@@ -28,7 +28,7 @@ use rings::{Band, Corner, Ring, rings};
 use sheet::{Sheet, sheet};
 use std::f64::consts::PI;
 use thin::without_those_among;
-pub(super) use thin::{Thinned, Thinning, axis_of};
+pub(super) use thin::{Thinned, Thinning, apart};
 use valleys::Lines;
 use wires::Wires;
 
@@ -150,7 +150,8 @@ pub(super) fn surface(
         round,
     };
     let Some(wires) = Wires::new(&segments, 2.0 * setting.outer, gap, budget)? else { return Ok(None) };
-    if !wires.are_crowded() {
+    // There are no polytopes around points that stand for cells.
+    if !setting.dense && !wires.are_crowded() {
         return Ok(None);
     }
     let Some(exact) = contour(&wires, setting.reach, PERTURBED * gap, budget)? else { return Ok(None) };
@@ -185,7 +186,8 @@ pub(super) fn counts(figures: &[Figure], setting: &Setting, among: [f64; 3], bud
     let axes = [(axis + 1) % 3, (axis + 2) % 3];
     let mut places: Vec<Place> = figures.iter().flat_map(Figure::corners).map(|at| axes.map(|axis| at[axis])).collect();
     for radius in among {
-        places = without_those_among(places, radius, budget)?;
+        let Some(left) = without_those_among(places, radius, budget)? else { return Ok(None) };
+        places = left;
     }
     let outer: Vec<[Place; 2]> = places.into_iter().map(|place| [place; 2]).collect();
     let gap = GAP * setting.slack;

@@ -14,12 +14,12 @@ use std::f64::consts::{PI, TAU};
 
 /// Bodies near to each other at least, as a mean over all: where there are fewer, polytopes around them have fewer triangles.
 const LEAST_NEAR: f64 = 3.0;
-/// Bodies near to each other at most, as a mean over all, and in any case.
+/// Bodies near to each other at most, as a mean over all: segments, and points, of which most are covered by a few others; and in any case.
 const MOST_NEAR: usize = 200;
-/// The same of points, of which most are covered by a few others.
 const MOST_NEAR_TO_POINTS: usize = 1_000;
-const BYTES_PER_NEAR: u64 = 64;
 const FEW_NEAR: usize = 100_000;
+/// One of so many bytes may hold an entry of a list.
+const BYTES_PER_NEAR: u64 = 64;
 /// Near to one of them at most: what is asked of a body grows with the square.
 const MOST_OF_ONE: usize = 4_096;
 /// Places that are close to each other along an axis, of those that one is held against.
@@ -385,7 +385,7 @@ impl Wires {
         };
         let each = if self.segments == 0 { MOST_NEAR_TO_POINTS } else { MOST_NEAR };
         let room = usize::try_from(budget.limits.memory_bytes / BYTES_PER_NEAR).unwrap_or(usize::MAX);
-        let most = (each * bodies.len() + FEW_NEAR).min(room);
+        let most = (each * bodies.len() + FEW_NEAR).min(room).min(u32::MAX as usize);
         let (mut near, mut starts): (Vec<(f32, u32)>, Vec<u32>) = (Vec::new(), vec![0]);
         let numbers: Vec<usize> = (0..bodies.len()).collect();
         for some in numbers.chunks(1 << 12) {
