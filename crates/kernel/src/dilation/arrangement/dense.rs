@@ -28,7 +28,7 @@ const OF_CELLS: f64 = 0.6;
 /// e, in units of the radius, as it is tried; and cells at most.
 const SMALL: [f64; 4] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0];
 const MOST_CELLS: usize = 150_000;
-/// Centres that are closer than this share of e are one: every place of A is as much farther from them at most.
+/// Centres that are closer than this share of the largest e are one: every place of A is as much farther from them at most.
 const AS_ONE: f64 = 1.0 / 16.0;
 /// Shares of the radius from which on no dilation changes where points among others are left out, one after the other: of few it takes less to find who is among whom.
 const AMONG: [f64; 3] = [0.15, 0.4, 0.9];
@@ -96,8 +96,10 @@ pub(in crate::dilation) fn is_told(
             continue;
         }
         known = small;
-        let figures = in_plane(&centres, setting.thin, AS_ONE * small);
-        let moved = (1.0 + AS_ONE) * small + 3.0 * setting.width + setting.off + setting.slack;
+        // Cells may be points, so small says nothing of how close to each other centres are.
+        let close = AS_ONE * share * setting.reach;
+        let figures = in_plane(&centres, setting.thin, close);
+        let moved = small + close + 3.0 * setting.width + setting.off + setting.slack;
         let steady = Steady { figures: &figures, radius: setting.reach, moved, solids: &[], plane: Some(setting.thin) };
         if steady.is_shown(budget)? {
             let counts = planar::counts(&figures, setting, AMONG.map(|share| share * setting.reach), budget)?;
@@ -155,9 +157,11 @@ mod tests {
     };
     use super::*;
     use crate::attractor::cell::distance_squared;
+    use crate::dilation::dilate;
     use crate::model::{AffineMap, Ifs, Model, Shape};
     use crate::solid::Inside;
     use crate::split_mix::Random;
+    use crate::tolerance::{Radius, Tolerance};
     use glam::{DMat3, DVec3};
 
     fn system(maps: Vec<AffineMap>) -> Attractor {
@@ -286,6 +290,16 @@ mod tests {
         assert!(is_flat(&shape, 4.0, 0.4));
         assert_steady(&shape, 4.0, 0.4);
         assert_limited(&shape, 4.0, 0.4);
+    }
+
+    /// The attractor of one map, and of two that are the same, is a point.
+    #[test]
+    fn a_point_is_a_ball() {
+        for count in [1, 2] {
+            let shape = copies(&vec![(0.5, 1.0, [3.0, 4.0]); count], 2, 0.0);
+            let made = dilate(&shape, Radius::new(2.0).unwrap(), Tolerance::new(0.1).unwrap(), &Budget::default()).unwrap();
+            assert_eq!(topology(&made), (1, 0, 2));
+        }
     }
 
     #[test]
