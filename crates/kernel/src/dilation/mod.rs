@@ -163,7 +163,7 @@ const MORE_CELLS: u64 = 10;
 fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
     let framed = order.framed(budget)?;
     if let Some(framed) = &framed
-        && let Some(dilation) = unless_stopped(order.plan_of(&framed.attractor, COARSE, budget)?.run_in_plane(budget))?
+        && let Some(dilation) = unless_stopped(order.plan_of(&framed.attractor, COARSE, budget)?.run_arranged(budget))?
     {
         return Ok(dilation);
     }
@@ -360,7 +360,7 @@ pub fn predict(
     let order = Order::new(attractor, radius, tolerance, simplify, budget);
     let framed = order.framed(budget)?;
     if let Some(framed) = &framed
-        && let Some(prediction) = unless_stopped(order.plan_of(&framed.attractor, COARSE, budget)?.predict_in_plane(budget))?
+        && let Some(prediction) = unless_stopped(order.plan_of(&framed.attractor, COARSE, budget)?.predict_arranged(budget))?
     {
         return Ok(prediction);
     }

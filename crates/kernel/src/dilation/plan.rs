@@ -305,9 +305,8 @@ impl<'a> Plan<'a> {
         instead: impl FnOnce() -> Result<Option<Prediction>, DilationError>,
         budget: &Budget,
     ) -> Result<Prediction, DilationError> {
-        let setting = self.setting(self.pitch, budget);
-        if let Some(arrangement) = Arrangement::new(&setting, &self.rule, &self.space(&setting).candidates, budget)? {
-            return Ok(self.predicted(&arrangement));
+        if let Some(prediction) = self.predict_arranged(budget)? {
+            return Ok(prediction);
         }
         match instead()? {
             Some(prediction) => Ok(prediction),
@@ -341,8 +340,8 @@ impl<'a> Plan<'a> {
         })
     }
 
-    /// The same for what lies in a plane, see [`Plan::run_in_plane`].
-    pub(super) fn predict_in_plane(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
+    /// The same for what needs no lattice, see [`Plan::run_arranged`].
+    pub(super) fn predict_arranged(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let arrangement = Arrangement::new(&setting, &self.rule, &self.space(&setting).candidates, budget)?;
         Ok(arrangement.map(|arrangement| self.predicted(&arrangement)))
@@ -426,8 +425,8 @@ impl<'a> Plan<'a> {
         Ok(made.filter(|made| made.topology_exact))
     }
 
-    /// The dilation of what lies in a plane, where points stand for cells; none where that does not come out.
-    pub(super) fn run_in_plane(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
+    /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, or by what needs none, where that serves better than a lattice and comes out.
+    pub(super) fn run_arranged(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
         let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
@@ -536,13 +535,6 @@ impl<'a> Plan<'a> {
             return Err(DilationError::LeafCells { tolerance_mm: self.aimed, allowed: budget.limits.cells });
         }
         Ok(())
-    }
-
-    /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, or by what needs none, where that serves better than a lattice.
-    #[cfg(test)]
-    pub(super) fn arranged(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
-        let arrangement = Arrangement::new(setting, &self.rule, &space.candidates, budget)?;
-        self.of_arrangement(arrangement, setting, space, budget)
     }
 
     /// The dilation by an arrangement, if there is one and it comes out.

@@ -550,8 +550,7 @@ mod tests {
         let limited = |allowed: u64| {
             budget.limits.triangles = allowed;
             let plan = plan(&attractor, RADIUS, 0.1);
-            let setting = plan.setting(plan.pitch(), &budget);
-            plan.arranged(&setting, &plan.space(&setting), &budget).map(|made| made.is_some())
+            plan.run_arranged(&budget).map(|made| made.is_some())
         };
         assert!(matches!([triangles - 1, triangles].map(limited), [Err(DilationError::Triangles { .. }), Ok(true)]));
     }

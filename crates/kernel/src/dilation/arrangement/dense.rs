@@ -30,8 +30,8 @@ const SMALL: [f64; 4] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0];
 const MOST_CELLS: usize = 150_000;
 /// Centres that are closer than this share of the largest e are one: every place of A is as much farther from them at most.
 const AS_ONE: f64 = 1.0 / 16.0;
-/// Shares of the radius from which on no dilation changes where points among others are left out, one after the other: of few it takes less to find who is among whom.
-const AMONG: [f64; 3] = [0.15, 0.4, 0.9];
+/// The share of the radius from which on no dilation changes where points among others are left out.
+const AMONG: f64 = 0.9;
 
 impl Arrangement {
     /// What lies in one plane of dense sites; none where they do not, or it does not come out.
@@ -102,7 +102,7 @@ pub(in crate::dilation) fn is_told(
         let moved = small + close + 3.0 * setting.width + setting.off + setting.slack;
         let steady = Steady { figures: &figures, radius: setting.reach, moved, solids: &[], plane: Some(setting.thin) };
         if steady.is_shown(budget)? {
-            let counts = planar::counts(&figures, setting, AMONG.map(|share| share * setting.reach), budget)?;
+            let counts = planar::counts(&figures, setting, AMONG * setting.reach, budget)?;
             return Ok(counts == Some(counts_of(surface)));
         }
     }

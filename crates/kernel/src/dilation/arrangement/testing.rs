@@ -46,9 +46,7 @@ pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'
 }
 
 pub(super) fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
-    let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
-    let setting = plan.setting(plan.pitch(), &budget);
-    plan.arranged(&setting, &plan.space(&setting), &budget).unwrap()
+    plan(attractor, radius, tolerance).run_arranged(&Budget::default()).unwrap()
 }
 
 pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {

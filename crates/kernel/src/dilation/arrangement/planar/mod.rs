@@ -177,18 +177,15 @@ pub(super) fn surface(
     }))
 }
 
-/// Components and holes of what is no farther in their plane than the reach from points with one coordinate in common, of which those go that change nothing from the radii `among` on, one after the other; none where that is in doubt.
+/// Components and holes of what is no farther in their plane than the reach from points with one coordinate in common, of which those go that change nothing from a radius of `among` on; none where that is in doubt.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn counts(figures: &[Figure], setting: &Setting, among: [f64; 3], budget: &Budget) -> Result<Option<[u64; 2]>, Stopped> {
+pub(super) fn counts(figures: &[Figure], setting: &Setting, among: f64, budget: &Budget) -> Result<Option<[u64; 2]>, Stopped> {
     let Some((axis, _)) = plane(figures) else { return Ok(None) };
     let axes = [(axis + 1) % 3, (axis + 2) % 3];
-    let mut places: Vec<Place> = figures.iter().flat_map(Figure::corners).map(|at| axes.map(|axis| at[axis])).collect();
-    for radius in among {
-        let Some(left) = without_those_among(places, radius, budget)? else { return Ok(None) };
-        places = left;
-    }
+    let places: Vec<Place> = figures.iter().flat_map(Figure::corners).map(|at| axes.map(|axis| at[axis])).collect();
+    let Some(places) = without_those_among(places, among, budget)? else { return Ok(None) };
     let outer: Vec<[Place; 2]> = places.into_iter().map(|place| [place; 2]).collect();
     let gap = GAP * setting.slack;
     let Some(wires) = Wires::new(&outer, 2.0 * setting.outer, gap, budget)? else { return Ok(None) };

@@ -64,11 +64,8 @@ impl Thinning {
         }
         let axes = [(axis + 1) % 3, (axis + 2) % 3];
         let apart = apart(points.iter().map(|point| axes.map(|axis| point[axis])), self.close);
-        let mut outer = without_those_between(apart, self.between, self.close, budget)?;
-        for share in AMONG {
-            let Some(left) = without_those_among(outer, share * self.among, budget)? else { return Ok(None) };
-            outer = left;
-        }
+        let outer = without_those_between(apart, self.between, self.close, budget)?;
+        let Some(outer) = without_those_among(outer, self.among, budget)? else { return Ok(None) };
         let figure = |place: Place| {
             let mut at = [0.5 * (low + high); 3];
             (at[axes[0]], at[axes[1]]) = (place[0], place[1]);
@@ -205,8 +202,17 @@ fn around_origin(ways: &[(usize, Place)], distance: f64) -> Option<[usize; 3]> {
     (cross(left, right) >= 0.0).then_some([first, one, other])
 }
 
-/// Places without those that are among others; none where very many are near to each other.
-pub(super) fn without_those_among(places: Vec<Place>, radius: f64, budget: &Budget) -> Result<Option<Vec<Place>>, Stopped> {
+/// Places without those that are among others from a radius on, in steps; none where very many are near to each other.
+pub(super) fn without_those_among(mut places: Vec<Place>, radius: f64, budget: &Budget) -> Result<Option<Vec<Place>>, Stopped> {
+    for share in AMONG {
+        let Some(left) = without_those_among_at(places, share * radius, budget)? else { return Ok(None) };
+        places = left;
+    }
+    Ok(Some(places))
+}
+
+/// The same in one step.
+fn without_those_among_at(places: Vec<Place>, radius: f64, budget: &Budget) -> Result<Option<Vec<Place>>, Stopped> {
     let mut grid = Grid::of(&places, radius);
     let mut is_left = vec![true; places.len()];
     let (mut arcs, mut looked) = (Vec::<[f64; 2]>::new(), 0);
