@@ -414,6 +414,13 @@ impl Attractor {
         Ok((TriMesh { vertices: drawn.vertices, triangles: drawn.triangles }, deviation_mm))
     }
 
+    /// Points as an attractor; none where there are none.
+    pub(crate) fn of_points(points: &[cell::Point]) -> Option<Self> {
+        let automaton = Automaton::new(vec![State::simplex(1)]).ok()?;
+        let root = |&[x, y, z]: &cell::Point| Root { state: StateId::new(0), points: vec![[x, y, z, 1.0]], rational: false, solid: None };
+        Self::new(automaton, points.iter().map(root).collect(), Vec::new(), Vec::new()).ok()
+    }
+
     /// Triangles as an attractor, or the solid that they bound; none where they are no such.
     pub(crate) fn of_triangles(mesh: &TriMesh, is_solid: bool) -> Option<Self> {
         let automaton = Automaton::new(vec![State::simplex(3)]).ok()?;

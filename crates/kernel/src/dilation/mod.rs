@@ -12,6 +12,7 @@
 //! Where points stand for cells, as in most fractals, there are too many of them to be told apart. There the least squared distance at the lattice's vertices alone decides
 //! (marching tetrahedra): nothing that sites cover is lost, and what is filled between them is proven to be within the tolerance, or the lattice is refined.
 //! Its cubes are larger than that asks where one site serves all that is filled. Gaps that it cannot follow are closed with a ball first (see `block`): without that they would end in false tunnels.
+//! What topology that has is told by other points: `flow` shows that their dilation has that of the attractor's, and `told` counts what theirs has.
 //! Where all of these points are in one plane, there are far fewer that matter, and a sheet over the plane is the surface (`dense` and `planar` in `arrangement`); cells with few control points are seen as affine frames for that, see `framed` in `attractor`.
 //!
 //! Points, segments and triangles of which few are near to each other, wires, panels and the faces of solids, need no lattice: a polytope stands for each, and their union's boundary is found facet by facet (`arrangement`) and simplified part by
@@ -37,6 +38,7 @@ mod decimation;
 mod drawn;
 mod dust;
 mod error;
+mod flow;
 mod frame;
 mod half_ball;
 mod lattice;
@@ -59,6 +61,7 @@ mod stability;
 mod star;
 mod stitch;
 mod surface;
+mod told;
 mod tree;
 mod unfold;
 mod wall;
@@ -94,10 +97,9 @@ pub struct Dilation {
     /// The least radius: the one asked for, unless parts have their own.
     pub least_radius_mm: f64,
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain, as far as they were looked at: others beside them are not; without a lattice, sets of sites whose dilations may or may not
-    /// have a common point. Not counted where points stand for cells: critical points of theirs are not those of the attractor.
+    /// have a common point. Where points stand for cells critical points of theirs are not those of the attractor: these are not counted, but it is one where the solid is shown to have another topology.
     pub uncertain: u64,
-    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` and `dense` in `arrangement`): of points, wires, surfaces and solids of these, and of fractals in a plane, where nothing was uncertain,
-    /// no triangles cross, and what stands for curves and smooth surfaces is near enough to them (see `steady` there).
+    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`), where nothing was uncertain and no triangles cross: of points, wires, surfaces and solids of these; of curves and smooth surfaces, if what stands for them is near enough (see `steady` there); and of all that is told by a few points (see `flow` and `told`).
     pub topology_exact: bool,
 }
 

@@ -5,6 +5,7 @@ use super::arrangement::{self, Arranged, Arrangement, Copies, Flat};
 use super::assemble::Assembly;
 use super::block;
 use super::dust;
+use super::flow::Flow;
 use super::lattice::{Cube, ENCLOSING, Grading};
 use super::octree::{Changed, Node, Pass, Task};
 use super::patches;
@@ -15,9 +16,10 @@ use super::setting::{Setting, extent, least};
 use super::simplify::Core;
 use super::smooth::MOST_NOISE;
 use super::surface::{BlockSurface, Blocks};
+use super::told;
 use super::tree::Candidates;
 use super::{Dilation, DilationError, Prediction};
-use crate::attractor::cell::{Cell, ControlPoint};
+use crate::attractor::cell::{Cell, ControlPoint, Point};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::attractor::{Attractor, Graph};
 use crate::automaton::LeafPrimitive;
@@ -518,7 +520,18 @@ impl<'a> Plan<'a> {
         let is_shape = self.meant.off == 0.0 && site_error.is_zero();
         let may_be_exact = !setting.dense && mended.uncertain == 0 && mended.crossings == 0;
         let is_exact = may_be_exact && (is_shape || arrangement::is_of_sites(setting, &self.rule, &space.candidates, budget)?);
-        self.certify(setting, mended, is_exact, Some(setting.lattice.pitch), budget)
+        let is_clear = mended.uncertain == 0 && mended.crossings == 0;
+        let mut made = self.certify(setting, mended, is_exact, Some(setting.lattice.pitch), budget)?;
+        if is_clear
+            && !is_exact
+            && let Some(flow) = self.flow(setting, space)
+        {
+            // Of points whose dilation is clear it is exact: they are not asked in turn.
+            let told = told::is_told(&flow, made.solid.topology(), budget)?;
+            made.topology_exact = told == Some(true);
+            made.uncertain += u64::from(told == Some(false));
+        }
+        Ok(made)
     }
 
     /// Holds all blocks against the limits.
@@ -561,7 +574,8 @@ impl<'a> Plan<'a> {
         }
         let is_exact = uncertain == 0
             && if setting.dense {
-                arrangement::is_told(&surface, self.rule.attractor(), &space.candidates, setting, budget)?
+                let flow = self.flow(setting, space).zip(arrangement.points());
+                flow.map(|(flow, points)| flow.is_that_of(&in_plane(points, setting), budget)).transpose()?.unwrap_or_default()
             } else {
                 arrangement.is_of_another(&self.rule, budget)?
             };
@@ -584,6 +598,17 @@ impl<'a> Plan<'a> {
         }
         let mended = self.put(setting, space, surface, &copies, uncertain, budget)?;
         self.certify(setting, mended, is_exact, None, budget).map(Some)
+    }
+
+    /// The dilation of what is meant, for what tells its topology; none where it has several radii, or what solids enclose, or is that of another shape.
+    fn flow<'b>(&'b self, setting: &Setting, space: &'b Space) -> Option<Flow<'b>> {
+        let attractor = self.rule.attractor();
+        let is_plain = attractor.solids().is_empty() && (0..attractor.roots().len() as u32).all(|root| self.rule.deficit(root) == 0.0);
+        let (plane, width) =
+            if arrangement::is_thin(setting) { (Some((setting.thin, setting.middle)), setting.width) } else { (None, 0.0) };
+        let Setting { reach, slack, .. } = *setting;
+        let flow = Flow { attractor, candidates: &space.candidates, radius: reach, slack: slack + width, plane };
+        (is_plain && self.meant.off == 0.0).then_some(flow)
     }
 
     /// A surface that was mended, with parts that are like others where they are.
@@ -747,6 +772,12 @@ impl<'a> Plan<'a> {
     }
 }
 
+/// Points that lie in the plane that a shape does but for how far that is up, moved straight into it: their dilation moves with them.
+fn in_plane(mut points: Vec<Point>, setting: &Setting) -> Vec<Point> {
+    points.iter_mut().for_each(|point| point[setting.thin] = setting.middle);
+    points
+}
+
 /// What comes of rays: the surface, columns that were looked at, and bytes that were held at most.
 struct Over {
     setting: Setting,
@@ -789,7 +820,6 @@ fn add(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attractor::cell::Point;
     use crate::model::{Interior, Model, PolygonMesh, Shape};
     use crate::tolerance::Radius;
 

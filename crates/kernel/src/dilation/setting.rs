@@ -60,9 +60,10 @@ pub(crate) struct Setting {
     pub(super) tolerance: f64,
     /// How far places of the shape that sites stand for are from these, and sites from it, at most: 0 where sites are the shape.
     pub(super) off: f64,
-    /// The axis along which the shape's box has its least side, and how long this is at most.
+    /// The axis along which the shape's box has its least side, how long this is at most, and where its middle is.
     pub(super) thin: usize,
     pub(super) width: f64,
+    pub(super) middle: f64,
     /// Whether sheets along the sites may serve.
     pub(super) has_sheets: bool,
     /// Cells that one cube of space may hold at once; a block, whose cells are smaller, four times as many.
@@ -115,6 +116,7 @@ impl Setting {
             off: 0.0,
             thin,
             width: side(thin),
+            middle: 0.5 * (bounds.low[thin].low + bounds.high[thin].high),
             has_sheets: true,
             cells,
         }

@@ -32,10 +32,10 @@ const PART: f64 = 4.0;
 
 /// A cube along the axes of coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cube {
-    pub(super) centre: Point,
+pub(in crate::dilation) struct Cube {
+    pub(in crate::dilation) centre: Point,
     /// Half of its side.
-    pub(super) half: f64,
+    pub(in crate::dilation) half: f64,
 }
 
 impl Cube {
@@ -47,7 +47,7 @@ impl Cube {
     }
 
     /// One of eight.
-    pub(super) fn part(&self, number: usize) -> Self {
+    pub(in crate::dilation) fn part(&self, number: usize) -> Self {
         let half = 0.5 * self.half;
         Self { centre: self.at(number, half), half }
     }
@@ -68,12 +68,12 @@ impl Cube {
     }
 
     /// How far its corners are from its centre.
-    pub(super) fn half_diagonal(&self) -> f64 {
+    pub(in crate::dilation) fn half_diagonal(&self) -> f64 {
         ROOT_OF_3 * self.half
     }
 
     /// How far its places are from its centre along a direction at most: the half times the sum of the direction's parts.
-    pub(super) fn half_along(&self, direction: &Point) -> f64 {
+    pub(in crate::dilation) fn half_along(&self, direction: &Point) -> f64 {
         self.half * direction.iter().map(|part| part.abs()).sum::<f64>()
     }
 }

@@ -1,22 +1,11 @@
 //! Points that stand for cells, as of most fractals: where they are in one plane, what is around them needs no lattice, see `planar`.
-//!
-//! They are so far apart that critical points of their distance say little of the attractor A's. Where its topology is asked for, smaller cells tell it: let F be the centres of balls of a radius e around cells of which A is the union, and w how wide A's box is across the plane.
-//! With F moved straight to a plane through that box, every place of A or F is within e + w of one of the other.
-//! What is higher above the plane than w is farther up than all places of A and F: straight up leads away from all of these, as `steady` asks. What is lower is within w of a place of the plane, where distances differ by no more. So if it is shown in the plane, for e + 3 w, A's dilation has the topology of F's,
-//! which has as many components and handles as its contour in the plane has components and holes, and no voids.
 
-use super::figure::{Figure, Outline};
 use super::planar::{self, Thinned, Thinning};
-use super::steady::Steady;
 use super::{Arrangement, BYTES_PER_POINT, Copies, Sites, most_of};
-use crate::attractor::Attractor;
-use crate::attractor::cell::{Cell, ControlPoint, Point};
 use crate::attractor::sites::SiteRule;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::setting::Setting;
-use crate::dilation::surface::BlockSurface;
 use crate::dilation::tree::Candidates;
-use crate::groups::Groups;
 use std::sync::Arc;
 
 /// How far points may be off a plane, as a share of half the band.
@@ -25,13 +14,6 @@ const FLAT: f64 = 1.0 / 256.0;
 const CLOSE: f64 = 1.0 / 64.0;
 /// The share of what sites may be off that cells use: what is left is for points that are between others.
 const OF_CELLS: f64 = 0.6;
-/// e, in units of the radius, as it is tried; and cells at most.
-const SMALL: [f64; 4] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0];
-const MOST_CELLS: usize = 150_000;
-/// Centres that are closer than this share of the largest e are one: every place of A is as much farther from them at most.
-const AS_ONE: f64 = 1.0 / 16.0;
-/// The share of the radius from which on no dilation changes where points among others are left out.
-const AMONG: f64 = 0.9;
 
 impl Arrangement {
     /// What lies in one plane of dense sites; none where they do not, or it does not come out.
@@ -62,7 +44,7 @@ impl Arrangement {
         // All that sites may be off is used.
         sites.error.inner_square = sites.error.inner_square.max(room);
         sites.error.square = sites.error.square.max(least_square);
-        // What they are off tells nothing of the topology: see `is_told`.
+        // What they are off tells nothing of the topology: see `flow`.
         let setting = Setting { off: f64::INFINITY, ..setting.narrower(moved, setting.slack) };
         let copies = Copies::default();
         let Some(flat) = planar::surface(&sites.list, &setting, |x| copies.rounded(x), budget)? else { return Ok(None) };
@@ -78,95 +60,21 @@ pub(in crate::dilation) fn is_thin(setting: &Setting) -> bool {
     setting.width <= FLAT * setting.half_band()
 }
 
-/// Whether a surface around an attractor in a plane has as many components and holes as its dilation, and that no voids. False where that is not shown.
-///
-/// # Errors
-/// [`Stopped`].
-pub(in crate::dilation) fn is_told(
-    surface: &BlockSurface,
-    attractor: &Attractor,
-    candidates: &Candidates,
-    setting: &Setting,
-    budget: &Budget,
-) -> Result<bool, Stopped> {
-    let mut known = f64::INFINITY;
-    for share in SMALL {
-        let Some((centres, small)) = centres(attractor, candidates, share * setting.reach, budget)? else { return Ok(false) };
-        if small == known {
-            continue;
-        }
-        known = small;
-        // Cells may be points, so small says nothing of how close to each other centres are.
-        let close = AS_ONE * share * setting.reach;
-        let figures = in_plane(&centres, setting.thin, close);
-        let moved = small + close + 3.0 * setting.width + setting.off + setting.slack;
-        let steady = Steady { figures: &figures, radius: setting.reach, moved, solids: &[], plane: Some(setting.thin) };
-        if steady.is_shown(budget)? {
-            let counts = planar::counts(&figures, setting, AMONG * setting.reach, budget)?;
-            return Ok(counts == Some(counts_of(surface)));
-        }
-    }
-    Ok(false)
-}
-
-/// Components and handles of a surface without voids.
-fn counts_of(surface: &BlockSurface) -> [u64; 2] {
-    let mut groups = Groups::of_triangles(surface.vertices.len(), &surface.triangles);
-    let components = (0..surface.vertices.len()).filter(|&vertex| groups.of(vertex) == vertex as u32).count() as u64;
-    let faces = surface.triangles.len() as u64;
-    // V - E + F = 2 (c - g), with E = 3 F / 2.
-    [components, (2 * components + faces / 2 - surface.vertices.len() as u64) / 2]
-}
-
-/// Centres of balls, none larger than told, around cells below some candidates, of which the attractor is the union, and how large they are; none where there are too many.
-fn centres(attractor: &Attractor, candidates: &Candidates, small: f64, budget: &Budget) -> Result<Option<(Vec<Point>, f64)>, Stopped> {
-    let (mut centres, mut largest) = (Vec::new(), 0.0_f64);
-    let candidates = candidates.cells.iter().map(|candidate| (candidate.cell, candidates.points_of(attractor, candidate).to_vec()));
-    let mut open: Vec<(Cell, Vec<ControlPoint>)> = candidates.collect();
-    let most = most_of(MOST_CELLS, budget);
-    while let Some((cell, points)) = open.pop() {
-        budget.cancel.check()?;
-        if centres.len() + open.len() >= most {
-            return Ok(None);
-        }
-        if cell.ball.radius <= small {
-            centres.push(cell.ball.centre);
-            largest = largest.max(cell.ball.radius);
-        } else {
-            open.extend(attractor.children(&cell, &points));
-        }
-    }
-    Ok(Some((centres, largest)))
-}
-
-/// Points as figures in one plane across an axis, where it is does not matter; those that are close are one.
-fn in_plane(points: &[Point], axis: usize, close: f64) -> Vec<Figure> {
-    let axes = [(axis + 1) % 3, (axis + 2) % 3];
-    let figure = |place: [f64; 2]| {
-        let mut at = [0.0; 3];
-        (at[axes[0]], at[axes[1]]) = (place[0], place[1]);
-        Figure { outline: Outline::Point(at), deficit: 0.0 }
-    };
-    planar::apart(points.iter().map(|point| axes.map(|axis| point[axis])), close).into_iter().map(figure).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::testing::{
-        arranged, arranged_unless_left, assert_limited, assert_steady, holds_everywhere, is_flat, lowered, on_lattice, topology,
+        arranged, arranged_unless_left, assert_limited, assert_steady, centres, holds_everywhere, is_flat, on_lattice, points, system,
+        topology,
     };
-    use super::*;
-    use crate::attractor::cell::distance_squared;
+    use crate::attractor::Attractor;
+    use crate::attractor::cell::{Cell, ControlPoint, distance_squared};
+    use crate::budget::Budget;
     use crate::dilation::dilate;
-    use crate::model::{AffineMap, Ifs, Model, Shape};
+    use crate::model::AffineMap;
     use crate::solid::Inside;
     use crate::split_mix::Random;
     use crate::tolerance::{Radius, Tolerance};
     use glam::{DMat3, DVec3};
-
-    fn system(maps: Vec<AffineMap>) -> Attractor {
-        Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) }.lower().unwrap().attractor
-    }
 
     /// Copies of the plane across an axis at a height, by a share, turned, to places.
     fn copies(maps: &[(f64, f64, [f64; 2])], axis: usize, height: f64) -> Attractor {
@@ -246,28 +154,15 @@ mod tests {
             }
             told += usize::from(made.topology_exact);
             // By the centres of small balls, out of the plane.
-            let candidates = candidates(&shape);
-            let Some((centres, small)) = super::centres(&shape, &candidates, 0.02 * radius, &Budget::default()).unwrap() else { continue };
-            if !made.topology_exact || centres.len() > 400 {
-                continue;
-            }
-            let centres: Vec<DVec3> = centres.iter().map(|&at| turned * DVec3::from_array(at)).collect();
-            let other = on_lattice(&lowered(&centres, (0..centres.len() as u32).map(|k| vec![k]).collect()), radius, 0.1 * radius);
-            assert!(small <= 0.02 * radius);
+            let Some(centres) = centres(&shape, 0.02 * radius, 400).filter(|_| made.topology_exact) else { continue };
+            let centres: Vec<DVec3> = centres.into_iter().map(|at| turned * at).collect();
+            let other = on_lattice(&points(&centres), radius, 0.1 * radius);
             if other.topology_exact {
                 assert_eq!(topology(&made), topology(&other), "{round}");
                 compared += 1;
             }
         }
-        assert!(told >= 6 && compared >= 2, "{told} told, {compared} compared");
-    }
-
-    fn candidates(shape: &Attractor) -> Candidates {
-        let mut candidates = Candidates::default();
-        for (index, root) in shape.roots().iter().enumerate() {
-            candidates.push(shape.root_cell(index), &root.points, false);
-        }
-        candidates
+        assert!(told >= 10 && compared >= 2, "{told} told, {compared} compared");
     }
 
     /// Sierpinski's triangle leaves the triangles open whose inscribed circle is wider than the ball: a side of 100 mm / 2^k has one of 100 mm / (2^k 2 sqrt 3).

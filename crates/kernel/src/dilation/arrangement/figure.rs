@@ -66,6 +66,14 @@ impl From<Weighted> for Figure {
 }
 
 impl Figure {
+    /// Where it is, if it is a point that no radius of its own belongs to.
+    pub(super) fn point(&self) -> Option<Point> {
+        match self.outline {
+            Outline::Point(at) if self.deficit == 0.0 => Some(at),
+            _ => None,
+        }
+    }
+
     /// The convex hull of these is the figure.
     pub(super) fn corners(&self) -> &[Point] {
         match &self.outline {

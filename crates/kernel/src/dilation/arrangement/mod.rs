@@ -38,7 +38,7 @@ mod steady;
 mod structure;
 mod sum;
 #[cfg(test)]
-mod testing;
+pub(super) mod testing;
 #[cfg(test)]
 mod tests;
 mod triangulate;
@@ -54,7 +54,8 @@ use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::solid::{Inside, TriMesh};
 pub(super) use copies::Copies;
-pub(super) use dense::{is_thin, is_told};
+pub(super) use cubes::Cube;
+pub(super) use dense::is_thin;
 use engine::{Engine, Forms, Run, State, TRIALS};
 pub(super) use faces::{Face, Faces, without_lines};
 use figure::{Figure, Outline};
@@ -495,6 +496,11 @@ impl Arrangement {
         Ok(self.is_steady)
     }
 
+    /// Where its sites are, if all are points.
+    pub(super) fn points(&self) -> Option<Vec<Point>> {
+        self.sites.list.iter().map(Figure::point).collect()
+    }
+
     /// Its figures without those of bends.
     fn figures(&self) -> &[Figure] {
         if self.tubes.figures > 0 { &self.sites.list[..self.tubes.figures] } else { &self.sites.list }
@@ -526,7 +532,7 @@ pub(super) fn is_of_sites(setting: &Setting, rule: &SiteRule<'_>, candidates: &C
 /// The same of figures that are off by so much, given the surfaces of solids.
 fn are_steady(figures: &[Figure], setting: &Setting, off: f64, solids: &[TriMesh], budget: &Budget) -> Result<bool, Stopped> {
     let solids: Vec<Inside<'_>> = solids.iter().map(Inside::new).collect();
-    Steady { figures, radius: setting.reach, moved: off + setting.slack, solids: &solids, plane: None }.is_shown(budget)
+    Steady { figures, radius: setting.reach, moved: off + setting.slack, solids: &solids }.is_shown(budget)
 }
 
 /// The figures that are near to each other, given how far beyond their ends they are cut; none where a lattice serves better, as too many are.

@@ -2,15 +2,17 @@
 
 use super::Arrangement;
 use crate::attractor::Attractor;
+use crate::attractor::cell::{Cell, ControlPoint, Point, distance_squared, dot, subtract};
 use crate::budget::{Budget, Limits, StopReason};
 use crate::dilation::plan::{Balls, Plan};
+use crate::dilation::tree::Candidates;
 use crate::dilation::{Dilation, DilationError, dilate};
 use crate::measure::triangle::closest_on_triangle;
-use crate::model::{Interior, Model, PolygonMesh, Shape};
+use crate::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
 use crate::solid::{Inside, mend};
 use crate::split_mix::Random;
 use crate::tolerance::{Radius, Tolerance};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::fmt::Display;
 
 pub(super) fn number(random: &mut Random) -> f64 {
@@ -31,13 +33,53 @@ pub(super) fn lowered_as(interior: Interior, vertices: &[DVec3], faces: Vec<Vec<
     Model { name: None, shape }.lower().ok().map(|lowered| lowered.attractor)
 }
 
-pub(super) fn points(vertices: &[DVec3]) -> Attractor {
+pub(in crate::dilation) fn points(vertices: &[DVec3]) -> Attractor {
     lowered(vertices, (0..vertices.len() as u32).map(|k| vec![k]).collect())
 }
 
 pub(super) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
     let vertices: Vec<DVec3> = segments.iter().flatten().copied().collect();
     lowered(&vertices, (0..segments.len() as u32).map(|k| vec![2 * k, 2 * k + 1]).collect())
+}
+
+pub(in crate::dilation) fn system(maps: Vec<AffineMap>) -> Attractor {
+    Model { name: None, shape: Shape::Ifs(Ifs { maps, primitive: None, graph: None }) }.lower().unwrap().attractor
+}
+
+/// Some copies of space, by about a half, turned anyhow, to some places.
+pub(in crate::dilation) fn copies_in_space(random: &mut Random, count: usize) -> Attractor {
+    let map = |random: &mut Random| {
+        let turned = DMat3::from_axis_angle((place(random, 2.0) - DVec3::ONE).normalize_or(DVec3::X), 3.0 * random.share());
+        AffineMap { linear: (0.3 + 0.25 * random.share()) * turned, translation: place(random, 40.0) }
+    };
+    system((0..count).map(|_| map(random)).collect())
+}
+
+/// The roots of a shape.
+pub(in crate::dilation) fn of_roots(shape: &Attractor) -> Candidates {
+    let mut candidates = Candidates::default();
+    for (index, root) in shape.roots().iter().enumerate() {
+        candidates.push(shape.root_cell(index), &root.points, false);
+    }
+    candidates
+}
+
+/// Centres of balls, none larger than told, around cells of which a shape is the union; none where there are more than `most`.
+pub(in crate::dilation) fn centres(shape: &Attractor, small: f64, most: usize) -> Option<Vec<DVec3>> {
+    let roots = shape.roots().iter().enumerate();
+    let mut open: Vec<(Cell, Vec<ControlPoint>)> = roots.map(|(index, root)| (shape.root_cell(index), root.points.clone())).collect();
+    let mut centres = Vec::new();
+    while let Some((cell, points)) = open.pop() {
+        if cell.ball.radius <= small {
+            centres.push(DVec3::from_array(cell.ball.centre));
+        } else {
+            open.extend(shape.children(&cell, &points));
+        }
+        if centres.len() + open.len() > most {
+            return None;
+        }
+    }
+    Some(centres)
 }
 
 pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
@@ -53,14 +95,14 @@ pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Di
     arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
 }
 
-pub(super) fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+pub(in crate::dilation) fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
     let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
     let setting = plan.setting(plan.pitch(), &budget);
     plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap()
 }
 
 /// Components, cavities and the Euler number.
-pub(super) fn topology(dilation: &Dilation) -> (u64, u64, i64) {
+pub(in crate::dilation) fn topology(dilation: &Dilation) -> (u64, u64, i64) {
     let topology = dilation.solid.topology();
     (topology.components, topology.cavities, topology.euler)
 }
@@ -166,4 +208,52 @@ pub(super) fn keeps_its_bounds(dilation: &Dilation, segments: &[[DVec3; 2]], rad
         };
         assert_bounds("segments", &inside, dilation, radius, x, distance_of_segments(x, segments));
     }
+}
+
+/// The place in the plane, or on the line, of some points from which all are as far, the deficits included, if it is in the inside of their hull.
+fn middle(points: &[(Point, f64)]) -> Option<Point> {
+    let (origin, first) = points[0];
+    let ways: Vec<Point> = points[1..].iter().map(|(at, _)| subtract(at, &origin)).collect();
+    // 2 (x - p) . (q - p) = |q - p|^2 + deficits' difference, for x - p a sum of the ways.
+    let count = ways.len();
+    let mut rows: Vec<Vec<f64>> = (0..count)
+        .map(|i| {
+            let mut row: Vec<f64> = ways.iter().map(|way| 2.0 * dot(way, &ways[i])).collect();
+            row.push(dot(&ways[i], &ways[i]) + points[i + 1].1 - first);
+            row
+        })
+        .collect();
+    for k in 0..count {
+        let pivot = (k..count).max_by(|&a, &b| rows[a][k].abs().total_cmp(&rows[b][k].abs()))?;
+        rows.swap(k, pivot);
+        if rows[k][k].abs() < 1e-9 {
+            return None;
+        }
+        for i in (0..count).filter(|&i| i != k) {
+            let (share, pivot) = (rows[i][k] / rows[k][k], rows[k].clone());
+            rows[i].iter_mut().zip(pivot).for_each(|(x, by)| *x -= share * by);
+        }
+    }
+    let weights: Vec<f64> = (0..count).map(|k| rows[k][count] / rows[k][k]).collect();
+    let is_within = weights.iter().all(|&weight| weight > 0.0) && weights.iter().sum::<f64>() < 1.0;
+    let sum = weights.iter().zip(&ways).fold(origin, |sum, (weight, way)| std::array::from_fn(|axis| sum[axis] + weight * way[axis]));
+    is_within.then_some(sum)
+}
+
+/// The critical values of the distance from points, and how many these are: at places that are in the hull of all points that are closest to them.
+pub(in crate::dilation) fn critical_values(points: &[(Point, f64)]) -> Vec<(f64, u32)> {
+    let mut found = Vec::new();
+    for set in 3..1_u32 << points.len() {
+        if !(2..=4).contains(&set.count_ones()) {
+            continue;
+        }
+        let own: Vec<(Point, f64)> = (0..points.len()).filter(|k| set >> k & 1 == 1).map(|k| points[k]).collect();
+        let Some(x) = middle(&own) else { continue };
+        let square = |(at, deficit): &(Point, f64)| distance_squared(at, &x) + deficit;
+        let value = square(&own[0]);
+        if points.iter().all(|other| square(other) > value - 1e-12) {
+            found.push((value.sqrt(), set.count_ones()));
+        }
+    }
+    found
 }

@@ -27,8 +27,7 @@ use contour::{Contour, contour};
 use rings::{Band, Corner, Ring, rings};
 use sheet::{Sheet, sheet};
 use std::f64::consts::PI;
-use thin::without_those_among;
-pub(super) use thin::{Thinned, Thinning, apart};
+pub(super) use thin::{Thinned, Thinning};
 use valleys::Lines;
 use wires::Wires;
 
@@ -175,22 +174,6 @@ pub(super) fn surface(
         });
         Flat::Made(Box::new(surface))
     }))
-}
-
-/// Components and holes of what is no farther in their plane than the reach from points with one coordinate in common, of which those go that change nothing from a radius of `among` on; none where that is in doubt.
-///
-/// # Errors
-/// [`Stopped`].
-pub(super) fn counts(figures: &[Figure], setting: &Setting, among: f64, budget: &Budget) -> Result<Option<[u64; 2]>, Stopped> {
-    let Some((axis, _)) = plane(figures) else { return Ok(None) };
-    let axes = [(axis + 1) % 3, (axis + 2) % 3];
-    let places: Vec<Place> = figures.iter().flat_map(Figure::corners).map(|at| axes.map(|axis| at[axis])).collect();
-    let Some(places) = without_those_among(places, among, budget)? else { return Ok(None) };
-    let outer: Vec<[Place; 2]> = places.into_iter().map(|place| [place; 2]).collect();
-    let gap = GAP * setting.slack;
-    let Some(wires) = Wires::new(&outer, 2.0 * setting.outer, gap, budget)? else { return Ok(None) };
-    let found = contour(&wires, setting.reach, PERTURBED * gap, budget)?;
-    Ok(found.map(|found| [found.components, found.holes]))
 }
 
 /// The rings of all levels from the rim up, and how far the contours are that they are led along.

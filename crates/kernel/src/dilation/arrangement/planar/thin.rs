@@ -52,11 +52,7 @@ impl Thinning {
     /// # Errors
     /// [`Stopped`].
     pub(in super::super) fn of(self, figures: &[Figure], budget: &Budget) -> Result<Option<Thinned>, Stopped> {
-        let at = |figure: &Figure| match figure.outline {
-            Outline::Point(at) if figure.deficit == 0.0 => Some(at),
-            _ => None,
-        };
-        let Some(points) = figures.iter().map(at).collect::<Option<Vec<Point>>>() else { return Ok(None) };
+        let Some(points) = figures.iter().map(Figure::point).collect::<Option<Vec<Point>>>() else { return Ok(None) };
         let axis = self.axis;
         let [low, high] = points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at[axis]), high.max(at[axis])]);
         if points.is_empty() || high - low > self.flat {
@@ -117,7 +113,7 @@ impl Grid {
 }
 
 /// The first of all places that are within a distance of each other.
-pub(in super::super) fn apart(places: impl Iterator<Item = Place>, close: f64) -> Vec<Place> {
+fn apart(places: impl Iterator<Item = Place>, close: f64) -> Vec<Place> {
     let (mut grid, mut kept) = (Grid::new(close), Vec::new());
     for place in places {
         kept.push(place);
@@ -203,7 +199,7 @@ fn around_origin(ways: &[(usize, Place)], distance: f64) -> Option<[usize; 3]> {
 }
 
 /// Places without those that are among others from a radius on, in steps; none where very many are near to each other.
-pub(super) fn without_those_among(mut places: Vec<Place>, radius: f64, budget: &Budget) -> Result<Option<Vec<Place>>, Stopped> {
+fn without_those_among(mut places: Vec<Place>, radius: f64, budget: &Budget) -> Result<Option<Vec<Place>>, Stopped> {
     for share in AMONG {
         let Some(left) = without_those_among_at(places, share * radius, budget)? else { return Ok(None) };
         places = left;
