@@ -1,6 +1,6 @@
 //! What stands for cells in a dilation: for every state the kind of site that allows the largest cells.
 
-use super::cell::{Cell, ControlPoint, Point, Site, dot, frame_columns, subtract, times};
+use super::cell::{Cell, ControlPoint, Point, Site, distance_squared, dot, frame_columns, subtract, times};
 use super::{Attractor, OwnRadius};
 use crate::automaton::{Automaton, LeafPrimitive, StateId};
 use crate::budget::{CancelToken, Stopped};
@@ -61,6 +61,16 @@ pub(crate) struct SiteRule<'a> {
     used: Vec<usize>,
     /// Of every root, how much less the square of its own radius is than that of `radius`; empty where all have this one.
     deficits: Vec<f64>,
+    /// Where sites are to be nearer to what they stand for.
+    closer: Vec<Closer>,
+}
+
+/// A ball to which cells only come if their sites are off by a share of what they may be elsewhere.
+#[derive(Clone, Copy, Debug)]
+struct Closer {
+    centre: Point,
+    radius: f64,
+    share: f64,
 }
 
 /// The share of r^2 - (r - e)^2 that sites may use, e the tolerance; the lattice has the rest. More lets cells be larger and
@@ -84,8 +94,17 @@ impl<'a> SiteRule<'a> {
             _ => 0.0,
         };
         let deficits = if attractor.has_own_radii() { (0..attractor.roots().len()).map(deficit).collect() } else { Vec::new() };
-        let mut rule =
-            Self { attractor, radius, tolerance, coarseness, share: SITE_SHARE, choices: Vec::new(), used: used(attractor), deficits };
+        let mut rule = Self {
+            attractor,
+            radius,
+            tolerance,
+            coarseness,
+            share: SITE_SHARE,
+            choices: Vec::new(),
+            used: used(attractor),
+            deficits,
+            closer: Vec::new(),
+        };
         choose(&mut rule);
         if rule.is_dense() {
             rule.share = DENSE_SHARE;
@@ -105,6 +124,20 @@ impl<'a> SiteRule<'a> {
     /// The same with sites that use only a share of what they may be off.
     pub(crate) fn finer(&self, share: f64) -> Self {
         Self { coarseness: share * self.coarseness, ..self.clone() }
+    }
+
+    /// The same with sites that use only a share of what they may be off where they come within a distance of some places.
+    pub(crate) fn closer(&self, places: &[Point], radius: f64, share: f64) -> Self {
+        let mut closer = self.clone();
+        closer.closer.extend(places.iter().map(|&centre| Closer { centre, radius, share }));
+        closer
+    }
+
+    /// Whether the sites of a cell with such an error are as near to it as they are to be where it is.
+    fn is_close(&self, cell: &Cell, error: &SiteError) -> bool {
+        let is_near = |place: &&Closer| distance_squared(&cell.ball.centre, &place.centre).sqrt() <= place.radius + cell.ball.radius;
+        let share = self.closer.iter().filter(is_near).map(|place| place.share).fold(1.0, f64::min);
+        share == 1.0 || (error.inner.max(error.outer) <= share * self.most_outer() && error.inner_square <= share * self.room())
     }
 
     /// Whether segments, or points, stand for curves.
@@ -208,7 +241,8 @@ impl<'a> SiteRule<'a> {
         let deficit = self.deficit(cell.root);
         if deficit == 0.0 {
             let square = (least + error.inner).powi(2) + error.inner_square;
-            return (square <= allowed && error.outer <= self.most_outer()).then_some(SiteError { square, ..error });
+            let is_small = square <= allowed && error.outer <= self.most_outer() && self.is_close(cell, &error);
+            return is_small.then_some(SiteError { square, ..error });
         }
         // The same in space, for the root's own radius: x within `outer` of the sites and o farther from the cell has
         // (d + o)^2 + deficit <= outer^2 + 2 d o + o^2, d^2 = outer^2 - deficit, which is (outer + o')^2 at most.
@@ -216,7 +250,7 @@ impl<'a> SiteRule<'a> {
         let square = (in_space(least) + error.inner).powi(2) + error.inner_square + deficit;
         let farthest = in_space(self.radius + self.tolerance);
         let outer = (2.0 * farthest * error.outer + error.outer * error.outer) / (2.0 * self.radius);
-        (square <= allowed && outer <= self.most_outer()).then_some(SiteError { square, outer, ..error })
+        (square <= allowed && outer <= self.most_outer() && self.is_close(cell, &error)).then_some(SiteError { square, outer, ..error })
     }
 
     /// (r - e)^2 and what sites may use.

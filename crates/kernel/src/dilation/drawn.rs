@@ -42,19 +42,19 @@ const CELLS_PER_SQUARE: f64 = 20.0;
 const BYTES_PER_CELL: u64 = 4_000;
 
 /// An attractor that stands for another one.
-pub(super) struct Drawn {
+pub(super) struct Drawn<'a> {
     pub(super) attractor: Attractor,
     balls: Balls,
-    pub(super) meant: Meant,
+    pub(super) meant: Meant<'a>,
     /// What it leaves of the tolerance: dilations of sets within d of each other, D(r) and D'(r), have D(r - d) in D'(r)
     /// in D(r + d), so that d adds to both bounds.
     rest: Tolerance,
 }
 
-impl Drawn {
+impl<'a> Drawn<'a> {
     /// Draws trimmed surfaces and the faces of volumes to their share of the tolerance, times `coarseness`, and splits roots whose radius varies; `None` when there are none, or no volumes that are proven to be solids.
     pub(super) fn resolved(
-        attractor: &Attractor,
+        attractor: &'a Attractor,
         radius: Radius,
         tolerance: Tolerance,
         coarseness: f64,
@@ -88,15 +88,16 @@ impl Drawn {
             let (balls, rest) = (Balls { least, most }, length(aimed - deviation_mm));
             let off = if deviation_mm > 0.0 { f64::INFINITY } else { 0.0 };
             let bounds = dilated_box(&graded.attractor, budget)?.widened(deviation_mm);
-            return Ok(Some(Self { attractor: graded.attractor, balls, meant: Meant { off, deviation_mm, bounds }, rest }));
+            return Ok(Some(Self { attractor: graded.attractor, balls, meant: Meant { off, deviation_mm, bounds, shape: None }, rest }));
         }
-        let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounding_box(attractor, budget)?.grown(radius.mm()) };
+        let bounds = bounding_box(attractor, budget)?.grown(radius.mm());
+        let meant = Meant { off: deviation_mm, deviation_mm, bounds, shape: None };
         Ok(Some(Self { attractor: changed.into_owned(), balls, meant, rest: length(aimed - deviation_mm) }))
     }
 
     /// Draws a surface with a B-rep, or what volumes are bounded by, to its share of the tolerance; `None` where it is no such shape, or has more cells than one that is smooth for balls of this radius: another way may do with fewer.
     pub(super) fn smooth(
-        attractor: &Attractor,
+        attractor: &'a Attractor,
         radius: Radius,
         tolerance: Tolerance,
         budget: &Budget,
@@ -116,25 +117,32 @@ impl Drawn {
         let came = |error| refused(error, SMOOTH_SHARE);
         if !is_surface {
             let filled = unless_stopped(attractor.filled(share, &few).map_err(came))?;
-            return Ok(filled.and_then(|(filled, deviation_mm)| Self::near(filled, &bounds, radius, aimed, deviation_mm)));
+            return Ok(filled.and_then(|(filled, deviation_mm)| Self::near(None, filled, &bounds, radius, [aimed, deviation_mm])));
         }
         let Some((mesh, deviation_mm)) = unless_stopped(attractor.drawn(share, &few).map(Some).map_err(came))? else { return Ok(None) };
         let (mesh, moved) = unfolded(mesh, UNFOLDED_SHARE * aimed);
         let deviation_mm = deviation_mm + moved;
-        Ok(Attractor::of_triangles(&mesh, false).and_then(|drawn| Self::near(drawn, &bounds, radius, aimed, deviation_mm)))
+        Ok(Attractor::of_triangles(&mesh, false)
+            .and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, deviation_mm])))
     }
 
     /// What stands for a shape in a box, no place of either farther from the other one than told, with one radius; none where that leaves nothing of what is aimed at.
-    fn near(attractor: Attractor, bounds: &AxisBox, radius: f64, aimed: f64, deviation_mm: f64) -> Option<Self> {
+    fn near(
+        shape: Option<&'a Attractor>,
+        attractor: Attractor,
+        bounds: &AxisBox,
+        radius: f64,
+        [aimed, deviation_mm]: [f64; 2],
+    ) -> Option<Self> {
         let rest = Tolerance::new(aimed - deviation_mm).ok()?;
-        let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius) };
+        let meant = Meant { off: deviation_mm, deviation_mm, bounds: bounds.grown(radius), shape };
         Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest })
     }
 
     /// Fewer triangles for a mesh that is finer than needed, within their share of the tolerance, times `coarseness`; `None` where it is no such.
     pub(super) fn decimated(
         Finer { mesh, is_solid }: &Finer,
-        attractor: &Attractor,
+        attractor: &'a Attractor,
         radius: Radius,
         tolerance: Tolerance,
         coarseness: f64,
@@ -147,7 +155,7 @@ impl Drawn {
         let longest = if *is_solid { NEAR_SURFACE * (radius - aimed) / JUNG } else { f64::INFINITY };
         let Some(fewer) = decimated(mesh, share, longest, budget)? else { return Ok(None) };
         let bounds = bounding_box(attractor, budget)?;
-        Ok(Attractor::of_triangles(&fewer, *is_solid).and_then(|drawn| Self::near(drawn, &bounds, radius, aimed, share)))
+        Ok(Attractor::of_triangles(&fewer, *is_solid).and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, share])))
     }
 
     /// The plan of its dilation, as that of the other one.

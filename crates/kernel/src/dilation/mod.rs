@@ -99,7 +99,7 @@ pub struct Dilation {
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain, as far as they were looked at: others beside them are not; without a lattice, sets of sites whose dilations may or may not
     /// have a common point. Where points stand for cells critical points of theirs are not those of the attractor: these are not counted, but it is one where the solid is shown to have another topology.
     pub uncertain: u64,
-    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`), where nothing was uncertain and no triangles cross: of points, wires, surfaces and solids of these; of curves and smooth surfaces, if what stands for them is near enough (see `steady` there); and of all that is told by a few points (see `flow` and `told`).
+    /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`), where nothing was uncertain and no triangles cross: of points, wires, surfaces and solids of these; of curves and smooth surfaces, if what stands for them is near enough (see `steady` there) or is shown to have their topology (see `flow`); and of all that is told by a few points (see `told`).
     pub topology_exact: bool,
 }
 

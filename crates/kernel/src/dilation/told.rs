@@ -2,6 +2,7 @@
 //!
 //! K need not be within the tolerance, and so are far fewer. Of points the topology of the dilation is proven as that of all others, see `critical` and `star`: a solid has the attractor's if it has as many components, handles and voids.
 
+use super::arrangement::Figure;
 use super::flow::Flow;
 use super::{DilationError, dilate_unsimplified, unless_stopped};
 use crate::attractor::Attractor;
@@ -23,7 +24,7 @@ const COARSE: f64 = 0.25;
 pub(super) fn is_told(flow: &Flow<'_>, topology: &Topology, budget: &Budget) -> Result<Option<bool>, DilationError> {
     for wide in WIDE {
         let Some(points) = flow.points(wide * flow.radius, MOST_POINTS, budget)? else { return Ok(None) };
-        if flow.is_that_of(&points, budget)?
+        if flow.is_that_of(&Figure::of_points(&points), budget)?
             && let Some(own) = of_points(&points, flow.radius, budget)?
         {
             return Ok(Some(own == counts(topology)));

@@ -30,6 +30,15 @@ pub(super) struct Candidate {
 }
 
 impl Candidates {
+    /// The roots of an attractor, as far as they are not asked whether they are leaves.
+    pub(super) fn of_roots(attractor: &Attractor) -> Self {
+        let mut candidates = Self::default();
+        for (index, root) in attractor.roots().iter().enumerate() {
+            candidates.push(attractor.root_cell(index), &root.points, false);
+        }
+        candidates
+    }
+
     pub(super) fn push(&mut self, cell: Cell, points: &[ControlPoint], leaf: bool) {
         let first = self.points.len() as u32;
         self.points.extend_from_slice(points);

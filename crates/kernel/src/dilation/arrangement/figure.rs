@@ -74,8 +74,13 @@ impl Figure {
         }
     }
 
+    /// Points, without deficits.
+    pub(in crate::dilation) fn of_points(points: &[Point]) -> Vec<Self> {
+        points.iter().map(|&at| Self { outline: Outline::Point(at), deficit: 0.0 }).collect()
+    }
+
     /// The convex hull of these is the figure.
-    pub(super) fn corners(&self) -> &[Point] {
+    pub(in crate::dilation) fn corners(&self) -> &[Point] {
         match &self.outline {
             Outline::Point(at) => std::slice::from_ref(at),
             Outline::Segment(ends) => ends,
@@ -108,7 +113,7 @@ impl Figure {
     }
 
     /// Its box.
-    pub(super) fn bounds(&self) -> [Point; 2] {
+    pub(in crate::dilation) fn bounds(&self) -> [Point; 2] {
         box_of(self.corners())
     }
 

@@ -44,6 +44,7 @@ mod tests;
 mod triangulate;
 mod tubes;
 
+use super::flow::Flow;
 use super::plan;
 use super::setting::Setting;
 use super::surface::BlockSurface;
@@ -58,7 +59,8 @@ pub(super) use cubes::Cube;
 pub(super) use dense::is_thin;
 use engine::{Engine, Forms, Run, State, TRIALS};
 pub(super) use faces::{Face, Faces, without_lines};
-use figure::{Figure, Outline};
+pub(super) use figure::Figure;
+use figure::Outline;
 use form::Kind;
 pub(super) use index::Index;
 use noise::Cleared;
@@ -93,6 +95,8 @@ const ROUNDS_OF_BENDS: usize = 6;
 const MOST_STEADY: usize = 20_000;
 /// The same where there is no lattice.
 const MOST_ASKED: usize = 300_000;
+/// Places at most where the topology of what sites stand for may be in doubt, so that finer ones are made there.
+const MOST_DOUBTS: usize = 64;
 /// Polytopes that tell how many triangles there will be.
 const SAMPLE: u64 = 64;
 /// Bytes held at most for each triangle that is made: the edges of the union and their names, its boundary, and the simplification's working memory.
@@ -116,6 +120,8 @@ pub(super) struct Arrangement {
     flat: Option<BlockSurface>,
     /// Whether its topology is shown to be that of what the sites stand for: kept, as it takes long to show.
     is_steady: bool,
+    /// Places where that is in doubt, as far as these are known, once that was asked for.
+    doubts: Option<Vec<Point>>,
     /// How many points there were of which these are left, where points stand for cells.
     thinned: usize,
     /// Those that a first trial begins with.
@@ -295,6 +301,7 @@ impl Arrangement {
             copies,
             flat: None,
             is_steady: false,
+            doubts: None,
             thinned: 0,
             polytopes: Polytopes::default(),
             solids,
@@ -476,11 +483,11 @@ impl Arrangement {
         Ok(None)
     }
 
-    /// Whether the dilation of what its sites stand for has the topology of theirs. False where that is not shown.
+    /// Whether the dilation of what its sites stand for, which is asked for where it is known, has the topology of theirs. False where that is not shown.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn is_of_another(&mut self, rule: &SiteRule<'_>, budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn is_of_another(&mut self, rule: &SiteRule<'_>, flow: Option<&Flow<'_>>, budget: &Budget) -> Result<bool, Stopped> {
         if self.sites.is_exact || self.is_steady {
             return Ok(true);
         }
@@ -493,7 +500,19 @@ impl Arrangement {
         // Parts that are like others are apart by twice the outer distance: what is in question around one of them must not reach another.
         let is_apart = self.copies.is_empty() || 2.0 * (off + slack) <= outer - reach;
         self.is_steady = is_within && is_apart && are_steady(self.figures(), &self.setting, off, &rule.attractor().surfaces(), budget)?;
+        if let Some(flow) = flow.filter(|_| !self.is_steady && self.doubts.is_none() && self.copies.is_empty()) {
+            // Joined figures are flat up to the slack of these.
+            let flow = Flow { slack: flow.slack + slack, ..*flow };
+            let doubts = flow.doubts(self.figures(), MOST_DOUBTS, budget)?;
+            self.is_steady = doubts.as_ref().is_some_and(Vec::is_empty);
+            self.doubts = Some(doubts.unwrap_or_default());
+        }
         Ok(self.is_steady)
+    }
+
+    /// Where the topology of what its sites stand for is in doubt; none where it could not be asked, or is in doubt at too many places.
+    pub(super) fn take_doubts(&mut self) -> Option<Vec<Point>> {
+        self.doubts.take().filter(|doubts| !doubts.is_empty())
     }
 
     /// Where its sites are, if all are points.
@@ -520,13 +539,23 @@ fn most_of(sites: usize, budget: &Budget) -> usize {
     sites.min(usize::try_from(budget.limits.cells).unwrap_or(usize::MAX))
 }
 
-/// Whether the dilation of what some sites stand for has the topology of theirs, if they are no more than can be asked. False where that is not shown.
+/// Whether the dilation of what some sites stand for, which is asked for where it is known, has the topology of theirs, if they are no more than can be asked. False where that is not shown.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn is_of_sites(setting: &Setting, rule: &SiteRule<'_>, candidates: &Candidates, budget: &Budget) -> Result<bool, Stopped> {
+pub(super) fn is_of_sites(
+    setting: &Setting,
+    rule: &SiteRule<'_>,
+    candidates: &Candidates,
+    flow: Option<&Flow<'_>>,
+    budget: &Budget,
+) -> Result<bool, Stopped> {
     let Some((sites, _)) = Sites::of(rule, candidates, MOST_STEADY, budget)? else { return Ok(false) };
-    are_steady(&sites.list, setting, setting.off + sites.off(), &rule.attractor().surfaces(), budget)
+    if are_steady(&sites.list, setting, setting.off + sites.off(), &rule.attractor().surfaces(), budget)? {
+        return Ok(true);
+    }
+    let doubts = flow.map(|flow| flow.doubts(&sites.list, MOST_DOUBTS, budget)).transpose()?.flatten();
+    Ok(doubts.is_some_and(|doubts| doubts.is_empty()))
 }
 
 /// The same of figures that are off by so much, given the surfaces of solids.

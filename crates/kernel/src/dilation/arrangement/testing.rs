@@ -5,7 +5,6 @@ use crate::attractor::Attractor;
 use crate::attractor::cell::{Cell, ControlPoint, Point, distance_squared, dot, subtract};
 use crate::budget::{Budget, Limits, StopReason};
 use crate::dilation::plan::{Balls, Plan};
-use crate::dilation::tree::Candidates;
 use crate::dilation::{Dilation, DilationError, dilate};
 use crate::measure::triangle::closest_on_triangle;
 use crate::model::{AffineMap, Ifs, Interior, Model, PolygonMesh, Shape};
@@ -37,7 +36,7 @@ pub(in crate::dilation) fn points(vertices: &[DVec3]) -> Attractor {
     lowered(vertices, (0..vertices.len() as u32).map(|k| vec![k]).collect())
 }
 
-pub(super) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
+pub(in crate::dilation) fn wires(segments: &[[DVec3; 2]]) -> Attractor {
     let vertices: Vec<DVec3> = segments.iter().flatten().copied().collect();
     lowered(&vertices, (0..segments.len() as u32).map(|k| vec![2 * k, 2 * k + 1]).collect())
 }
@@ -53,15 +52,6 @@ pub(in crate::dilation) fn copies_in_space(random: &mut Random, count: usize) ->
         AffineMap { linear: (0.3 + 0.25 * random.share()) * turned, translation: place(random, 40.0) }
     };
     system((0..count).map(|_| map(random)).collect())
-}
-
-/// The roots of a shape.
-pub(in crate::dilation) fn of_roots(shape: &Attractor) -> Candidates {
-    let mut candidates = Candidates::default();
-    for (index, root) in shape.roots().iter().enumerate() {
-        candidates.push(shape.root_cell(index), &root.points, false);
-    }
-    candidates
 }
 
 /// Centres of balls, none larger than told, around cells of which a shape is the union; none where there are more than `most`.

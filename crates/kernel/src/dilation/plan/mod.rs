@@ -1,9 +1,10 @@
 //! Pitch, thresholds and bounds of a dilation.
 
 use super::arrangement::height_field::between_rays;
-use super::arrangement::{self, Arranged, Arrangement, Copies, Flat};
+use super::arrangement::{self, Arranged, Arrangement, Copies, Figure, Flat};
 use super::assemble::Assembly;
 use super::block;
+use super::drawn::unless_stopped;
 use super::dust;
 use super::flow::Flow;
 use super::lattice::{Cube, ENCLOSING, Grading};
@@ -23,12 +24,13 @@ use crate::attractor::cell::{Cell, ControlPoint, Point};
 use crate::attractor::sites::{SiteError, SiteRule};
 use crate::attractor::{Attractor, Graph};
 use crate::automaton::LeafPrimitive;
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, Limits, Stopped};
 use crate::measure::bounds::{AxisBox, bounding_box};
 use crate::solid::mend;
 use crate::solid::{Solid, SolidError, TriMesh, carried, rounding};
 use crate::tolerance::Tolerance;
 use glam::DVec3;
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Mutex;
 
@@ -61,6 +63,10 @@ const MOST_SPLIT: u64 = 100_000;
 /// One in so many bytes may hold them.
 const SPLIT_SHARE: u64 = 8;
 const BYTES_PER_CONTROL_POINT: u64 = 32;
+/// Rounds in which sites become nearer to what they stand for around places where the topology is in doubt, by which share, and cells at most for each of the first.
+const CLOSER_ROUNDS: u32 = 3;
+const CLOSER: f64 = 0.0625;
+const CLOSER_CELLS: u64 = 10;
 /// Bytes of a cell with its control points, nodes and sites.
 const BYTES_PER_CELL: u64 = 400;
 /// Bytes held at most for each triangle: block surfaces, the joined mesh and its verification.
@@ -98,6 +104,8 @@ fn check_depth(attractor: &Attractor, aimed: f64, tolerance: Tolerance, budget: 
 pub(super) struct Space {
     blocks: i64,
     candidates: Candidates,
+    /// The roots of what is meant, where that is another shape.
+    meant: Candidates,
 }
 
 #[cfg(test)]
@@ -145,6 +153,7 @@ impl Balls {
 }
 
 /// Pitch and bounds of a dilation before it begins.
+#[derive(Clone)]
 pub(super) struct Plan<'a> {
     balls: Balls,
     /// The largest of them.
@@ -160,20 +169,22 @@ pub(super) struct Plan<'a> {
     extra: f64,
     bounds: AxisBox,
     rule: SiteRule<'a>,
-    meant: Meant,
+    meant: Meant<'a>,
     clean_only: bool,
     has_sheets: bool,
 }
 
 /// What a plan's attractor stands for: itself, or another one that it is nearly.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Meant {
+pub(super) struct Meant<'a> {
     /// No place of either is farther from the other one than this. Infinite where no length tells.
     pub(super) off: f64,
     /// Bounds are that much wider.
     pub(super) deviation_mm: f64,
     /// The box of its exact dilation.
     pub(super) bounds: AxisBox,
+    /// The other one, where its cells tell where it is.
+    pub(super) shape: Option<&'a Attractor>,
 }
 
 impl<'a> Plan<'a> {
@@ -206,7 +217,7 @@ impl<'a> Plan<'a> {
             let reachable_mm = 1.01 * balls.inner((2.0 * extra).max(share + extra)).max(balls.outer((2.0 * extra).max(share + extra)));
             return Err(DilationError::Precision { tolerance_mm: tolerance.mm(), extent_mm: extent(&bounds, radius), reachable_mm });
         }
-        let meant = Meant { off: 0.0, deviation_mm: 0.0, bounds: bounds.grown(radius) };
+        let meant = Meant { off: 0.0, deviation_mm: 0.0, bounds: bounds.grown(radius), shape: None };
         Ok(Self {
             balls,
             radius,
@@ -249,8 +260,13 @@ impl<'a> Plan<'a> {
     }
 
     /// The same for an attractor that stands for another one, within what is left of the tolerance.
-    pub(super) fn standing_for(self, meant: Meant) -> Self {
+    pub(super) fn standing_for(self, meant: Meant<'a>) -> Self {
         Self { meant, ..self }
+    }
+
+    /// The same with sites that are nearer to what they stand for around some places: all that may be closest to these.
+    fn closer(&self, places: &[Point], share: f64) -> Self {
+        Self { rule: self.rule.closer(places, self.radius + 2.0 * self.rule.outer_reserve(), share), ..self.clone() }
     }
 
     /// The same where sheets along the sites do not serve.
@@ -393,7 +409,14 @@ impl<'a> Plan<'a> {
         let space = self.space(&setting);
         let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
         let leaves = arrangement.as_ref().map(Arrangement::leaves).filter(|&leaves| leaves <= FEW_LEAVES);
+        let cells = arrangement.as_ref().map_or(0, Arrangement::leaves);
         let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
+        if let Some(OfSites { doubts: Some(doubts), .. }) = &made
+            && let Some(closer) = self.run_closer(doubts, cells, &setting, &space, budget)?
+        {
+            return Ok(closer);
+        }
+        let made = made.map(|made| made.dilation);
         let stands_for_another = !setting.dense && self.meant.off.is_finite() && (self.meant.off > 0.0 || !self.rule.is_exact());
         if let Some(leaves) = leaves
             && stands_for_another
@@ -404,6 +427,33 @@ impl<'a> Plan<'a> {
         }
         let made = if made.is_some() { made } else { instead()? };
         made.map_or_else(|| self.on_lattice(&setting, &space, budget), Ok)
+    }
+
+    /// The same by so many cells, with sites that become nearer to what they stand for where the topology is in doubt; none where that does not tell it.
+    fn run_closer(
+        &self,
+        doubts: &[Point],
+        cells: u64,
+        setting: &Setting,
+        space: &Space,
+        budget: &Budget,
+    ) -> Result<Option<Dilation>, DilationError> {
+        let limits = Limits { cells: budget.limits.cells.min(CLOSER_CELLS * cells), ..budget.limits };
+        let aside = Budget { limits, ..budget.aside() };
+        let (mut closer, mut share, mut doubts) = (self.clone(), 1.0, Cow::Borrowed(doubts));
+        for _ in 0..CLOSER_ROUNDS {
+            share *= CLOSER;
+            closer = closer.closer(&doubts, share);
+            let Some(mut arrangement) = Arrangement::new(setting, &closer.rule, &space.candidates, &aside)? else { break };
+            // Asked first: all else takes longer.
+            if arrangement.is_of_another(&closer.rule, closer.flow(setting, space).as_ref(), &aside)? {
+                let made = unless_stopped(closer.of_arrangement(Some(arrangement), setting, space, &aside))?;
+                return Ok(made.map(|made| made.dilation).filter(|made| made.topology_exact));
+            }
+            let Some(left) = arrangement.take_doubts() else { break };
+            doubts = Cow::Owned(left);
+        }
+        Ok(None)
     }
 
     /// The same on a lattice.
@@ -419,12 +469,12 @@ impl<'a> Plan<'a> {
         let mut arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
         // Asked first: all else takes longer.
         if let Some(arrangement) = &mut arrangement
-            && !arrangement.is_of_another(&self.rule, budget)?
+            && !arrangement.is_of_another(&self.rule, self.flow(&setting, &space).as_ref(), budget)?
         {
             return Ok(None);
         }
         let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
-        Ok(made.filter(|made| made.topology_exact))
+        Ok(made.map(|made| made.dilation).filter(|made| made.topology_exact))
     }
 
     /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, or by what needs none, where that serves better than a lattice and comes out.
@@ -432,7 +482,7 @@ impl<'a> Plan<'a> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
         let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
-        self.of_arrangement(arrangement, &setting, &space, budget)
+        Ok(self.of_arrangement(arrangement, &setting, &space, budget)?.map(|made| made.dilation))
     }
 
     /// The dilation of a surface that turns little by a sheet on each side, or of a solid by one outside; none where that does not come out.
@@ -440,7 +490,7 @@ impl<'a> Plan<'a> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
         let arrangement = Arrangement::of_sheets(&setting, &self.rule, &space.candidates, budget)?;
-        self.of_arrangement(arrangement, &setting, &space, budget)
+        Ok(self.of_arrangement(arrangement, &setting, &space, budget)?.map(|made| made.dilation))
     }
 
     /// The dilation of a graph over a convex part of a plane, by rays that stand for it; none where that does not come out.
@@ -519,12 +569,14 @@ impl<'a> Plan<'a> {
         let mended = self.mended(setting, space, surface, uncertain as u64, budget)?;
         let is_shape = self.meant.off == 0.0 && site_error.is_zero();
         let may_be_exact = !setting.dense && mended.uncertain == 0 && mended.crossings == 0;
-        let is_exact = may_be_exact && (is_shape || arrangement::is_of_sites(setting, &self.rule, &space.candidates, budget)?);
+        let flow = self.flow(setting, space);
+        let is_of_sites = || arrangement::is_of_sites(setting, &self.rule, &space.candidates, flow.as_ref(), budget);
+        let is_exact = may_be_exact && (is_shape || is_of_sites()?);
         let is_clear = mended.uncertain == 0 && mended.crossings == 0;
         let mut made = self.certify(setting, mended, is_exact, Some(setting.lattice.pitch), budget)?;
         if is_clear
             && !is_exact
-            && let Some(flow) = self.flow(setting, space)
+            && let Some(flow) = flow
         {
             // Of points whose dilation is clear it is exact: they are not asked in turn.
             let told = told::is_told(&flow, made.solid.topology(), budget)?;
@@ -557,7 +609,7 @@ impl<'a> Plan<'a> {
         setting: &Setting,
         space: &Space,
         budget: &Budget,
-    ) -> Result<Option<Dilation>, DilationError> {
+    ) -> Result<Option<OfSites>, DilationError> {
         let Some(mut arrangement) = arrangement else { return Ok(None) };
         let allowed = budget.limits.triangles;
         let too_many = || DilationError::Triangles { tolerance_mm: self.aimed, allowed };
@@ -572,13 +624,17 @@ impl<'a> Plan<'a> {
         if surface.triangles.len() as u64 > allowed {
             return Err(too_many());
         }
+        let flow = self.flow(setting, space);
         let is_exact = uncertain == 0
             && if setting.dense {
-                let flow = self.flow(setting, space).zip(arrangement.points());
-                flow.map(|(flow, points)| flow.is_that_of(&in_plane(points, setting), budget)).transpose()?.unwrap_or_default()
+                flow.zip(arrangement.points())
+                    .map(|(flow, points)| flow.is_that_of(&Figure::of_points(&in_plane(points, setting)), budget))
+                    .transpose()?
+                    .unwrap_or_default()
             } else {
-                arrangement.is_of_another(&self.rule, budget)?
+                arrangement.is_of_another(&self.rule, flow.as_ref(), budget)?
             };
+        let doubts = arrangement.take_doubts();
         let (index, narrower, copies) = arrangement.into_index();
         self.prove(setting, surface.site_error, surface.triangles.len() as u64, budget);
         if is_done {
@@ -586,7 +642,9 @@ impl<'a> Plan<'a> {
                 return Err(too_many());
             }
             copies.put(&mut surface);
-            return self.certify(setting, Mended { surface, uncertain, crossings: 0 }, is_exact, None, budget).map(Some);
+            return self
+                .certify(setting, Mended { surface, uncertain, crossings: 0 }, is_exact, None, budget)
+                .map(|dilation| Some(OfSites { dilation, doubts }));
         }
         copies.round(&mut surface);
         let bounds = self.bounds.grown(2.0 * self.radius);
@@ -597,18 +655,19 @@ impl<'a> Plan<'a> {
             return Err(too_many());
         }
         let mended = self.put(setting, space, surface, &copies, uncertain, budget)?;
-        self.certify(setting, mended, is_exact, None, budget).map(Some)
+        self.certify(setting, mended, is_exact, None, budget).map(|dilation| Some(OfSites { dilation, doubts }))
     }
 
-    /// The dilation of what is meant, for what tells its topology; none where it has several radii, or what solids enclose, or is that of another shape.
+    /// The dilation of what is meant, for what tells its topology; none where it has several radii, or what solids enclose, or its cells do not tell where it is.
     fn flow<'b>(&'b self, setting: &Setting, space: &'b Space) -> Option<Flow<'b>> {
-        let attractor = self.rule.attractor();
-        let is_plain = attractor.solids().is_empty() && (0..attractor.roots().len() as u32).all(|root| self.rule.deficit(root) == 0.0);
+        let own = self.rule.attractor();
+        let is_another = self.meant.off > 0.0;
+        let (attractor, candidates) = if is_another { (self.meant.shape?, &space.meant) } else { (own, &space.candidates) };
+        let is_plain = own.solids().is_empty() && (0..own.roots().len() as u32).all(|root| self.rule.deficit(root) == 0.0);
         let (plane, width) =
-            if arrangement::is_thin(setting) { (Some((setting.thin, setting.middle)), setting.width) } else { (None, 0.0) };
+            if arrangement::is_thin(setting) && !is_another { (Some((setting.thin, setting.middle)), setting.width) } else { (None, 0.0) };
         let Setting { reach, slack, .. } = *setting;
-        let flow = Flow { attractor, candidates: &space.candidates, radius: reach, slack: slack + width, plane };
-        (is_plain && self.meant.off == 0.0).then_some(flow)
+        is_plain.then_some(Flow { attractor, candidates, radius: reach, slack: slack + width, plane })
     }
 
     /// A surface that was mended, with parts that are like others where they are.
@@ -710,7 +769,8 @@ impl<'a> Plan<'a> {
             }
             candidates.push(cell, &root.points, leaf);
         }
-        Space { blocks: blocks.next_power_of_two() as i64, candidates }
+        let meant = self.meant.shape.map(Candidates::of_roots).unwrap_or_default();
+        Space { blocks: blocks.next_power_of_two() as i64, candidates, meant }
     }
 
     /// The bounds of a surface between the ends of the band, as those of a lattice and of what is simplified are: inner and outer, in mm.
@@ -778,6 +838,13 @@ fn in_plane(mut points: Vec<Point>, setting: &Setting) -> Vec<Point> {
     points
 }
 
+/// What comes of an arrangement.
+struct OfSites {
+    dilation: Dilation,
+    /// Places where its topology is in doubt, if there are few, and only as its sites stand for what is meant.
+    doubts: Option<Vec<Point>>,
+}
+
 /// What comes of rays: the surface, columns that were looked at, and bytes that were held at most.
 struct Over {
     setting: Setting,
@@ -818,158 +885,4 @@ fn add(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::{Interior, Model, PolygonMesh, Shape};
-    use crate::tolerance::Radius;
-
-    /// Two rods side by side, 3 mm apart, and a rod by itself.
-    fn rods() -> Attractor {
-        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
-        let vertices =
-            vec![at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(0.0, 3.0, 0.0), at(20.0, 3.0, 0.0), at(0.0, 40.0, 0.0), at(20.0, 40.0, 0.0)];
-        let shape = Shape::Mesh(PolygonMesh { vertices, faces: vec![vec![0, 1], vec![2, 3], vec![4, 5]], interior: Interior::Surface });
-        Model { name: None, shape }.lower().unwrap().attractor
-    }
-
-    /// What is left of a surface with a tetrahedron of the given size at a place, besides a larger one, and how many shells went in doubt.
-    fn without_dust(at: Point, size: f64) -> (usize, usize) {
-        let (surface, doubtful) = dusted(at, size, false, [0, 1, 2]);
-        (surface.triangles.len(), doubtful)
-    }
-
-    /// The same with the tetrahedron's corners in some order, and whether the topology was proven.
-    fn dusted(at: Point, size: f64, is_proven: bool, order: [usize; 3]) -> (BlockSurface, usize) {
-        let (attractor, budget) = (rods(), Budget::default());
-        let balls = Balls { least: Radius::new(1.4).unwrap().mm(), most: 1.4 };
-        let plan = Plan::new(&attractor, balls, Tolerance::new(0.14).unwrap(), true, 1.0, &budget).unwrap();
-        let setting = plan.setting(plan.pitch, &budget);
-        let tetrahedron = |first: Point, size: f64| -> [Point; 4] {
-            let corner = |axis: usize| std::array::from_fn(|other| first[other] + if other == axis { size } else { 0.0 });
-            [first, corner(0), corner(1), corner(2)].map(|x: Point| x.map(|x| f64::from(x as f32)))
-        };
-        // Counter-clockwise seen from within: a void, unless it has no volume.
-        let faces = |first: u32| [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]].map(|face: [u32; 3]| face.map(|corner| first + corner));
-        let mut surface = BlockSurface {
-            vertices: tetrahedron([5.0, -10.0, 0.0], 8.0).into_iter().chain(tetrahedron(at, size)).collect(),
-            triangles: faces(0).into_iter().chain(faces(4).map(|face| order.map(|corner| face[corner]))).collect(),
-            ..BlockSurface::default()
-        };
-        let doubtful = dust::remove(&setting, &plan.rule, &plan.space(&setting).candidates, is_proven, &mut surface);
-        (surface, doubtful)
-    }
-
-    /// A part of a pot, and the ends of its box: its dilation's surface passes a vertex of the lattice within rounding, where all of some twenty triangles are no more than that.
-    #[test]
-    fn what_passes_a_vertex_within_rounding_crosses_nothing() {
-        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 100.0;
-        let vertices = vec![
-            at(-1.972_710_538_648_750_7, -0.101_647_686_003_419_3, 1.160_540_771_484_375_2),
-            at(-1.966_728_210_449_218_8, 0.0, 1.205_294_036_865_234_3),
-            at(-1.965_082_609_819_543_7, -0.201_960_983_382_444_7, 1.160_540_771_484_375),
-            at(-1.964_169_115_905_860_3, -0.101_207_572_849_470_99, 1.205_294_036_865_234_3),
-            at(-1.957_031_25, 0.0, 1.250_390_625),
-            at(-1.956_574_214_408_087_5, -0.201_086_534_698_123_51, 1.205_294_036_865_234_3),
-            at(-1.954_484_773_081_406_1, -0.100_708_568_550_926_55, 1.250_390_625),
-            at(-1.946_927_318_272_528_9, -0.200_095_076_822_308_12, 1.250_390_625),
-            at(-1.946_235_656_738_281_2, 0.0, 1.295_816_802_978_515_8),
-            at(-1.943_703_226_978_649_6, -0.100_153_028_753_569_85, 1.295_816_802_978_515_8),
-            at(-3.050_000_000_000_000_3, -2.0, 0.0),
-            at(3.172, 2.0, 3.15),
-        ];
-        let triangles = [[9, 5, 7], [9, 7, 10], [10, 7, 8], [5, 2, 4], [5, 4, 7], [7, 4, 6], [7, 6, 8], [2, 1, 4], [4, 1, 3], [4, 3, 6]];
-        let faces = triangles.iter().map(|face| face.iter().map(|corner| corner - 1).collect()).chain([vec![10], vec![11]]).collect();
-        let attractor = Model { name: None, shape: Shape::Mesh(PolygonMesh { vertices, faces, interior: Interior::Surface }) }
-            .lower()
-            .unwrap()
-            .attractor;
-        let (radius, budget) = (Radius::new(4.823).unwrap().mm(), Budget::default());
-        let plan =
-            Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.4823).unwrap(), true, 1.0, &budget).unwrap();
-        let setting = plan.setting(plan.pitch, &budget);
-        let made = plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap();
-        assert_eq!((made.crossings, made.uncertain, made.solid.topology().components), (0, 0, 3));
-    }
-
-    /// Two plates of 12 x 4 mm in several blocks of a lattice, about two radii apart: all between them is critical, and decided by levels of cubes where it can be.
-    #[test]
-    fn plates_about_two_radii_apart_are_one_or_two_or_in_doubt() {
-        let made = |gap: f64| {
-            let plate = |z: f64| [[0.0, 0.0], [12.0, 0.0], [12.0, 4.0], [0.0, 4.0]].map(|[x, y]| DVec3::new(x, y, z + 0.01 * x));
-            let shape = Shape::Mesh(PolygonMesh {
-                vertices: [plate(0.0), plate(gap)].concat(),
-                faces: vec![vec![0, 1, 2], vec![0, 2, 3], vec![4, 5, 6], vec![4, 6, 7]],
-                interior: Interior::Surface,
-            });
-            let attractor = Model { name: None, shape }.lower().unwrap().attractor;
-            let (radius, budget) = (Radius::new(1.0).unwrap().mm(), Budget::default());
-            let plan =
-                Plan::new(&attractor, Balls { least: radius, most: radius }, Tolerance::new(0.1).unwrap(), true, 1.0, &budget).unwrap();
-            let setting = plan.setting(plan.pitch, &budget);
-            let made = plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap();
-            (made.uncertain > 0, made.topology_exact, made.solid.topology().components)
-        };
-        // The plates are tilted: their distance is gap / sqrt(1 + 0.01^2).
-        let radii = |share: f64| 2.0 * share * (1.0 + 1e-4_f64).sqrt();
-        assert_eq!(made(radii(0.99)), (false, true, 1));
-        assert_eq!(made(radii(1.01)), (false, true, 2));
-        let (in_doubt, is_exact, _) = made(radii(1.0));
-        assert!(in_doubt && !is_exact);
-    }
-
-    /// Two rods that are alike, and what is made of one of them in coordinates that are not congruent elsewhere: both are looked at where they are.
-    #[test]
-    fn what_is_not_congruent_is_mended_where_it_is() {
-        let at = |x: f64, y: f64| DVec3::new(x, y, 0.1);
-        let vertices = vec![at(0.3, 0.0), at(20.3, 0.0), at(0.3, 40.0), at(20.3, 40.0)];
-        let shape = Shape::Mesh(PolygonMesh { vertices, faces: vec![vec![0, 1], vec![2, 3]], interior: Interior::Surface });
-        let attractor = Model { name: None, shape }.lower().unwrap().attractor;
-        let budget = Budget::default();
-        let plan = Plan::new(&attractor, Balls { least: 1.0, most: 1.0 }, Tolerance::new(0.1).unwrap(), true, 1.0, &budget).unwrap();
-        let setting = plan.setting(plan.pitch, &budget);
-        let space = plan.space(&setting);
-        let mut arrangement = Arrangement::new(&setting, &plan.rule, &space.candidates, &budget).unwrap().unwrap();
-        let surface = arrangement.run(&budget).unwrap().unwrap().surface;
-        let (_, _, copies) = arrangement.into_index();
-        for is_congruent in [true, false] {
-            let mut surface = surface.alone();
-            copies.round(&mut surface);
-            if !is_congruent {
-                surface.vertices.iter_mut().for_each(|vertex| vertex[1] = f64::from((vertex[1] + 1e-7 * vertex[0]) as f32));
-            }
-            let triangles = surface.triangles.len();
-            assert_eq!(copies.are_whole(&surface), is_congruent);
-            let mended = plan.put(&setting, &space, surface, &copies, 0, &budget).unwrap();
-            assert_eq!((mended.surface.triangles.len(), mended.uncertain, mended.crossings), (2 * triangles, 0, 0));
-            assert_eq!(plan.certify(&setting, mended, true, None, &budget).unwrap().solid.topology().components, 2);
-        }
-    }
-
-    #[test]
-    fn shells_no_larger_than_rounding_go_and_may_be_in_doubt() {
-        // Beyond one rod: nothing there could be a void.
-        assert_eq!(without_dust([10.0, 41.400_001, 0.0], 0.0), (4, 0));
-        assert_eq!(without_dust([10.0, 41.400_001, 0.0], 4e-6), (4, 0));
-        // Between two, as far from both: it may have been one.
-        assert_eq!(without_dust([10.0, 1.5, 0.0], 0.0), (4, 1));
-        // A void that can be seen there stays.
-        assert_eq!(without_dust([10.0, 1.5, 0.0], 0.02), (8, 0));
-    }
-
-    #[test]
-    fn proven_voids_stay_and_are_turned_back() {
-        // In what one rod covers: no void of the dilation, unless it is what simplification left of one.
-        let at = [10.0, 0.8, 0.0];
-        assert_eq!(without_dust(at, 0.02), (4, 0));
-        let (void, doubtful) = dusted(at, 0.02, true, [0, 1, 2]);
-        assert_eq!((void.triangles.len(), doubtful), (8, 0));
-        let (turned, doubtful) = dusted(at, 0.02, true, [0, 2, 1]);
-        assert_eq!(doubtful, 0);
-        let directed = |surface: &BlockSurface| -> BTreeSet<[u32; 2]> {
-            surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect()
-        };
-        assert_eq!(directed(&void), directed(&turned));
-        // A piece too narrow for one without the proof.
-        assert_eq!(dusted(at, 0.02, false, [0, 2, 1]).0.triangles.len(), 4);
-    }
-}
+mod tests;

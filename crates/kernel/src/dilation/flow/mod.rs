@@ -1,21 +1,28 @@
-//! Points K whose dilation has the topology of an attractor's, A, which is shown by directions along which both are left.
+//! Points, segments and other figures K whose dilation has the topology of an attractor's, A, which is shown by directions along which both are left.
 //!
 //! Let f be the distance from A, g that from K, and Q the places x with min(f, g) <= r <= max(f, g). Let each of them have a direction w with w . (x - c) > 0 for all places c of A and of K that are closest to x. Closest places depend on x upper semicontinuously: so that holds around all these x, for a smooth field of directions.
 //! Along it f and g rise, faster than some rate as Q is compact, and against it they fall: what is in one of both dilations goes, within Q, to where it is in both, and what was in both stays. Each is retracted to their intersection, and their complements to that of their union: both have the same components, handles and voids.
 //!
-//! That is asked cube by cube. Let y be a cube's middle and h half its diagonal, and let A be the union of cells in balls around c_i of radii p_i; with t_i = |y - c_i| and u_i = (y - c_i) / t_i. For all x of the cube |x - c_i| is no less than t_i + u_i . (x - y), and no more than that and h^2 / 2 (t_i - h).
+//! That is asked cube by cube. Let y be a cube's middle and h half its diagonal, and let A be the union of cells, some in balls around c_i of radii p_i; with t_i = |y - c_i| and u_i = (y - c_i) / t_i. For all x of the cube |x - c_i| is no less than t_i + u_i . (x - y), and no more than that and h^2 / 2 (t_i - h).
 //! So cell i has no place that is closest to any x of it if, for some k, t_i - t_k exceeds p_i + p_k + h^2 / 2 (t_k - h) and what (u_k - u_i) . (x - y) may be; and likewise for K, whose balls have no radius. For the others one w must have w . (y - c_i) larger than p_i and what w . (y - x) may be.
+//! Of a convex figure of K, c_i is the place that is closest to y: its distance is convex, so both bounds hold for it, too; and the way from the closest place turns by no more than x moves, |x - c(x) - (y - c(y))| <= |x - y|, so that w . (y - c_i) must be larger than h.
+//!
+//! Other cells, smooth ones, are looked at as figures that stand for them, no place of either farther than p_i from one of the other: p_i is far less than a ball's radius is then. Let d be how far x is from a figure, q its closest place, and c the cell's, closest to x of all A: so |x - c| <= d + p_i, and c is within p_i of a place c' of one
+//! of its figures, no farther than d + 2 p_i from x. As the figure is convex |c' - q|^2 <= (d + 2 p_i)^2 - d^2 = 4 p_i (d + p_i). So w . (y - c_i) must be larger than h + p_i + 2 sqrt(p_i (d + p_i)), with d no more than t_i + h; or w serves the ball around the cell.
+//!
 //! Where there is none its cells are replaced by smaller ones, and the cube is halved: cells that are deep inside, or farther than others, never are.
 //!
-//! K may be any points. It serves if it has places of A that are closest to some around which A is about as far as the radius, and covers what is deeper.
+//! K may be any figures. It serves if it has places of A that are closest to some around which A is about as far as the radius, and covers what is deeper.
 //!
 //! Where all of A and K is within w of a plane, straight up leads away from all of it at places that are higher than it. The others are within w of a place of the plane, and so are as far from all places but for w: only squares in the plane are looked at.
 
-use super::arrangement::Cube;
+use super::arrangement::{Cube, Figure};
+use super::convex::Convex;
 use super::surface::NameHasher;
-use super::tree::Candidates;
+use super::tree::{Candidates, Weighted};
 use crate::attractor::Attractor;
 use crate::attractor::cell::{Ball, Cell, ControlPoint, Point, distance_squared, dot, subtract};
+use crate::automaton::LeafPrimitive;
 use crate::budget::{Budget, Stopped};
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -23,15 +30,25 @@ use std::hash::BuildHasherDefault;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Halves of the sides of cubes that are looked at one by one, in units of the radius; and of the diagonals of those in which directions are looked for, and of those that are halved no more.
+/// Halves of the sides of cubes that are looked at one by one, in units of the radius; of the diagonals of those in which directions are looked for; of those that are halved no more where one doubt is enough, and where all are wanted.
 const LARGE: f64 = 2.0;
 const WIDEST: f64 = 0.6;
-const NARROWEST: f64 = 1.0 / 256.0;
+const NARROWEST: [f64; 2] = [1.0 / 256.0, 1.0 / 32_768.0];
+/// How near figures are to what they stand for where directions are looked for, in units of half the diagonal squared over the radius; in cubes as narrow as this only where there is none else.
+const NEARER: f64 = 1.0 / 16.0;
+const NARROW: f64 = 1.0 / 16.0;
+/// Places are not asked for that are no farther than this, in units of the radius, from one in doubt.
+const AROUND: f64 = 0.25;
 /// Radii of cells at most, in units of half a cube's diagonal.
 const REFINED: f64 = 1.6;
+/// How far what is drawn for a cell is off it at most, as a share of its ball's radius, to be looked at instead.
+const DRAWN: f64 = 0.25;
 /// Looks at cells at most to find points, and at both to compare them: shapes with more of a surface take longer than all else.
 const MOST_TO_FIND: usize = 30_000_000;
 const MOST_LOOKS: usize = 150_000_000;
+/// The same to compare them with figures that nearly are the attractor: in any case, and for each figure.
+const FEW_LOOKS: usize = 30_000_000;
+const LOOKS: usize = 5_000;
 /// Bytes of the memory that there may be for each cell that one large cube holds: many cubes are looked at at once.
 const BYTES_PER_CELL: u64 = 4_000;
 /// Looks between which it is asked whether to go on.
@@ -60,9 +77,11 @@ pub(super) struct Flow<'a> {
 struct Search<'a> {
     flow: &'a Flow<'a>,
     /// K.
-    points: &'a [Point],
-    /// Looks that are left.
+    others: &'a [Figure],
+    /// Looks that are left, and places in doubt that there may be still.
     left: AtomicUsize,
+    doubts_left: AtomicUsize,
+    narrowest: f64,
     /// Cells that one large cube may hold.
     room: usize,
     budget: &'a Budget,
@@ -77,31 +96,37 @@ struct Nodes {
     starts: Vec<usize>,
     /// Which cells one is the union of, once that was asked for.
     children: Vec<Option<Range<u32>>>,
+    /// What stands for each one, where that is far nearer to it than its ball is small: where it begins and ends in `figures`, and how far places of either are off the other.
+    drawn: Vec<Option<(Range<u32>, f64)>>,
+    figures: Vec<Figure>,
 }
 
-/// A cell, or a point, seen from the middle of a cube.
+/// A cell, or a figure of K, seen from the middle of a cube.
 #[derive(Clone, Copy, Debug)]
 struct View {
     index: u32,
     distance: f64,
-    /// Of the ball, and what distances are off.
+    /// Of the ball, or how far the figure is off, and what distances are.
     radius: f64,
     away: Point,
+    /// Around the cell; of no use for figures of K.
     ball: Ball,
+    /// How far a figure is off what it stands for; none of a ball.
+    off: Option<f64>,
 }
 
-/// Cells and points that may matter in a cube, with their numbers.
+/// Cells, with their balls, and figures of K that may matter in a cube, by their numbers.
 #[derive(Clone, Debug, Default)]
 struct Lists {
     cells: Vec<(u32, Ball)>,
-    points: Vec<(u32, Ball)>,
+    others: Vec<u32>,
 }
 
 /// Where those of one cube are in lists.
 #[derive(Clone, Debug)]
 struct Ranges {
     cells: Range<usize>,
-    points: Range<usize>,
+    others: Range<usize>,
 }
 
 /// Working memory: the lists of a cube are behind those of the ones around it.
@@ -111,18 +136,47 @@ struct Work {
     lists: Lists,
     /// What may be closest to places of a cube.
     cells: Vec<View>,
-    points: Vec<View>,
+    others: Vec<View>,
     open: Vec<(u32, Ball)>,
     small: Vec<(u32, Ball)>,
+    /// Places that have no direction.
+    doubts: Vec<Point>,
 }
 
 impl Nodes {
-    fn push(&mut self, cell: Cell, points: &[ControlPoint]) -> u32 {
+    fn push(&mut self, attractor: &Attractor, cell: Cell, points: &[ControlPoint]) -> u32 {
         self.starts.push(self.points.len());
         self.points.extend_from_slice(points);
         self.cells.push(cell);
         self.children.push(None);
+        let drawn = self.draw(attractor, &cell, points);
+        self.drawn.push(drawn);
         self.cells.len() as u32 - 1
+    }
+
+    /// Adds the figures that stand for a cell, where they serve better than its ball.
+    fn draw(&mut self, attractor: &Attractor, cell: &Cell, points: &[ControlPoint]) -> Option<(Range<u32>, f64)> {
+        // Of rough cells the ball serves as well.
+        let is_smooth =
+            matches!(attractor.state_of(cell).leaf, LeafPrimitive::Simplex | LeafPrimitive::Chord(_) | LeafPrimitive::Polygon(_));
+        let off = if is_smooth { attractor.leaf_error(cell, points) } else { f64::INFINITY };
+        let is_near = off.is_finite() && off <= DRAWN * cell.ball.radius;
+        if !is_near {
+            return None;
+        }
+        let first = self.figures.len() as u32;
+        attractor.emit(cell, points, &mut |site| self.figures.push(Weighted { site, deficit: 0.0 }.into()));
+        let last = self.figures.len() as u32;
+        (first < last).then_some((first..last, off))
+    }
+
+    /// Looks at a cell: at its ball, or at its figures.
+    #[inline]
+    fn show(&self, &(index, ball): &(u32, Ball), look: &mut Look<'_>) {
+        let Some((figures, off)) = &self.drawn[index as usize] else { return look.see(index, &ball.centre, ball.radius, ball, None) };
+        for figure in &self.figures[figures.start as usize..figures.end as usize] {
+            look.see(index, &figure.closest(&look.cube.centre), *off, ball, Some(*off));
+        }
     }
 
     fn ball(&self, index: u32) -> Ball {
@@ -142,7 +196,7 @@ impl Nodes {
         let first = self.cells.len() as u32;
         let made: Vec<_> = attractor.children(&self.cells[index as usize], self.points_of(attractor, index)).collect();
         made.iter().for_each(|(cell, points)| {
-            self.push(*cell, points);
+            self.push(attractor, *cell, points);
         });
         let children = first..self.cells.len() as u32;
         self.children[index as usize] = Some(children.clone());
@@ -166,20 +220,32 @@ impl Nodes {
     }
 }
 
+impl View {
+    /// Where it is closest.
+    fn place(&self, from: &Point) -> Point {
+        std::array::from_fn(|axis| from[axis] - self.distance * self.away[axis])
+    }
+}
+
 impl Work {
     /// Puts what is seen behind all lists.
     fn list(&mut self) -> Ranges {
-        let Self { lists, cells, points, .. } = self;
-        let first = [lists.cells.len(), lists.points.len()];
-        lists.cells.extend(cells.iter().map(|view| (view.index, view.ball)));
-        lists.points.extend(points.iter().map(|view| (view.index, view.ball)));
-        Ranges { cells: first[0]..lists.cells.len(), points: first[1]..lists.points.len() }
+        let Self { lists, cells, others, .. } = self;
+        let first = [lists.cells.len(), lists.others.len()];
+        for view in cells.iter() {
+            // Figures of one cell are one after the other.
+            if lists.cells[first[0]..].last().is_none_or(|&(last, _)| last != view.index) {
+                lists.cells.push((view.index, view.ball));
+            }
+        }
+        lists.others.extend(others.iter().map(|view| view.index));
+        Ranges { cells: first[0]..lists.cells.len(), others: first[1]..lists.others.len() }
     }
 
     /// Drops all lists from some on.
     fn drop_from(&mut self, ranges: &Ranges) {
         self.lists.cells.truncate(ranges.cells.start);
-        self.lists.points.truncate(ranges.points.start);
+        self.lists.others.truncate(ranges.others.start);
     }
 }
 
@@ -204,23 +270,49 @@ impl Flow<'_> {
         Ok((!points.is_empty() && points.len() <= most).then_some(points))
     }
 
-    /// Whether the dilation of points has the same topology. False where that is not shown, or takes too long.
+    /// Whether the dilation of figures without deficits has the same topology. False where that is not shown, or takes too long.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn is_that_of(&self, points: &[Point], budget: &Budget) -> Result<bool, Stopped> {
-        let is_in_place = |point: &Point| self.plane.is_none_or(|(axis, at)| (point[axis] - at).abs() <= self.slack);
-        if points.is_empty() || !points.iter().all(is_in_place) {
-            return Ok(false);
-        }
-        let search = self.search(points, MOST_LOOKS, budget);
-        let holds = search.everywhere(|work, cube, ranges| search.holds(work, cube, ranges))?;
-        // What uses up all looks at last has none left for others.
-        Ok(holds.into_iter().all(|holds| holds) && search.has_looks())
+    pub(super) fn is_that_of(&self, figures: &[Figure], budget: &Budget) -> Result<bool, Stopped> {
+        Ok(self.doubts(figures, 0, budget)?.is_some_and(|doubts| doubts.is_empty()))
     }
 
-    fn search<'a>(&'a self, points: &'a [Point], looks: usize, budget: &'a Budget) -> Search<'a> {
-        Search { flow: self, points, left: AtomicUsize::new(looks), room: (budget.limits.memory_bytes / BYTES_PER_CELL) as usize, budget }
+    /// Places around which it is not shown that the dilation of figures without deficits has the same topology: of those that are near to each other one. None where these are more than `most`, or nothing was shown.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn doubts(&self, figures: &[Figure], most: usize, budget: &Budget) -> Result<Option<Vec<Point>>, Stopped> {
+        let is_in_place = |point: &Point| self.plane.is_none_or(|(axis, at)| (point[axis] - at).abs() <= self.slack);
+        let serves = |figure: &Figure| figure.deficit() == 0.0 && figure.corners().iter().all(is_in_place);
+        if figures.is_empty() || !figures.iter().all(serves) {
+            return Ok(None);
+        }
+        let looks = if most > 0 { MOST_LOOKS.min(FEW_LOOKS + LOOKS * figures.len()) } else { MOST_LOOKS };
+        let search = Search {
+            doubts_left: AtomicUsize::new(most),
+            narrowest: NARROWEST[usize::from(most > 0)],
+            ..self.search(figures, looks, budget)
+        };
+        let doubts = search.everywhere(|work, cube, ranges| {
+            let is_done = search.holds(work, cube, ranges)?;
+            Ok(is_done.then(|| std::mem::take(&mut work.doubts)))
+        })?;
+        // What uses up all looks at last has none left for others.
+        let doubts: Option<Vec<Vec<Point>>> = doubts.into_iter().collect::<Option<_>>().filter(|_| search.has_looks());
+        Ok(doubts.map(|doubts| doubts.concat()))
+    }
+
+    fn search<'a>(&'a self, others: &'a [Figure], looks: usize, budget: &'a Budget) -> Search<'a> {
+        Search {
+            flow: self,
+            others,
+            left: AtomicUsize::new(looks),
+            doubts_left: AtomicUsize::new(0),
+            narrowest: NARROWEST[0],
+            room: (budget.limits.memory_bytes / BYTES_PER_CELL) as usize,
+            budget,
+        }
     }
 
     /// The parts of a cube in which there may be places in question: of a square in the plane four.
@@ -244,25 +336,45 @@ impl Flow<'_> {
         let across = self.plane.map_or(0.0, |(axis, _)| cube.half * direction[axis].abs());
         cube.half_along(direction) - across
     }
+}
 
-    /// Looks for those balls that may hold the closest place of any place of a cube; returns bounds of the distance from what is in all of them.
-    fn look<'b>(&self, cube: &Cube, balls: impl Iterator<Item = &'b (u32, Ball)>, views: &mut Vec<View>) -> [f64; 2] {
+/// A look for what may hold the closest place of any place of a cube.
+struct Look<'a> {
+    flow: &'a Flow<'a>,
+    cube: &'a Cube,
+    half: f64,
+    /// The least of the longest ways from the middle to one of all, and which one it is.
+    high: f64,
+    nearest: Option<View>,
+    views: &'a mut Vec<View>,
+}
+
+impl<'a> Look<'a> {
+    fn new(flow: &'a Flow<'a>, cube: &'a Cube, views: &'a mut Vec<View>) -> Self {
         views.clear();
-        let half = self.half(cube);
-        let (mut nearest, mut high): (Option<View>, f64) = (None, f64::INFINITY);
-        for &(index, ball) in balls {
-            let (way, radius) = (subtract(&cube.centre, &ball.centre), ball.radius + self.slack);
-            let square = dot(&way, &way);
-            if square > (high + 2.0 * half + radius).powi(2) {
-                continue;
-            }
-            let distance = square.sqrt();
-            let view = View { index, distance, radius, away: way.map(|part| if distance > 0.0 { part / distance } else { 0.0 }), ball };
-            if distance + radius < high {
-                (nearest, high) = (Some(view), distance + radius);
-            }
-            views.push(view);
+        Self { flow, cube, half: flow.half(cube), high: f64::INFINITY, nearest: None, views }
+    }
+
+    /// Looks at a ball, or at the closest place of a figure.
+    #[inline]
+    fn see(&mut self, index: u32, place: &Point, radius: f64, ball: Ball, off: Option<f64>) {
+        let (way, radius) = (subtract(&self.cube.centre, place), radius + self.flow.slack);
+        let square = dot(&way, &way);
+        if square > (self.high + 2.0 * self.half + radius).powi(2) {
+            return;
         }
+        let distance = square.sqrt();
+        let away = way.map(|part| if distance > 0.0 { part / distance } else { 0.0 });
+        let view = View { index, distance, radius, away, ball, off };
+        if distance + radius < self.high {
+            (self.nearest, self.high) = (Some(view), distance + radius);
+        }
+        self.views.push(view);
+    }
+
+    /// Drops what is nowhere closest; returns bounds of the distance from what is in all.
+    fn bounds(self) -> [f64; 2] {
+        let Self { flow, cube, half, high, nearest, views } = self;
         // Of what has no bounds nothing is known.
         if !views.iter().map(|view| view.distance + view.radius).sum::<f64>().is_finite() {
             return [f64::NEG_INFINITY, f64::INFINITY];
@@ -274,7 +386,7 @@ impl Flow<'_> {
         views.retain(|view| {
             let way = view.distance - view.radius - high;
             way <= bulge.min(2.0 * half)
-                || (way <= 2.0 * half && way - bulge <= self.half_along(cube, &subtract(&view.away, &nearest.away)))
+                || (way <= 2.0 * half && way - bulge <= flow.half_along(cube, &subtract(&view.away, &nearest.away)))
         });
         [low - half, high + half]
     }
@@ -293,27 +405,27 @@ impl Search<'_> {
         let Flow { attractor, candidates, .. } = self.flow;
         let mut first = Work::default();
         for candidate in &candidates.cells {
-            let cell = first.nodes.push(candidate.cell, candidates.points_of(attractor, candidate));
+            let cell = first.nodes.push(attractor, candidate.cell, candidates.points_of(attractor, candidate));
             first.lists.cells.push((cell, candidate.cell.ball));
         }
-        first.lists.points.extend((0..).zip(self.points.iter().map(|&centre| Ball { centre, radius: 0.0 })));
+        first.lists.others.extend(0..self.others.len() as u32);
         let mut cubes = Vec::new();
         let mut open = vec![(self.around(&first.nodes), std::mem::take(&mut first.lists))];
         while let Some((cube, lists)) = open.pop() {
             self.budget.cancel.check()?;
-            if !self.spend(lists.cells.len() + lists.points.len()) {
+            if !self.spend(lists.cells.len() + lists.others.len()) {
                 return Ok(Vec::new());
             }
-            let ranges = Ranges { cells: 0..lists.cells.len(), points: 0..lists.points.len() };
+            let ranges = Ranges { cells: 0..lists.cells.len(), others: 0..lists.others.len() };
             first.lists = lists;
-            let of_points = self.see_points(&mut first, &cube, &ranges);
+            let of_others = self.see_others(&mut first, &cube, &ranges);
             let [low, high] = self.see_cells(&mut first, &cube, &ranges);
-            if low.min(of_points[0]) > self.flow.radius {
+            if low.min(of_others[0]) > self.flow.radius {
                 continue;
             }
             let is_parted = cube.half > LARGE * self.flow.radius && high >= self.flow.radius;
             if is_parted {
-                self.refine(&mut first, &cube, 0.5 * REFINED * self.flow.half(&cube));
+                self.refine(&mut first, &cube, [0.5 * REFINED * self.flow.half(&cube); 2]);
             }
             first.lists = Lists::default();
             first.list();
@@ -328,11 +440,11 @@ impl Search<'_> {
         let of_cube = |(cube, lists): (Cube, Lists)| {
             let mut own = Work::default();
             for (cell, ball) in lists.cells {
-                let copied = own.nodes.push(nodes.cells[cell as usize], nodes.points_of(attractor, cell));
+                let copied = own.nodes.push(attractor, nodes.cells[cell as usize], nodes.points_of(attractor, cell));
                 own.lists.cells.push((copied, ball));
             }
-            own.lists.points = lists.points;
-            let ranges = Ranges { cells: 0..own.lists.cells.len(), points: 0..own.lists.points.len() };
+            own.lists.others = lists.others;
+            let ranges = Ranges { cells: 0..own.lists.cells.len(), others: 0..own.lists.others.len() };
             work(&mut own, &cube, &ranges)
         };
         cubes.into_par_iter().map(of_cube).collect()
@@ -341,10 +453,11 @@ impl Search<'_> {
     /// A cube around all places in question.
     fn around(&self, nodes: &Nodes) -> Cube {
         let [mut low, mut high] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        let of_points = self.points.iter().map(|&centre| Ball { centre, radius: 0.0 });
-        for ball in nodes.cells.iter().map(|cell| cell.ball).chain(of_points) {
-            low = std::array::from_fn(|axis| low[axis].min(ball.centre[axis] - ball.radius));
-            high = std::array::from_fn(|axis| high[axis].max(ball.centre[axis] + ball.radius));
+        let of_ball = |Ball { centre, radius }: Ball| [centre.map(|x| x - radius), centre.map(|x| x + radius)];
+        let of_cells = nodes.cells.iter().map(|cell| of_ball(cell.ball));
+        for [from, to] in of_cells.chain(self.others.iter().map(Figure::bounds)) {
+            low = std::array::from_fn(|axis| low[axis].min(from[axis]));
+            high = std::array::from_fn(|axis| high[axis].max(to[axis]));
         }
         let side = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         let mut centre: Point = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
@@ -374,25 +487,45 @@ impl Search<'_> {
 
     /// Sees the cells that may be closest to places of a cube; returns bounds of the distance from the attractor there.
     fn see_cells(&self, work: &mut Work, cube: &Cube, ranges: &Ranges) -> [f64; 2] {
-        self.flow.look(cube, work.lists.cells[ranges.cells.clone()].iter(), &mut work.cells)
+        let Work { nodes, lists, cells, .. } = work;
+        let mut look = Look::new(self.flow, cube, cells);
+        lists.cells[ranges.cells.clone()].iter().for_each(|cell| nodes.show(cell, &mut look));
+        look.bounds()
     }
 
-    /// The same for points.
-    fn see_points(&self, work: &mut Work, cube: &Cube, ranges: &Ranges) -> [f64; 2] {
-        self.flow.look(cube, work.lists.points[ranges.points.clone()].iter(), &mut work.points)
+    /// The same for K.
+    fn see_others(&self, work: &mut Work, cube: &Cube, ranges: &Ranges) -> [f64; 2] {
+        let mut look = Look::new(self.flow, cube, &mut work.others);
+        for &index in &work.lists.others[ranges.others.clone()] {
+            let figure = &self.others[index as usize];
+            let place = figure.closest(&cube.centre);
+            // What is more than a point has other places that are closest to others of the cube.
+            let off = (figure.corners().len() > 1).then_some(0.0);
+            look.see(index, &place, 0.0, Ball { centre: place, radius: f64::INFINITY }, off);
+        }
+        look.bounds()
     }
 
-    /// Sees cells with no larger radius than told in the place of larger ones; none where there are no such.
-    fn refine(&self, work: &mut Work, cube: &Cube, most: f64) -> Option<[f64; 2]> {
+    /// Sees smaller cells in the place of those with balls, or with figures that are off, by more than told; none where there are no such.
+    fn refine(&self, work: &mut Work, cube: &Cube, [of_ball, of_figure]: [f64; 2]) -> Option<[f64; 2]> {
         let Flow { attractor, slack, .. } = *self.flow;
         let half = self.flow.half(cube);
         let Work { nodes, cells, open, small, .. } = work;
-        if cells.iter().all(|view| view.radius - slack <= most) {
+        let is_small = |nodes: &Nodes, index: u32| match &nodes.drawn[index as usize] {
+            Some((_, off)) => *off <= of_figure,
+            None => nodes.ball(index).radius <= of_ball,
+        };
+        if nodes.cells.len() > self.room {
+            self.give_up();
+            return None;
+        }
+        if cells.iter().all(|view| is_small(nodes, view.index)) {
             return None;
         }
         let mut high = cells.iter().map(|view| view.distance + view.radius).fold(f64::INFINITY, f64::min);
         small.clear();
         open.extend(cells.iter().map(|view| (view.index, view.ball)));
+        open.dedup_by_key(|&mut (index, _)| index);
         let mut looks = 0;
         while let Some((cell, ball)) = open.pop() {
             looks += 1;
@@ -407,14 +540,16 @@ impl Search<'_> {
                 continue;
             }
             high = high.min(square.sqrt() + radius);
-            let children = if ball.radius > most { nodes.children(attractor, cell) } else { 0..0 };
+            let children = if is_small(nodes, cell) { 0..0 } else { nodes.children(attractor, cell) };
             if children.is_empty() {
                 small.push((cell, ball));
             }
             open.extend(children.map(|child| (child, nodes.ball(child))));
         }
         self.spend(looks % CHUNK);
-        Some(self.flow.look(cube, small.iter(), cells))
+        let mut look = Look::new(self.flow, cube, cells);
+        small.iter().for_each(|cell| nodes.show(cell, &mut look));
+        Some(look.bounds())
     }
 
     /// Finds points for a cube; false where that takes too long.
@@ -431,7 +566,7 @@ impl Search<'_> {
         if high < radius {
             let covers = |at: &Point| distance_squared(at, &cube.centre).sqrt() + half + slack < radius;
             if !found.covering.iter().any(covers) {
-                found.covering.push(work.nodes.ball(nearest.index).centre);
+                found.covering.push(nearest.place(&cube.centre));
             }
             return Ok(true);
         }
@@ -440,7 +575,7 @@ impl Search<'_> {
             found.closest.push(work.nodes.foot(attractor, index, &cube.centre, NEARLY * wide));
             return Ok(true);
         }
-        self.refine(work, cube, 0.5 * REFINED * half);
+        self.refine(work, cube, [0.5 * REFINED * half; 2]);
         let ranges = work.list();
         for part in self.flow.parts(*cube) {
             if !self.find(work, &part, &ranges, wide, found)? {
@@ -451,30 +586,44 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// Whether all places of a cube that are in question have a direction. False where that is not shown.
+    /// Notes the places of a cube that are in question and have no direction. False where there are too many, or that takes too long.
     fn holds(&self, work: &mut Work, cube: &Cube, ranges: &Ranges) -> Result<bool, Stopped> {
         self.budget.cancel.check()?;
-        if !self.spend(ranges.cells.len() + ranges.points.len()) {
+        if !self.spend(ranges.cells.len() + ranges.others.len()) {
             return Ok(false);
         }
         let Flow { radius, .. } = *self.flow;
         let half = self.flow.half(cube);
+        let is_known = |doubt: &Point| distance_squared(doubt, &cube.centre).sqrt() + half < AROUND * radius;
+        if work.doubts.iter().any(is_known) {
+            return Ok(true);
+        }
         let is_settled = |[a, b]: [[f64; 2]; 2]| a[0].min(b[0]) > radius || a[1].max(b[1]) < radius;
-        let of_points = self.see_points(work, cube, ranges);
+        let of_others = self.see_others(work, cube, ranges);
         let of_cells = self.see_cells(work, cube, ranges);
         let is_narrow = half <= WIDEST * radius;
-        if is_settled([of_cells, of_points]) || is_narrow && self.have_direction(work, cube) {
+        if is_settled([of_cells, of_others]) || is_narrow && self.have_direction(work, cube) {
             return Ok(true);
         }
         // As small as parts ask for: they have these in common.
-        if let Some(of_cells) = self.refine(work, cube, 0.5 * REFINED * half)
-            && (is_settled([of_cells, of_points]) || is_narrow && self.have_direction(work, cube))
-        {
-            return Ok(true);
+        let small = 0.5 * REFINED * half;
+        let nearer = [small, small.min(NEARER * half * half / radius)];
+        let steps = [[small; 2], nearer];
+        let first_step = usize::from(is_narrow && half > NARROW * radius);
+        for &small in &steps[first_step..=usize::from(is_narrow)] {
+            if let Some(of_cells) = self.refine(work, cube, small)
+                && (is_settled([of_cells, of_others]) || is_narrow && self.have_direction(work, cube))
+            {
+                return Ok(true);
+            }
         }
-        if half <= NARROWEST * radius {
-            self.give_up();
-            return Ok(false);
+        if half <= self.narrowest * radius {
+            let may_be = self.doubts_left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok();
+            if !may_be {
+                self.give_up();
+            }
+            work.doubts.push(cube.centre);
+            return Ok(may_be);
         }
         let ranges = work.list();
         for part in self.flow.parts(*cube) {
@@ -486,12 +635,27 @@ impl Search<'_> {
         Ok(true)
     }
 
+    /// Whether a direction leads away from what is seen, wherever in a cube.
+    fn is_left(&self, cube: &Cube, view: &View, direction: &Point) -> bool {
+        let (half, along) = (self.flow.half(cube), self.flow.half_along(cube, direction));
+        let ahead = dot(direction, &view.away) * view.distance;
+        match view.off {
+            None => ahead > view.radius + along,
+            Some(off) => {
+                let off = off + self.flow.slack;
+                let aside = 2.0 * (off * (view.distance + half + off)).sqrt();
+                let from_ball = || dot(direction, &subtract(&cube.centre, &view.ball.centre)) > view.ball.radius + self.flow.slack + along;
+                ahead > view.radius + aside + half || from_ball()
+            }
+        }
+    }
+
     /// Whether one direction leads away from all that is seen, wherever in a cube.
     ///
     /// No direction is within a smaller angle of all ways from what is seen than that with a cosine of |p|, for any mean p of these: Gilbert's steps to the p of least length tell both that a direction serves, and that there is none.
     fn have_direction(&self, work: &Work, cube: &Cube) -> bool {
-        let views = || work.cells.iter().chain(&work.points);
-        let count = (work.cells.len() + work.points.len()) as f64;
+        let views = || work.cells.iter().chain(&work.others);
+        let count = (work.cells.len() + work.others.len()) as f64;
         let sum = views().fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.away[axis]));
         let mut mean = sum.map(|part| part / count);
         // A direction has parts with a sum of at least 1.
@@ -502,11 +666,10 @@ impl Search<'_> {
                 return false;
             }
             let direction = mean.map(|part| part / length);
-            let along = self.flow.half_along(cube, &direction);
             let (mut serves, mut least) = (true, (f64::INFINITY, [0.0; 3]));
             for view in views() {
                 let cosine = dot(&direction, &view.away);
-                serves &= cosine * view.distance > view.radius + along;
+                serves &= self.is_left(cube, view, &direction);
                 if cosine < least.0 {
                     least = (cosine, view.away);
                 }
@@ -527,134 +690,4 @@ impl Search<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::arrangement::testing::{centres, copies_in_space, critical_values, of_roots, on_lattice, points, topology};
-    use super::super::dilate_unsimplified;
-    use super::*;
-    use crate::split_mix::Random;
-    use crate::tolerance::{Radius, Tolerance};
-    use glam::DVec3;
-
-    fn is_shown(attractor: &Attractor, radius: f64, others: &[DVec3]) -> bool {
-        let candidates = of_roots(attractor);
-        let flow = Flow { attractor, candidates: &candidates, radius, slack: 1e-12, plane: None };
-        flow.is_that_of(&others.iter().map(DVec3::to_array).collect::<Vec<Point>>(), &Budget::default()).unwrap()
-    }
-
-    fn vector(random: &mut Random) -> DVec3 {
-        DVec3::from_array(std::array::from_fn(|_| 2.0 * random.share() - 1.0))
-    }
-
-    /// Two points, the corners of a triangle and of a tetrahedron, regular ones: parts join, a handle and a void close, where the radius is half a side, or that of the circle or sphere around them.
-    #[test]
-    fn nothing_is_shown_where_topologies_differ() {
-        let triangle = [DVec3::X, DVec3::new(-0.5, 0.75_f64.sqrt(), 0.0), DVec3::new(-0.5, -(0.75_f64.sqrt()), 0.0)];
-        let tetrahedron = [DVec3::ONE, DVec3::new(1.0, -1.0, -1.0), DVec3::new(-1.0, 1.0, -1.0), DVec3::new(-1.0, -1.0, 1.0)];
-        let sets = [vec![-DVec3::X, DVec3::X], triangle.to_vec(), tetrahedron.map(DVec3::normalize).to_vec()];
-        let at = |set: &[DVec3], share: f64| set.iter().map(|x| DVec3::new(3.0, -2.0, 5.0) + share * *x).collect::<Vec<DVec3>>();
-        for set in &sets {
-            for moved in [1e-6, 1e-3, 0.05] {
-                let (wider, narrower) = (at(set, 1.0 + moved), at(set, 1.0 - moved));
-                assert!(!is_shown(&points(&wider), 1.0, &narrower) && !is_shown(&points(&narrower), 1.0, &wider), "{set:?}, {moved}");
-                let [far, farther] = [0.1, 0.12].map(|share| at(set, 1.0 + share));
-                let [near, nearer] = [0.1, 0.12].map(|share| at(set, 1.0 - share));
-                assert!(is_shown(&points(&far), 1.0, &farther) && is_shown(&points(&nearer), 1.0, &near), "{set:?}");
-            }
-        }
-        // What only one of both has.
-        assert!(!is_shown(&points(&sets[0]), 0.5, &sets[0][..1]) && !is_shown(&points(&sets[0][..1]), 0.5, &sets[0]));
-    }
-
-    /// Points in a plane, of which one critical value, known from closed forms, is above the radius, and the same points closer to each other, so that it is below: in no plane.
-    #[test]
-    fn nothing_is_shown_in_a_plane_across_a_critical_value() {
-        let mut random = Random(29);
-        let (mut across, mut shown, mut clear) = (0, 0, 0);
-        for round in 0..1_500 {
-            let axis = round % 3;
-            let mut set: Vec<(Point, f64)> = (0..2 + round % 7).map(|_| ((1.8 * vector(&mut random)).to_array(), 0.0)).collect();
-            set.iter_mut().for_each(|(at, _)| at[axis] = 0.0);
-            let values: Vec<f64> = critical_values(&set).into_iter().map(|(value, _)| value).collect();
-            let Some(&value) = values.get((random.next() % 6) as usize).filter(|&&value| value > 0.3) else { continue };
-            let moved = [1e-6, 1e-3, 1e-2][round / 3 % 3];
-            let at = |share: f64| -> Vec<DVec3> {
-                let place = |(at, _): &(Point, f64)| {
-                    let mut at = at.map(|x| x * share);
-                    at[axis] = 0.7;
-                    DVec3::from_array(at)
-                };
-                set.iter().map(place).collect()
-            };
-            let told = |one: f64, other: f64| {
-                let attractor = points(&at(one));
-                let candidates = of_roots(&attractor);
-                let flow = Flow { attractor: &attractor, candidates: &candidates, radius: 1.0, slack: 1e-12, plane: Some((axis, 0.7)) };
-                flow.is_that_of(&at(other).iter().map(DVec3::to_array).collect::<Vec<Point>>(), &Budget::default()).unwrap()
-            };
-            across += 1;
-            assert!(!told((1.0 + moved) / value, (1.0 - moved) / value), "{round}: {values:?}, {moved}");
-            // All values of the one are as far on the same side of the radius as those of the other, and none is near.
-            let share = 1.05 / value;
-            if values.iter().all(|value| (share * value - 1.0).abs() > 0.04) {
-                clear += 1;
-                shown += usize::from(told(share, share * (1.0 + moved)));
-            }
-        }
-        assert!(across > 500 && clear > 200 && 20 * shown > 19 * clear, "{across} across one, {shown} of {clear} shown");
-    }
-
-    /// Of random points and others beside them: never where their dilations have other topologies.
-    #[test]
-    fn random_points_have_the_topology_that_is_shown() {
-        let mut random = Random(11);
-        let (mut shown, mut compared, mut differ) = (0, 0, 0);
-        for round in 0..240 {
-            let set: Vec<DVec3> = (0..4 + round % 9).map(|_| 1.6 * vector(&mut random)).collect();
-            let moved = [0.003, 0.03, 0.1][round % 3];
-            let others: Vec<DVec3> = set.iter().map(|x| *x + moved * vector(&mut random)).collect();
-            let made = |points: &Attractor| {
-                dilate_unsimplified(points, Radius::new(1.0).unwrap(), Tolerance::new(0.25).unwrap(), &Budget::default()).unwrap()
-            };
-            let told = is_shown(&points(&set), 1.0, &others);
-            shown += usize::from(told);
-            let [one, other] = [&set, &others].map(|set| made(&points(set)));
-            if one.topology_exact && other.topology_exact {
-                let is_same = topology(&one) == topology(&other);
-                assert!(!told || is_same, "{round}");
-                (compared, differ) = (compared + 1, differ + usize::from(!is_same));
-            }
-        }
-        assert!(shown >= 120 && compared >= 200 && differ >= 5, "{shown} shown, {compared} compared, {differ} differ");
-    }
-
-    /// The points that are found for random systems of maps tell as much as the centres of all small balls around their cells.
-    #[test]
-    fn random_systems_have_the_topology_of_small_balls() {
-        let mut random = Random(5);
-        let (mut shown, mut compared) = (0, 0);
-        for round in 0..16 {
-            let shape = copies_in_space(&mut random, 3 + round % 2);
-            let radius = [6.0, 9.0, 14.0][round % 3];
-            let candidates = of_roots(&shape);
-            let flow = Flow { attractor: &shape, candidates: &candidates, radius, slack: 1e-10, plane: None };
-            let told = [0.5, 0.2].into_iter().find_map(|wide| {
-                let found = flow.points(wide * radius, 20_000, &Budget::default()).unwrap()?;
-                flow.is_that_of(&found, &Budget::default()).unwrap().then_some(found)
-            });
-            let Some(found) = told else { continue };
-            shown += 1;
-            let small = 0.02 * radius;
-            let Some(balls) = centres(&shape, small, 30_000) else { continue };
-            let found: Vec<DVec3> = found.iter().map(|&at| DVec3::from_array(at)).collect();
-            // The attractor's dilation is between those of all centres by less and by more.
-            let made = |set: &[DVec3], radius: f64| on_lattice(&points(set), radius, 0.25 * radius);
-            let all = [made(&found, radius), made(&balls, radius - small), made(&balls, radius + small)];
-            let [own, less, more] = [0, 1, 2].map(|k| topology(&all[k]));
-            if all.iter().all(|made| made.topology_exact) && less == more {
-                assert_eq!(own, less, "{round}");
-                compared += 1;
-            }
-        }
-        assert!(shown >= 5 && compared >= 4, "{shown} shown, {compared} compared");
-    }
-}
+mod tests;
