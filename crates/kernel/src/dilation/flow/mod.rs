@@ -635,9 +635,9 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// Whether a direction leads away from what is seen, wherever in a cube.
-    fn is_left(&self, cube: &Cube, view: &View, direction: &Point) -> bool {
-        let (half, along) = (self.flow.half(cube), self.flow.half_along(cube, direction));
+    /// Whether a direction leads away from what is seen, wherever in a cube: given how far its places are from its middle at most, in all and along the direction.
+    #[inline]
+    fn is_left(&self, cube: &Cube, view: &View, direction: &Point, [half, along]: [f64; 2]) -> bool {
         let ahead = dot(direction, &view.away) * view.distance;
         match view.off {
             None => ahead > view.radius + along,
@@ -666,10 +666,11 @@ impl Search<'_> {
                 return false;
             }
             let direction = mean.map(|part| part / length);
+            let reach = [self.flow.half(cube), self.flow.half_along(cube, &direction)];
             let (mut serves, mut least) = (true, (f64::INFINITY, [0.0; 3]));
             for view in views() {
                 let cosine = dot(&direction, &view.away);
-                serves &= self.is_left(cube, view, &direction);
+                serves &= self.is_left(cube, view, &direction, reach);
                 if cosine < least.0 {
                     least = (cosine, view.away);
                 }

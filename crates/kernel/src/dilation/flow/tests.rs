@@ -312,7 +312,9 @@ fn no_direction_serves_a_cube_around_a_critical_place() {
         let ranges = Ranges { cells: 0..0, others: 0..figures.len() };
         let [low, high] = search.see_others(&mut work, &cube, &ranges);
         assert!(low <= 1.0 && 1.0 <= high && work.others.len() == figures.len(), "{round}");
-        assert!(!work.others.iter().all(|view| search.is_left(&cube, view, &wanted.to_array())), "{round}: {figures:?}, {cube:?}");
+        let wanted = wanted.to_array();
+        let reach = [flow.half(&cube), flow.half_along(&cube, &wanted)];
+        assert!(!work.others.iter().all(|view| search.is_left(&cube, view, &wanted, reach)), "{round}: {figures:?}, {cube:?}");
         assert!(!search.have_direction(&work, &cube), "{round}: {figures:?}, {cube:?}");
     }
 }

@@ -408,17 +408,16 @@ impl<'a> Plan<'a> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
         let arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
-        let leaves = arrangement.as_ref().map(Arrangement::leaves).filter(|&leaves| leaves <= FEW_LEAVES);
-        let cells = arrangement.as_ref().map_or(0, Arrangement::leaves);
+        let leaves = arrangement.as_ref().map_or(u64::MAX, Arrangement::leaves);
         let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
         if let Some(OfSites { doubts: Some(doubts), .. }) = &made
-            && let Some(closer) = self.run_closer(doubts, cells, &setting, &space, budget)?
+            && let Some(closer) = self.run_closer(doubts, leaves, &setting, &space, budget)?
         {
             return Ok(closer);
         }
         let made = made.map(|made| made.dilation);
         let stands_for_another = !setting.dense && self.meant.off.is_finite() && (self.meant.off > 0.0 || !self.rule.is_exact());
-        if let Some(leaves) = leaves
+        if leaves <= FEW_LEAVES
             && stands_for_another
             && !made.as_ref().is_some_and(|made| made.topology_exact)
             && let Some(finer) = finer(leaves)?
