@@ -205,17 +205,21 @@ impl Pieces {
     }
 
     /// Takes away parts that hang together and bound nothing that is to be left out, if it was cut: told of each by its triangles.
-    pub(super) fn fill(&mut self, is_none: impl Fn(&[[Point; 3]]) -> bool + Sync) {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn fill(&mut self, is_none: impl Fn(&[[Point; 3]]) -> Result<bool, Stopped> + Sync) -> Result<(), Stopped> {
         if !self.is_cut {
-            return;
+            return Ok(());
         }
-        let parts = parts(self.vertices.len(), &self.triangles);
+        let parts = joined_at_sides(&self.triangles);
         let is_gone = |part: &Vec<u32>| is_none(&part.iter().map(|&piece| self.corners(piece)).collect::<Vec<_>>());
-        let gone: Vec<bool> = parts.par_iter().map(is_gone).collect();
+        let gone: Vec<bool> = parts.par_iter().map(is_gone).collect::<Result<_, Stopped>>()?;
         let mut is_kept = vec![true; self.triangles.len()];
         parts.iter().zip(gone).filter(|(_, gone)| *gone).flat_map(|(part, _)| part).for_each(|&piece| is_kept[piece as usize] = false);
         let both = self.triangles.iter().copied().zip(self.owners.iter().copied()).zip(is_kept);
         (self.triangles, self.owners) = both.filter(|(_, is_kept)| *is_kept).map(|(own, _)| own).unzip();
+        Ok(())
     }
 
     pub(super) fn corners(&self, piece: u32) -> [Point; 3] {
@@ -379,11 +383,25 @@ impl Cutting<'_> {
 /// The triangles of each of the surfaces that hang together.
 fn parts(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let groups = Groups::of_triangles(vertices, triangles).all();
-    let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (triangle, corners) in (0..).zip(triangles) {
-        parts.entry(groups[corners[0] as usize]).or_default().push(triangle);
+    grouped(triangles.iter().map(|corners| groups[corners[0] as usize]))
+}
+
+/// The same of those that hang together at sides: what meets others at vertices alone is a part.
+fn joined_at_sides(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut groups = Groups::new(triangles.len());
+    for pair in edges(triangles).windows(2).filter(|pair| pair[0].ends == pair[1].ends) {
+        groups.join(pair[0].triangle as usize, pair[1].triangle as usize);
     }
-    parts.into_values().collect()
+    grouped(groups.all())
+}
+
+/// Numbers from 0 on by the group that each is in.
+fn grouped(groups: impl IntoIterator<Item = u32>) -> Vec<Vec<u32>> {
+    let mut all: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (number, group) in (0..).zip(groups) {
+        all.entry(group).or_default().push(number);
+    }
+    all.into_values().collect()
 }
 
 /// How far along both of two segments they cross, if they do.

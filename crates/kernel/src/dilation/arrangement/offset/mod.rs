@@ -3,10 +3,10 @@
 //! Around solids that do not meet themselves there is the sheet outside alone, and all that is said here of places is said of those outside, unless that one does not come out; closed surfaces whose seams leave no triangles for both sides are made of two such, one around what is outside of them. At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
 //!
 //! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
-//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
+//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What cuts leave of folds is closed by moving vertices to neighbours. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
 //! * Each way from a place of the sheets to the place with the same shares in the feet of its corners has d <= t - m (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of the sheets: where no cell is, these wind around nothing. A sheet outside alone winds there as the T do (`inward`). Where sheets cross each other they are cut (`crossed`), and M is what they wind around once or more: so M is in D_t(S), as what cuts, mending and rounding move is moved by less than m.
-//!   So is what else is added: closed parts that are filled, and lids (`lids`) over places where sheets are too near, look back, or touch, each with a place inside such that what is between that and the lid has d <= t - m; and what is between slivers and what they become (`tidy`).
+//!   So is what else is added: closed parts that are filled, and lids (`lids`) over places where sheets are too near, look back, or touch, each with a place inside such that what is between that and the lid has d <= t - m; and what is between slivers, or folds, and what they become (`tidy`).
 //! * All triangles of its boundary have s <= d <= t. It is closed, meets itself nowhere, and winds once around a place of each connected part of S. It does not meet the inside of D_s(S), so that is in M.
 //! * Wherever s <= d(x) <= t there is a direction w with w . (x - c) > 0 for all places c of S that are closest to x; and at places of the boundary of M there is one that leaves it through all facets there, too (`ways`).
 //!
@@ -67,11 +67,12 @@ const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
 /// Rounds in which strips that are too near are left to finer ones.
 const ROUNDS_OF_STRIPS: u32 = 4;
-/// Rounds in which normals are evened where what is left of sheets looks back, the first before lids are tried, the second where these do not help, and by how many times fewer triangles are not as they have to be after each round in which lids are put there at least.
+/// Rounds in which normals are evened where what is left of sheets looks back, the first before folds are closed and lids are tried, the second where these do not help, and by how many times fewer triangles are not as they have to be after each round of these at least.
 const EVENINGS: usize = 2;
 const FEWER: usize = 2;
-/// Of so many triangles one may be covered by lids.
-const SPARSE: usize = 16;
+/// Of so many triangles one may be covered by lids, and one may be folded before.
+const SPARSE: usize = 8;
+const FOLDED: usize = 4;
 /// By what share of half the band vertices are shaken, so that triangles do not touch each other.
 const SHAKEN: f64 = 0.01;
 /// What is cut, mended and rounded is off by so many roundings at most, all in all.
@@ -241,7 +242,7 @@ fn along(
     let mut evened: Option<Skin> = None;
     let (mut round_number, mut evenings, mut has_lids, mut may_move_before) = (0, 0, false, false);
     let mut made_before = None;
-    while round_number < ROUNDS {
+    'rounds: while round_number < ROUNDS {
         let own = evened.as_ref().unwrap_or(skin);
         let mut coarse = Coarse::new(own, &hidden, radius, column.cos());
         if !coarse.run(&first, &most, budget)? {
@@ -269,7 +270,7 @@ fn along(
         let Some(mut pieces) = pieces else {
             return Ok(ControlFlow::Continue(()));
         };
-        pieces.fill(|part| around.is_filled(part));
+        pieces.fill(|part| around.is_filled(part, budget))?;
         // What is cut is not exactly where it is said to be.
         let may_move = pieces.is_cut || has_lids;
         if may_move != may_move_before {
@@ -305,16 +306,17 @@ fn along(
             if is_first && even(&mut most) {
                 continue;
             }
-            if !flaws.is_none() && !may_move {
-                has_lids = true;
-                continue;
-            }
             let mut before = usize::MAX;
-            while !flaws.is_none() {
+            while !flaws.is_none() && flaws.count() <= outcome.surface.triangles.len() / FOLDED {
+                flaws = outcome.unfold(flaws, around, &ways, setting, budget)?;
+                if !flaws.is_none() && !may_move {
+                    has_lids = true;
+                    continue 'rounds;
+                }
                 // Where they would be everywhere, or do not leave much less, lids do not help.
                 let is_hopeless = flaws.count() > (before / FEWER).min(outcome.surface.triangles.len() / SPARSE);
                 before = flaws.count();
-                if is_hopeless || !outcome.cover(around, &flaws, round, budget)? {
+                if flaws.is_none() || is_hopeless || !outcome.cover(around, &flaws, round, budget)? {
                     break;
                 }
                 flaws = outcome.flaws(around, &ways, setting, budget)?;
@@ -469,7 +471,7 @@ impl Around<'_> {
     }
 
     /// Whether all that a closed surface bounds, given by its triangles, is shown to be nearer than the outer distance by what may move: what is inside is no farther from it than half of what it is wide.
-    fn is_filled(&self, triangles: &[[Point; 3]]) -> bool {
+    fn is_filled(&self, triangles: &[[Point; 3]], budget: &Budget) -> Result<bool, Stopped> {
         let width = |along: &Point| {
             let all = triangles.iter().flatten().map(|corner| dot(corner, along));
             all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
@@ -477,12 +479,20 @@ impl Around<'_> {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let normals = triangles.iter().filter_map(upright).take(MOST_NORMALS);
         let half_width = 0.5 * axes.into_iter().chain(normals).map(|along| width(&along)).fold(f64::INFINITY, f64::min);
-        half_width < self.outer
-            && triangles.iter().all(|triangle| {
-                let centre = middle(triangle);
-                let reach = radius(triangle, &centre) + half_width;
-                self.closest(&centre).is_some_and(|(_, way)| dot(&way, &way).sqrt() + reach <= self.outer - self.moved)
-            })
+        let most = self.outer - self.moved - half_width;
+        let mut memory = Memory::default();
+        let mut is_near = |triangle: &[Point; 3]| {
+            let centre = middle(triangle);
+            self.closest(&centre).is_some_and(|(_, way)| dot(&way, &way).sqrt() + radius(triangle, &centre) <= most)
+                || self.is_between(*triangle, None, [f64::NEG_INFINITY, most], &mut memory)
+        };
+        for triangle in triangles {
+            budget.cancel.check()?;
+            if most <= 0.0 || !is_near(triangle) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 }
 

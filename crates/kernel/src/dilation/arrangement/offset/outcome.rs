@@ -3,7 +3,7 @@
 use super::crossed::Pieces;
 use super::sheets::Sheets;
 use super::ways::Ways;
-use super::{Around, IN_A_ROW};
+use super::{Around, FEWER, IN_A_ROW};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::Memory;
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use std::collections::{BTreeSet, HashSet};
 
 /// The cosine from which on a triangle looks back.
-const BACK: f64 = 0.05;
+pub(super) const BACK: f64 = 0.05;
 /// How many times lids are shaken until they cross what is there without touching it.
 const TRIES: usize = 3;
 
@@ -115,6 +115,32 @@ impl Outcome {
         Ok(flaws)
     }
 
+    /// Takes folds away as long as that leaves much less that is not as it has to be, and tells what is left of it.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn unfold(
+        &mut self,
+        mut flaws: Flaws,
+        around: &Around<'_>,
+        ways: &Ways<'_>,
+        setting: &Setting,
+        budget: &Budget,
+    ) -> Result<Flaws, Stopped> {
+        let mut before = usize::MAX;
+        while !flaws.is_none() && flaws.count() <= before / FEWER {
+            before = flaws.count();
+            // Vertices are moved with all of their triangles.
+            split(&mut self.surface);
+            if !doubled(&self.surface.triangles).is_empty() {
+                break;
+            }
+            around.unfold(&mut self.surface, &flaws.triangles(), budget)?;
+            flaws = self.flaws(around, ways, setting, budget)?;
+        }
+        Ok(flaws)
+    }
+
     /// Adds lids over what is not as it has to be; false where these cannot be cut.
     ///
     /// # Errors
@@ -137,7 +163,7 @@ impl Outcome {
             }
         }
         let Some(mut pieces) = found else { return Ok(false) };
-        pieces.fill(|part| around.is_filled(part));
+        pieces.fill(|part| around.is_filled(part, budget))?;
         self.off += pieces.off;
         self.is_cut = true;
         (self.surface.vertices, self.surface.triangles) = (pieces.vertices, pieces.triangles);

@@ -21,6 +21,9 @@ const SMOOTH: f64 = 0.5;
 const ACUTE: f64 = 0.9;
 /// Sides that are shorter than this, as a share of the longest ones at both ends, may have one normal: noise and marching cubes turn the triangles there, and sheets would fold.
 const SHORT: f64 = 0.2;
+/// The cosine of the angle by which noise turns normals at most, but for one in so many.
+const NOISE: f64 = 0.9;
+const MANY: usize = 16;
 
 /// The share of inner sides that may be flat, and around solids.
 const FLAT: f64 = 0.5;
@@ -156,7 +159,9 @@ impl Skin {
         Some(Self { sides, places, triangles, mesh, normals, ups, shared, lost, around, borders, outs, turns, seams })
     }
 
-    /// Makes the normals of some corners those that short sides share, or, where they are these already, the means of those around them, where no more than told is lost of a radius; whether any is another one now. So they take turns: means of means alone left pebble of the peers' comparison folded at r/40.
+    /// Makes the normals of some corners those that short sides share, or, where they are these already, the means of those around them, where they turn little with that and no more than told is lost of a radius; whether any is another one now. So they take turns: means of means alone left pebble of the peers' comparison folded at r/40.
+    ///
+    /// Noise turns normals by little: where many would turn by much, sheets fold for other reasons, and nothing is changed.
     pub(super) fn even(&mut self, corners: &[u32], radius: f64, most_lost: f64) -> bool {
         let evened = |&corner: &u32| {
             let beside = self.around.at(corner).iter().map(|&triangle| self.triangles[triangle as usize]);
@@ -168,7 +173,13 @@ impl Skin {
                 (lost <= most_lost).then_some((corner, up, lost))
             })
         };
-        let all: Vec<(u32, Point, f64)> = corners.par_iter().filter_map(evened).collect();
+        let mut all: Vec<(u32, Point, f64)> = corners.par_iter().filter_map(evened).collect();
+        let turns_little = |&(corner, up, _): &(u32, Point, f64)| dot(&up, &self.ups[corner as usize]) >= NOISE;
+        let many = all.len() - all.len().div_ceil(MANY);
+        all.retain(turns_little);
+        if all.len() < many {
+            return false;
+        }
         for &(corner, up, lost) in &all {
             (self.ups[corner as usize], self.lost[corner as usize]) = (up, lost);
         }

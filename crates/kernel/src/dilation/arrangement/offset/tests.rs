@@ -77,6 +77,20 @@ impl Mesh {
         })
     }
 
+    /// A wide ring whose outer border is bent down by less than the radius that it is thickened by.
+    fn brim(around: usize, across: usize, bend: f64, brim: f64) -> Self {
+        let (wide, to) = (10.0, 0.5);
+        let arcs = [wide * to, bend * (0.5 * PI - to)];
+        Self::of(around, across, |u, v| {
+            let way = v * (arcs[0] + arcs[1] + brim);
+            let angle = if way < arcs[0] { way / wide } else { (to + (way - arcs[0]) / bend).min(0.5 * PI) };
+            let own = if way < arcs[0] { wide } else { bend };
+            let ring = 8.0 + (wide - own) * to.sin() + own * angle.sin();
+            let height = (wide - own) * to.cos() + own * angle.cos() - (way - arcs[0] - arcs[1]).max(0.0);
+            DVec3::new(ring * (TAU * u).cos(), ring * (TAU * u).sin(), height)
+        })
+    }
+
     /// Two caps of balls that meet at a rim, each as wide as an angle.
     fn lens(around: usize, across: usize, radius: f64, angle: f64) -> Self {
         let cap = |side: f64| {
@@ -354,6 +368,16 @@ fn sheets_may_cross_themselves() {
     let double = sheet.clone().and(sheet.moved(DVec3::new(0.0, 0.0, 2.0_f64.sqrt())));
     assert_made(1, &double, [1.0, 0.1], (1, 0, 2), 300, &mut random);
     assert_steady(&double.turned(&mut random).lowered(), 1.0, 0.1);
+}
+
+/// Near borders that are bent by less than the radius, sheets fold.
+#[test]
+fn folds_are_taken_away() {
+    let mut random = Random(191);
+    let brims = [(120, 0.9, 0.01), (120, 0.9, 0.1), (120, 0.9, 0.3), (120, 0.9, 0.6), (200, 0.7, 0.6)];
+    for (case, (around, bend, brim)) in brims.into_iter().enumerate() {
+        assert_made(case, &Mesh::brim(around, 40, bend, brim), [1.0, 0.1], (1, 0, 0), 100, &mut random);
+    }
 }
 
 /// A shape with seams, with the components, the cavities and the Euler number of its dilation.

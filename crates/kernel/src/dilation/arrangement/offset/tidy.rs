@@ -1,6 +1,7 @@
-//! Slivers that cuts leave, and short sides, taken away: their normals are noise.
+//! What cuts leave that has to go: slivers and short sides, whose normals are noise, and folds.
 
 use super::Around;
+use super::outcome::BACK;
 use super::skin::upright;
 use crate::attractor::cell::{Point, distance_squared, dot};
 use crate::budget::{Budget, Stopped};
@@ -14,6 +15,8 @@ use crate::solid::mend::{MOST_AROUND, Mender};
 const SHORT: f64 = 0.02;
 /// The cosine by which triangles may turn.
 const TURN: f64 = 0.5;
+/// The same for those of folds, which turn as they have to.
+const BACKWARDS: f64 = -2.0;
 /// Sweeps at most.
 const SWEEPS: usize = 3;
 
@@ -24,13 +27,7 @@ impl Around<'_> {
     /// [`Stopped`].
     pub(super) fn tidy(&self, surface: &mut BlockSurface, budget: &Budget) -> Result<(), Stopped> {
         let short = SHORT * self.half();
-        let mut tidying = Tidying {
-            around: self,
-            mesh: HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles),
-            mender: Mender::default(),
-            memory: Memory::default(),
-        };
-        tidying.mender.start(&tidying.mesh);
+        let mut tidying = Tidying::new(self, surface);
         for _ in 0..SWEEPS {
             let mut is_changed = false;
             for triangle in 0..tidying.mesh.triangles() {
@@ -57,6 +54,29 @@ impl Around<'_> {
         (surface.vertices, surface.triangles, _) = tidying.mesh.compact();
         Ok(())
     }
+
+    /// Moves corners of triangles to neighbours where fewer triangles look back then, and what is moved stays between the distances.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn unfold(&self, surface: &mut BlockSurface, triangles: &[u32], budget: &Budget) -> Result<(), Stopped> {
+        let mut folded: Vec<u32> = triangles.iter().flat_map(|&triangle| surface.triangles[triangle as usize]).collect();
+        folded.sort_unstable();
+        folded.dedup();
+        let mut tidying = Tidying::new(self, surface);
+        for _ in 0..SWEEPS {
+            let mut is_changed = false;
+            for &vertex in &folded {
+                budget.cancel.check()?;
+                is_changed |= tidying.unfold(vertex);
+            }
+            if !is_changed {
+                break;
+            }
+        }
+        (surface.vertices, surface.triangles, _) = tidying.mesh.compact();
+        Ok(())
+    }
 }
 
 /// A surface that is tidied.
@@ -67,7 +87,34 @@ struct Tidying<'a> {
     memory: Memory,
 }
 
-impl Tidying<'_> {
+impl<'a> Tidying<'a> {
+    fn new(around: &'a Around<'a>, surface: &mut BlockSurface) -> Self {
+        let mesh = HalfEdges::new(std::mem::take(&mut surface.vertices), &surface.triangles);
+        let mut mender = Mender::default();
+        mender.start(&mesh);
+        Self { around, mesh, mender, memory: Memory::default() }
+    }
+
+    /// Moves a vertex to the neighbour with which fewest triangles around it look back, of those that serve and with which fewer do so than before; whether there is one.
+    fn unfold(&mut self, vertex: u32) -> bool {
+        if !self.mesh.star(vertex, MOST_AROUND, &mut self.mender.star) {
+            return false;
+        }
+        let ring = &self.mender.star.ring;
+        let back = |apex: u32, gone: Option<usize>| {
+            let corners = |k: usize| [apex, ring[k], ring[(k + 1) % ring.len()]].map(|corner| self.at(corner));
+            kept(gone, ring.len()).filter(|&k| self.around.leads(&corners(k)) < BACK).count()
+        };
+        let before = back(vertex, None);
+        if before == 0 {
+            return false;
+        }
+        let with = (0..ring.len()).map(|m| (back(ring[m], Some(m)), m));
+        let mut better: Vec<(usize, usize)> = with.filter(|own| own.0 < before).collect();
+        better.sort_unstable();
+        better.into_iter().any(|(_, m)| self.moves(vertex, m, BACKWARDS))
+    }
+
     fn at(&self, vertex: u32) -> Point {
         self.mesh.points[vertex as usize]
     }
@@ -77,13 +124,18 @@ impl Tidying<'_> {
         if !self.mesh.star(from, MOST_AROUND, &mut self.mender.star) {
             return false;
         }
+        let m = self.mender.star.ring.iter().position(|&other| other == to);
+        m.is_some_and(|m| self.moves(from, m, TURN))
+    }
+
+    /// Moves a vertex to the neighbour at a place of its ring, if no triangle turns so much that a cosine is less, and what is moved stays between the distances; whether it does.
+    fn moves(&mut self, from: u32, m: usize, turn: f64) -> bool {
         let ring = self.mender.star.ring.clone();
-        let Some(m) = ring.iter().position(|&other| other == to) else { return false };
         let serves = self.mender.keeps_manifold(&self.mesh, m)
             && kept(Some(m), ring.len()).all(|k| {
-                let [old, fresh] = [from, to].map(|apex| [apex, ring[k], ring[(k + 1) % ring.len()]].map(|corner| self.at(corner)));
+                let [old, fresh] = [from, ring[m]].map(|apex| [apex, ring[k], ring[(k + 1) % ring.len()]].map(|corner| self.at(corner)));
                 let Some(normal) = upright(&fresh) else { return false };
-                upright(&old).is_none_or(|own| dot(&own, &normal) > TURN) && self.stays(fresh, Some(old), 0.0)
+                upright(&old).is_none_or(|own| dot(&own, &normal) > turn) && self.stays(fresh, Some(old), 0.0)
             });
         if serves {
             self.mesh.collapse(from, &self.mender.star, m);
