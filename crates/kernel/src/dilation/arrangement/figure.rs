@@ -4,7 +4,7 @@
 //! topology, changes. What changes is that there are fewer bodies, and fewer of them near to each other.
 
 use super::polyhedron::Polyhedron;
-use crate::attractor::cell::{Point, Site, between, closest_on_segment, cross, distance_squared, dot, subtract, unit};
+use crate::attractor::cell::{Ball, Point, Site, between, closest_on_segment, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::convex::Convex;
 use crate::dilation::tree::Weighted;
@@ -25,6 +25,10 @@ const ROUNDS: usize = 24;
 /// Polygons with a common side, or segments with a common end, that are looked at: of any number of them most lie in planes of their own, or on lines.
 const MOST_AT_A_SIDE: usize = 8;
 
+/// Twice the area over the square of the longest side from which on a polygon's normal is told, to less than 1e-10; and by how much the parts of unit vectors across it, and their squares, are off then at most.
+const LEAST_WIDTH: f64 = 1e-5;
+const NOISE: f64 = 1e-9;
+
 /// A site, or several that are one convex set.
 #[derive(Clone, Debug)]
 pub(in crate::dilation) struct Figure {
@@ -39,6 +43,29 @@ pub(super) enum Outline {
     Segment([Point; 2]),
     Polygon(Polygon),
     Polyhedron(Polyhedron),
+}
+
+/// The line, or the plane, that differences of a figure's places are along.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dilation) enum Span {
+    /// Along a unit vector.
+    Line(Point),
+    /// Across a unit vector.
+    Plane(Point),
+    /// Along any, or not known.
+    Space,
+}
+
+impl Span {
+    /// The length of the part of a unit vector along it, at most.
+    #[inline]
+    pub(in crate::dilation) fn along(&self, direction: &Point) -> f64 {
+        match self {
+            Self::Line(way) => dot(way, direction).abs() + NOISE,
+            Self::Plane(up) => (1.0 - dot(up, direction).powi(2) + NOISE).max(0.0).sqrt(),
+            Self::Space => 1.0,
+        }
+    }
 }
 
 /// A convex polygon.
@@ -87,6 +114,23 @@ impl Figure {
             Outline::Polygon(polygon) => &polygon.corners,
             Outline::Polyhedron(polyhedron) => &polyhedron.corners,
         }
+    }
+
+    /// What its places differ along.
+    pub(in crate::dilation) fn span(&self) -> Span {
+        match &self.outline {
+            Outline::Point(_) => Span::Line([0.0; 3]),
+            Outline::Segment([a, b]) => Span::Line(unit(&subtract(b, a))),
+            Outline::Polygon(polygon) if polygon.is_wide() => Span::Plane(polygon.up),
+            Outline::Polygon(_) | Outline::Polyhedron(_) => Span::Space,
+        }
+    }
+
+    /// A ball around it.
+    pub(in crate::dilation) fn ball(&self) -> Ball {
+        let corners = self.corners();
+        let centre: Point = std::array::from_fn(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / corners.len() as f64);
+        Ball { centre, radius: corners.iter().map(|corner| distance_squared(corner, &centre)).fold(0.0, f64::max).sqrt() }
     }
 
     pub(super) fn polygon(&self) -> Option<&Polygon> {
@@ -213,6 +257,12 @@ impl Polygon {
     /// How high x is above its plane.
     fn height(&self, x: &Point) -> f64 {
         dot(&self.up, &subtract(x, &self.corners[0]))
+    }
+
+    /// Whether rounding does not tell its normal.
+    fn is_wide(&self) -> bool {
+        let longest = self.sides().map(|[from, to]| distance_squared(&from, &to)).fold(0.0, f64::max);
+        self.double() > LEAST_WIDTH * longest
     }
 
     /// Twice its area.

@@ -6,9 +6,10 @@
 //! That is asked cube by cube. Let y be a cube's middle and h half its diagonal, and let A be the union of cells, some in balls around c_i of radii p_i; with t_i = |y - c_i| and u_i = (y - c_i) / t_i. For all x of the cube |x - c_i| is no less than t_i + u_i . (x - y), and no more than that and h^2 / 2 (t_i - h).
 //! So cell i has no place that is closest to any x of it if, for some k, t_i - t_k exceeds p_i + p_k + h^2 / 2 (t_k - h) and what (u_k - u_i) . (x - y) may be; and likewise for K, whose balls have no radius. For the others one w must have w . (y - c_i) larger than p_i and what w . (y - x) may be.
 //! Of a convex figure of K, c_i is the place that is closest to y: its distance is convex, so both bounds hold for it, too; and the way from the closest place turns by no more than x moves, |x - c(x) - (y - c(y))| <= |x - y|, so that w . (y - c_i) must be larger than h.
+//! That of a segment or a polygon moves along its line or plane, by no more than x does: larger than what w . (y - x) may be and h |w_i|, with the part w_i of w along there, is enough, too. So is what serves a ball around the figure.
 //!
 //! Other cells, smooth ones, are looked at as figures that stand for them, no place of either farther than p_i from one of the other: p_i is far less than a ball's radius is then. Let d be how far x is from a figure, q its closest place, and c the cell's, closest to x of all A: so |x - c| <= d + p_i, and c is within p_i of a place c' of one
-//! of its figures, no farther than d + 2 p_i from x. As the figure is convex |c' - q|^2 <= (d + 2 p_i)^2 - d^2 = 4 p_i (d + p_i). So w . (y - c_i) must be larger than h + p_i + 2 sqrt(p_i (d + p_i)), with d no more than t_i + h; or w serves the ball around the cell.
+//! of its figures, no farther than d + 2 p_i from x. As the figure is convex |c' - q|^2 <= (d + 2 p_i)^2 - d^2 = 4 p_i (d + p_i). So w . (y - c_i) must be larger by p_i + 2 sqrt(p_i (d + p_i)), with d no more than t_i + h; or w serves the ball around the cell.
 //!
 //! Where there is none its cells are replaced by smaller ones, and the cube is halved: cells that are deep inside, or farther than others, never are.
 //!
@@ -16,7 +17,7 @@
 //!
 //! Where all of A and K is within w of a plane, straight up leads away from all of it at places that are higher than it. The others are within w of a place of the plane, and so are as far from all places but for w: only squares in the plane are looked at.
 
-use super::arrangement::{Cube, Figure};
+use super::arrangement::{Cube, Figure, Span};
 use super::convex::Convex;
 use super::surface::NameHasher;
 use super::tree::{Candidates, Weighted};
@@ -32,7 +33,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Halves of the sides of cubes that are looked at one by one, in units of the radius; of the diagonals of those in which directions are looked for; of those that are halved no more where one doubt is enough, and where all are wanted.
 const LARGE: f64 = 2.0;
-const WIDEST: f64 = 0.6;
+const WIDEST: f64 = 1.0;
 const NARROWEST: [f64; 2] = [1.0 / 256.0, 1.0 / 32_768.0];
 /// How near figures are to what they stand for where directions are looked for, in units of half the diagonal squared over the radius; in cubes as narrow as this only where there is none else.
 const NEARER: f64 = 1.0 / 16.0;
@@ -76,8 +77,9 @@ pub(super) struct Flow<'a> {
 /// What is looked at for one question.
 struct Search<'a> {
     flow: &'a Flow<'a>,
-    /// K.
+    /// K, and of each of its figures a ball around it, and what its closest place moves along, if it does.
     others: &'a [Figure],
+    hulls: Vec<(Ball, Option<Span>)>,
     /// Looks that are left, and places in doubt that there may be still.
     left: AtomicUsize,
     doubts_left: AtomicUsize,
@@ -98,7 +100,7 @@ struct Nodes {
     children: Vec<Option<Range<u32>>>,
     /// What stands for each one, where that is far nearer to it than its ball is small: where it begins and ends in `figures`, and how far places of either are off the other.
     drawn: Vec<Option<(Range<u32>, f64)>>,
-    figures: Vec<Figure>,
+    figures: Vec<(Figure, Span)>,
 }
 
 /// A cell, or a figure of K, seen from the middle of a cube.
@@ -109,10 +111,10 @@ struct View {
     /// Of the ball, or how far the figure is off, and what distances are.
     radius: f64,
     away: Point,
-    /// Around the cell; of no use for figures of K.
+    /// Around the cell, or around a figure of K.
     ball: Ball,
-    /// How far a figure is off what it stands for; none of a ball.
-    off: Option<f64>,
+    /// How far a figure is off what it stands for, and along what its closest place moves; none of a ball, or of a point.
+    flat: Option<(f64, Span)>,
 }
 
 /// Cells, with their balls, and figures of K that may matter in a cube, by their numbers.
@@ -165,7 +167,11 @@ impl Nodes {
             return None;
         }
         let first = self.figures.len() as u32;
-        attractor.emit(cell, points, &mut |site| self.figures.push(Weighted { site, deficit: 0.0 }.into()));
+        attractor.emit(cell, points, &mut |site| {
+            let figure = Figure::from(Weighted { site, deficit: 0.0 });
+            let span = figure.span();
+            self.figures.push((figure, span));
+        });
         let last = self.figures.len() as u32;
         (first < last).then_some((first..last, off))
     }
@@ -173,9 +179,9 @@ impl Nodes {
     /// Looks at a cell: at its ball, or at its figures.
     #[inline]
     fn show(&self, &(index, ball): &(u32, Ball), look: &mut Look<'_>) {
-        let Some((figures, off)) = &self.drawn[index as usize] else { return look.see(index, &ball.centre, ball.radius, ball, None) };
-        for figure in &self.figures[figures.start as usize..figures.end as usize] {
-            look.see(index, &figure.closest(&look.cube.centre), *off, ball, Some(*off));
+        let Some((figures, off)) = &self.drawn[index as usize] else { return look.see(index, &ball.centre, ball.radius, || (ball, None)) };
+        for (figure, span) in &self.figures[figures.start as usize..figures.end as usize] {
+            look.see(index, &figure.closest(&look.cube.centre), *off, || (ball, Some((*off, *span))));
         }
     }
 
@@ -307,6 +313,7 @@ impl Flow<'_> {
         Search {
             flow: self,
             others,
+            hulls: others.iter().map(|figure| (figure.ball(), (figure.corners().len() > 1).then(|| figure.span()))).collect(),
             left: AtomicUsize::new(looks),
             doubts_left: AtomicUsize::new(0),
             narrowest: NARROWEST[0],
@@ -355,9 +362,16 @@ impl<'a> Look<'a> {
         Self { flow, cube, half: flow.half(cube), high: f64::INFINITY, nearest: None, views }
     }
 
-    /// Looks at a ball, or at the closest place of a figure.
+    /// Whether nothing in a ball is closest to any place of the cube.
     #[inline]
-    fn see(&mut self, index: u32, place: &Point, radius: f64, ball: Ball, off: Option<f64>) {
+    fn is_beyond(&self, ball: &Ball) -> bool {
+        let reach = self.high + 2.0 * self.half + ball.radius + self.flow.slack;
+        distance_squared(&self.cube.centre, &ball.centre) > reach * reach
+    }
+
+    /// Looks at a ball, or at the closest place of a figure, given the rest of what is seen.
+    #[inline]
+    fn see(&mut self, index: u32, place: &Point, radius: f64, rest: impl FnOnce() -> (Ball, Option<(f64, Span)>)) {
         let (way, radius) = (subtract(&self.cube.centre, place), radius + self.flow.slack);
         let square = dot(&way, &way);
         if square > (self.high + 2.0 * self.half + radius).powi(2) {
@@ -365,7 +379,8 @@ impl<'a> Look<'a> {
         }
         let distance = square.sqrt();
         let away = way.map(|part| if distance > 0.0 { part / distance } else { 0.0 });
-        let view = View { index, distance, radius, away, ball, off };
+        let (ball, flat) = rest();
+        let view = View { index, distance, radius, away, ball, flat };
         if distance + radius < self.high {
             (self.nearest, self.high) = (Some(view), distance + radius);
         }
@@ -497,11 +512,12 @@ impl Search<'_> {
     fn see_others(&self, work: &mut Work, cube: &Cube, ranges: &Ranges) -> [f64; 2] {
         let mut look = Look::new(self.flow, cube, &mut work.others);
         for &index in &work.lists.others[ranges.others.clone()] {
-            let figure = &self.others[index as usize];
-            let place = figure.closest(&cube.centre);
-            // What is more than a point has other places that are closest to others of the cube.
-            let off = (figure.corners().len() > 1).then_some(0.0);
-            look.see(index, &place, 0.0, Ball { centre: place, radius: f64::INFINITY }, off);
+            let (ball, span) = self.hulls[index as usize];
+            if look.is_beyond(&ball) {
+                continue;
+            }
+            let place = self.others[index as usize].closest(&cube.centre);
+            look.see(index, &place, 0.0, || (ball, span.map(|span| (0.0, span))));
         }
         look.bounds()
     }
@@ -639,15 +655,14 @@ impl Search<'_> {
     #[inline]
     fn is_left(&self, cube: &Cube, view: &View, direction: &Point, [half, along]: [f64; 2]) -> bool {
         let ahead = dot(direction, &view.away) * view.distance;
-        match view.off {
-            None => ahead > view.radius + along,
-            Some(off) => {
-                let off = off + self.flow.slack;
-                let aside = 2.0 * (off * (view.distance + half + off)).sqrt();
-                let from_ball = || dot(direction, &subtract(&cube.centre, &view.ball.centre)) > view.ball.radius + self.flow.slack + along;
-                ahead > view.radius + aside + half || from_ball()
-            }
-        }
+        let Some((off, span)) = &view.flat else { return ahead > view.radius + along };
+        let slack = self.flow.slack;
+        let aside = 2.0 * ((off + slack) * (view.distance + half + off + slack)).sqrt();
+        // Joined figures are flat but for that.
+        let moved = || along + half * span.along(direction) + 2.0 * slack;
+        let from_ball = || dot(direction, &subtract(&cube.centre, &view.ball.centre)) > view.ball.radius + slack + along;
+        let left = ahead - view.radius - aside;
+        left > half || left > moved() || from_ball()
     }
 
     /// Whether one direction leads away from all that is seen, wherever in a cube.
@@ -658,7 +673,7 @@ impl Search<'_> {
         let count = (work.cells.len() + work.others.len()) as f64;
         let sum = views().fold([0.0; 3], |sum: Point, view| std::array::from_fn(|axis| sum[axis] + view.away[axis]));
         let mut mean = sum.map(|part| part / count);
-        // A direction has parts with a sum of at least 1.
+        // A direction has parts with a sum of at least 1; what a ball around a figure that is off would show with less is left.
         let wanted = views().map(|view| (view.radius + cube.half) / view.distance).fold(f64::INFINITY, f64::min);
         for _ in 0..STEPS {
             let length = dot(&mean, &mean).sqrt();

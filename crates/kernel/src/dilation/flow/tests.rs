@@ -3,6 +3,7 @@
 use super::super::arrangement::testing::{centres, copies_in_space, critical_values, on_lattice, points, topology, wires};
 use super::super::{dilate, dilate_unsimplified};
 use super::*;
+use crate::attractor::cell::{cross, unit};
 use crate::model::{ControlNet, Curve, CurveScheme, Interior, Model, PolygonMesh, Shape};
 use crate::split_mix::Random;
 use crate::tolerance::{Radius, Tolerance};
@@ -277,7 +278,7 @@ fn holes_of_circles_are_told_near_to_where_they_close() {
     }
 }
 
-/// Points, segments and triangles that are as far from a place as the radius, in directions around it: no direction leads away from all, whichever cube the place is in.
+/// Points, segments, triangles and needles that are as far from a place as the radius, in directions around it: no direction leads away from all, whichever cube the place is in.
 #[test]
 fn no_direction_serves_a_cube_around_a_critical_place() {
     let mut random = Random(31);
@@ -296,14 +297,16 @@ fn no_direction_serves_a_cube_around_a_critical_place() {
         for way in &ways {
             let foot = place - *way;
             let [one, other]: [DVec3; 2] = std::array::from_fn(|_| vector(&mut random).reject_from(*way));
-            figures.extend(match random.next() % 3 {
+            figures.extend(match random.next() % 4 {
                 0 => self::figures(&[foot]),
                 1 => figures_of(&wires(&[[foot - one, foot + one]])),
-                _ => figures_of(&triangles(&[[foot + one, foot + other, foot - one - other]])),
+                2 => figures_of(&triangles(&[[foot + one, foot + other, foot - one - other]])),
+                // Corners on a line, but for rounding: its normal is noise.
+                _ => figures_of(&triangles(&[[foot + one, foot - one, foot + 0.3 * one]])),
             });
         }
         let search = flow.search(&figures, usize::MAX, &budget);
-        let half = [0.3, 0.1, 0.01][round % 3];
+        let half = [0.55, 0.3, 0.1, 0.01][round % 4];
         let offset =
             DVec3::from_array(std::array::from_fn(|_| if random.next().is_multiple_of(2) { 0.999 } else { -0.999 * random.share() }));
         let cube = Cube { centre: (place + half * offset).to_array(), half };
@@ -316,5 +319,22 @@ fn no_direction_serves_a_cube_around_a_critical_place() {
         let reach = [flow.half(&cube), flow.half_along(&cube, &wanted)];
         assert!(!work.others.iter().all(|view| search.is_left(&cube, view, &wanted, reach)), "{round}: {figures:?}, {cube:?}");
         assert!(!search.have_direction(&work, &cube), "{round}: {figures:?}, {cube:?}");
+    }
+}
+
+/// Of triangles that are nearly lines rounding tells the normal: what they differ along is no less than their longest side tells.
+#[test]
+fn spans_of_needles_hold_them() {
+    let mut random = Random(37);
+    for round in 0..20_000 {
+        let (from, way) = (vector(&mut random), vector(&mut random).normalize());
+        let high = [0.0, 1e-16, 1e-13, 1e-9, 1e-6, 1e-3][round % 6] * vector(&mut random);
+        let figures = figures_of(&triangles(&[[from, from + way, from + random.share() * way + high]]));
+        let [a, b, c] = figures[0].corners().try_into().unwrap();
+        let across = unit(&cross(&subtract(&b, &a), &subtract(&c, &b)));
+        let own = unit(&subtract(&b, &a));
+        for direction in [across, unit(&vector(&mut random).to_array())] {
+            assert!(figures[0].span().along(&direction) >= dot(&direction, &own).abs(), "{round} {figures:?}");
+        }
     }
 }
