@@ -259,7 +259,7 @@ impl Polygon {
         dot(&self.up, &subtract(x, &self.corners[0]))
     }
 
-    /// Whether rounding does not tell its normal.
+    /// Whether it is so wide that its normal is not what rounding makes of it.
     fn is_wide(&self) -> bool {
         let longest = self.sides().map(|[from, to]| distance_squared(&from, &to)).fold(0.0, f64::max);
         self.double() > LEAST_WIDTH * longest
