@@ -97,7 +97,7 @@ mod tests {
         copies(&[(0.5, 0.0, [0.0, 0.0]), (0.5, 0.0, [50.0, 0.0]), (0.5, 0.0, [25.0, 1_875.0_f64.sqrt()])], 2, 0.0)
     }
 
-    /// How far a place is from an attractor, but for so little: from the centres of balls around cells, of which those go that are farther than another.
+    /// How far a place is from an attractor, or farther by so little: no farther than from the far side of any cell's ball. Those go that are not nearer by more.
     fn distance(attractor: &Attractor, x: DVec3, little: f64) -> f64 {
         let roots = attractor.roots().iter().enumerate();
         let mut open: Vec<(Cell, Vec<ControlPoint>)> =
@@ -105,13 +105,10 @@ mod tests {
         let from = |cell: &Cell| distance_squared(&x.to_array(), &cell.ball.centre).sqrt();
         let mut best = f64::INFINITY;
         while let Some((cell, points)) = open.pop() {
-            if from(&cell) - cell.ball.radius >= best {
+            if from(&cell) - cell.ball.radius >= best - little {
                 continue;
             }
-            if cell.ball.radius <= little {
-                best = best.min(from(&cell));
-                continue;
-            }
+            best = best.min(from(&cell) + cell.ball.radius);
             let mut children: Vec<_> = attractor.children(&cell, &points).collect();
             children.sort_by(|a, b| from(&b.0).total_cmp(&from(&a.0)));
             open.extend(children);
@@ -141,7 +138,7 @@ mod tests {
             let made = arranged(&shape, radius, tolerance);
             assert!(made.inner_mm <= tolerance && made.outer_mm <= tolerance && made.pitch_mm.is_none(), "{round}");
             // Nothing crosses, and no place is beyond the bounds but for what is not known of the distance.
-            let little = 0.01 * tolerance;
+            let little = 0.05 * tolerance;
             let [inner, outer] = [radius - made.inner_mm - little, radius + made.outer_mm + little];
             let within = |x: DVec3| if (inner..=outer).contains(&distance(&shape, x, little)) { radius } else { f64::INFINITY };
             assert!(holds_everywhere(&made, radius, within, &mut random), "{round}");

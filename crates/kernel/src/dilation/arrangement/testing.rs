@@ -73,8 +73,12 @@ pub(in crate::dilation) fn centres(shape: &Attractor, small: f64, most: usize) -
 }
 
 pub(super) fn plan(attractor: &Attractor, radius: f64, tolerance: f64) -> Plan<'_> {
+    plan_with(attractor, radius, tolerance, true)
+}
+
+fn plan_with(attractor: &Attractor, radius: f64, tolerance: f64, simplify: bool) -> Plan<'_> {
     let balls = Balls { least: Radius::new(radius).unwrap().mm(), most: radius };
-    Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), true, 1.0, &Budget::default()).unwrap()
+    Plan::new(attractor, balls, Tolerance::new(tolerance).unwrap(), simplify, 1.0, &Budget::default()).unwrap()
 }
 
 pub(super) fn arranged_unless_left(attractor: &Attractor, radius: f64, tolerance: f64) -> Option<Dilation> {
@@ -85,8 +89,9 @@ pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Di
     arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
 }
 
-pub(in crate::dilation) fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
-    let (plan, budget) = (plan(attractor, radius, tolerance), Budget::default());
+/// The same by a lattice, which is asked for its topology: that is exact, or not told, however coarse it is, and whether it is simplified or not.
+pub(in crate::dilation) fn on_lattice(attractor: &Attractor, radius: f64, most: f64) -> Dilation {
+    let (plan, budget) = (plan_with(attractor, radius, most.max(0.1 * radius), false), Budget::default());
     let setting = plan.setting(plan.pitch(), &budget);
     plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap()
 }
@@ -158,13 +163,26 @@ pub(super) fn assert_bounds(case: impl Display, inside: &Inside<'_>, dilation: &
     }
 }
 
-/// The distance of a place from triangles.
-pub(super) fn distance_of_triangles(x: DVec3, vertices: &[DVec3], faces: &[Vec<u32>]) -> f64 {
-    let of = |face: &Vec<u32>| {
-        let [a, b, c] = [0, 1, 2].map(|k| vertices[face[k] as usize].to_array());
-        x.distance(DVec3::from_array(closest_on_triangle(&x.to_array(), &a, &b, &c)))
+/// How far places are from triangles: from each of those in a row that is not farther all together than the best so far, as its box tells.
+pub(super) fn distance_of_triangles(vertices: &[DVec3], faces: &[Vec<u32>]) -> impl Fn(DVec3) -> f64 {
+    let corners = |face: &Vec<u32>| [0, 1, 2].map(|k| vertices[face[k] as usize]);
+    let row = |row: &[Vec<u32>]| -> (DVec3, DVec3, Vec<[DVec3; 3]>) {
+        let all: Vec<[DVec3; 3]> = row.iter().map(corners).collect();
+        let [low, high] = [DVec3::min, DVec3::max].map(|most| all.iter().flatten().copied().reduce(most).unwrap_or_default());
+        (low, high, all)
     };
-    faces.iter().map(of).fold(f64::INFINITY, f64::min)
+    let rows: Vec<(DVec3, DVec3, Vec<[DVec3; 3]>)> = faces.chunks(16).map(row).collect();
+    move |x| {
+        let beyond = |low: DVec3, high: DVec3| x.distance(x.clamp(low, high));
+        let nearest = rows.iter().min_by(|a, b| beyond(a.0, a.1).total_cmp(&beyond(b.0, b.1)));
+        nearest.into_iter().chain(&rows).fold(f64::INFINITY, |best, (low, high, all)| {
+            if beyond(*low, *high) > best {
+                return best;
+            }
+            let of = |[a, b, c]: &[DVec3; 3]| closest_on_triangle(&x.to_array(), &a.to_array(), &b.to_array(), &c.to_array());
+            all.iter().map(|corners| x.distance(DVec3::from_array(of(corners)))).fold(best, f64::min)
+        })
+    }
 }
 
 /// What is told of a shape's arrangement, which there is.

@@ -337,13 +337,14 @@ fn panels_keep_their_bounds_and_agree_with_the_lattice() {
         assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
         let inside = Inside::new(dilation.solid.mesh());
         let corners = |face: &Vec<u32>| [0, 1, 2].map(|k| vertices[face[k] as usize]);
+        let distance = distance_of_triangles(&vertices, &faces);
         for _ in 0..300 {
             let face = &faces[(random.next() % faces.len() as u64) as usize];
             let [a, b, c] = corners(face);
             let on = a.lerp(b, number(&mut random)).lerp(c, number(&mut random));
             let away = place(&mut random, 2.0) - DVec3::ONE;
             let x = on + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(&mut random));
-            assert_bounds(round, &inside, &dilation, radius, x, distance_of_triangles(x, &vertices, &faces));
+            assert_bounds(round, &inside, &dilation, radius, x, distance(x));
         }
         let other = on_lattice(&shape, radius, tolerance);
         if dilation.topology_exact && other.topology_exact {
@@ -373,10 +374,10 @@ fn tetrahedra_are_one_body_each() {
         assert_eq!(bodies, count as usize, "{round}");
         let dilation = arranged(&shape, radius, tolerance);
         assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
-        let inside = Inside::new(dilation.solid.mesh());
+        let (inside, distance) = (Inside::new(dilation.solid.mesh()), distance_of_triangles(&vertices, &faces));
         for _ in 0..300 {
             let x = place(&mut random, 11.5) - DVec3::splat(0.7);
-            assert_bounds(round, &inside, &dilation, radius, x, distance_of_triangles(x, &vertices, &faces));
+            assert_bounds(round, &inside, &dilation, radius, x, distance(x));
         }
         let other = on_lattice(&shape, radius, tolerance);
         assert!(dilation.topology_exact && other.topology_exact, "{round}");
@@ -529,12 +530,12 @@ fn fine_rims_are_arranged() {
             let shape = lowered(&vertices, faces.clone());
             let dilation = arranged(&shape, radius, tolerance);
             assert!(dilation.topology_exact && dilation.crossings == 0 && topology(&dilation) == (1, 0, 2), "{count} {share}");
-            let inside = Inside::new(dilation.solid.mesh());
+            let (inside, distance) = (Inside::new(dilation.solid.mesh()), distance_of_triangles(&vertices, &faces));
             for _ in 0..400 {
                 let on = vertices[(random.next() % u64::from(count)) as usize + 1] * number(&mut random).powf(0.3);
                 let away = place(&mut random, 2.0) - DVec3::ONE;
                 let x = on + away.normalize_or_zero() * radius * (0.8 + 0.4 * number(&mut random));
-                assert_bounds(format_args!("{count} {share}"), &inside, &dilation, radius, x, distance_of_triangles(x, &vertices, &faces));
+                assert_bounds(format_args!("{count} {share}"), &inside, &dilation, radius, x, distance(x));
             }
         }
     }

@@ -154,8 +154,8 @@ fn graphs_keep_their_bounds_and_are_balls() {
         let dilation = arranged(&shape, radius, tolerance);
         assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{round}");
         assert_eq!(topology(&dilation), (1, 0, 2), "{round}");
-        let distance = |x: DVec3| distance_of_triangles(x, &vertices, &faces);
-        assert!(holds_everywhere(&dilation, radius, distance, &mut random), "{round}");
+        let distance = distance_of_triangles(&vertices, &faces);
+        assert!(holds_everywhere(&dilation, radius, &distance, &mut random), "{round}");
         let inside = Inside::new(dilation.solid.mesh());
         for _ in 0..200 {
             let x = DVec3::from_array(std::array::from_fn(|_| 22.0 * random.share() - 6.0));
@@ -447,7 +447,7 @@ fn graphs_anywhere_are_made_and_copies_are_put() {
         let shape = lowered(&vertices, faces.clone());
         assert!(is_flat(&shape, 2.1, 0.2));
         let made = arranged(&shape, 2.1, 0.2);
-        assert!(made.topology_exact && holds_everywhere(&made, 2.1, |x| distance_of_triangles(x, &vertices, &faces), &mut Random(1)));
+        assert!(made.topology_exact && holds_everywhere(&made, 2.1, distance_of_triangles(&vertices, &faces), &mut Random(1)));
         topology(&made)
     };
     // About all axes, where zeros have signs, and far from them.

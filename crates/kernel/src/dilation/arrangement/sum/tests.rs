@@ -171,8 +171,8 @@ fn walls_keep_their_bounds_and_agree_with_the_lattice() {
         made += 1;
         let dilation = arranged(&shape, radius, tolerance);
         assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
-        let distance = |x: DVec3| distance_of_triangles(x, &walls.vertices, &walls.faces);
-        assert!(holds_everywhere(&dilation, radius, distance, &mut random), "{case}");
+        let distance = distance_of_triangles(&walls.vertices, &walls.faces);
+        assert!(holds_everywhere(&dilation, radius, &distance, &mut random), "{case}");
         let inside = Inside::new(dilation.solid.mesh());
         for _ in 0..300 {
             let face = &walls.faces[random.next() as usize % walls.faces.len()];
