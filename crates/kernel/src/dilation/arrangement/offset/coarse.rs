@@ -1,6 +1,6 @@
 //! Fewer triangles for a surface: such that its sheets, as far out as the radius, follow it.
 
-use super::seams::Hidden;
+use super::seams::{Corner, Hidden, Valleys};
 use super::skin::Skin;
 use crate::attractor::cell::{Point, between, cross, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
@@ -29,8 +29,8 @@ const IN_A_ROW: u32 = 256;
 pub(super) struct Coarse<'a> {
     skin: &'a Skin,
     hidden: &'a Hidden,
-    /// How far out the sheets are, and the cosine of the angle by which the border turns at most at vertices that may go.
-    radius: f64,
+    tops: Tops<'a>,
+    /// The cosine of the angle by which the border turns at most at vertices that may go.
     turn: f64,
     /// The least height of a triangle that may come to be, as a share of its longest side, unless one was as low before; and how long sides may be that go, as a share of the longest one around a vertex.
     height: f64,
@@ -48,17 +48,39 @@ pub(super) struct Coarse<'a> {
     lengths: Vec<(f64, usize)>,
 }
 
+/// Where sheets as far out as the radius are over vertices: along the normals, or where those of parts meet, if that is told. Then they need not go by what is hidden.
+struct Tops<'a> {
+    skin: &'a Skin,
+    valleys: Option<&'a Valleys>,
+    radius: f64,
+}
+
 /// What may come to be: a triangle, or a side of the border.
 enum Fresh {
     Triangle(Triangle),
     Side(Side),
 }
 
+impl Tops<'_> {
+    /// The place over a vertex on a side, and the normal.
+    fn over(&self, corner: Corner) -> (Point, Point) {
+        let Self { skin, valleys, radius } = self;
+        let (at, up) = (&skin.places[corner.0 as usize], skin.up(corner));
+        let valleys = if skin.is_border(corner.0) { *valleys } else { None };
+        let valley = |valleys: &'_ Valleys| valleys[*skin.seams.ring_of.get(&corner)?];
+        let top = match valleys.and_then(valley) {
+            Some(valley) => lifted(at, &valley, 1.0),
+            None => lifted(at, &up, *radius),
+        };
+        (top, up)
+    }
+}
+
 impl Fresh {
-    fn new(skin: &Skin, radius: f64, height: f64, corners: [u32; 3]) -> Option<Self> {
-        match corners.iter().position(|&corner| corner == skin.beyond()) {
-            None => Triangle::new(skin, radius, height, corners).map(Self::Triangle),
-            Some(k) => Side::new(skin, radius, [corners[(k + 2) % 3], corners[(k + 1) % 3]]).map(Self::Side),
+    fn new(tops: &Tops<'_>, height: f64, corners: [u32; 3]) -> Option<Self> {
+        match corners.iter().position(|&corner| corner == tops.skin.beyond()) {
+            None => Triangle::new(tops, height, corners).map(Self::Triangle),
+            Some(k) => Side::new(tops, [corners[(k + 2) % 3], corners[(k + 1) % 3]]).map(Self::Side),
         }
     }
 
@@ -72,10 +94,10 @@ impl Fresh {
         }
     }
 
-    fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
+    fn error(&self, tops: &Tops<'_>, is_open: impl Fn(Corner) -> bool, vertex: u32) -> f64 {
         match self {
-            Self::Triangle(own) => own.error(skin, radius, vertex),
-            Self::Side(own) => own.error(skin, radius, vertex),
+            Self::Triangle(own) => own.error(tops, is_open, vertex),
+            Self::Side(own) => own.error(tops, is_open, vertex),
         }
     }
 
@@ -94,63 +116,62 @@ impl Fresh {
     }
 }
 
-/// A side of the border: its ends, with the normal and the way out there, and how far it is off a strip that turns evenly.
+/// A side of the border: its ends, and the ends of the strip over it: on the sides of the surface, and beyond the border. How far it is off a strip that turns evenly.
 struct Side {
     ends: [Point; 2],
-    ways: [[Point; 2]; 2],
     along: Point,
+    /// The normal at the first end.
+    up: Point,
+    strips: [[Point; 2]; 3],
     is_seam: bool,
     sag: f64,
 }
 
 impl Side {
     /// None where both ends are hardly alike.
-    fn new(skin: &Skin, radius: f64, ends: [u32; 2]) -> Option<Self> {
-        let places = ends.map(|end| skin.places[end as usize]);
-        let mut ways = ends.map(|end| [skin.ups[end as usize], skin.outs[end as usize]]);
-        if dot(&ways[0][0], &ways[1][0]) < 0.0 {
-            ways[1][0] = ways[1][0].map(|part| -part);
-        }
+    fn new(tops: &Tops<'_>, ends: [u32; 2]) -> Option<Self> {
+        let skin = tops.skin;
+        let [up, other] = ends.map(|end| skin.ups[end as usize]);
+        let is_turned = dot(&up, &other) < 0.0;
         // Along seams there are sheets alone.
         let is_seam = ends.iter().all(|&end| skin.seams.copies(end).is_some());
-        if is_seam {
-            ways.iter_mut().for_each(|own| own[1] = own[0]);
-        }
-        if (0..2).any(|k| dot(&ways[0][k], &ways[1][k]) < LEAST_COSINE) {
+        let outs = ends.map(|end| skin.outs[end as usize]);
+        if dot(&up, &other).abs() < LEAST_COSINE || (!is_seam && dot(&outs[0], &outs[1]) < LEAST_COSINE) {
             return None;
         }
-        let way = subtract(&places[1], &places[0]);
-        let bend = |k: usize, side: f64| {
-            let turned = subtract(&ways[1][k], &ways[0][k]);
-            dot(&lifted(&way, &turned, side), &turned).abs() / 8.0
-        };
-        let up = skin.sides.iter().map(|side| bend(0, side * radius)).fold(0.0, f64::max);
-        Some(Self { ends: places, ways, along: unit(&way), is_seam, sag: up.max(bend(1, radius)) / STRIP })
+        let places = ends.map(|end| skin.places[end as usize]);
+        let (mut strips, mut sag) = ([[[0.0; 3]; 2]; 3], 0.0_f64);
+        let beyond = [0, 1].map(|k| (lifted(&places[k], &outs[k], tops.radius), outs[k]));
+        let over = |side: &f64| [(ends[0], *side > 0.0), (ends[1], (*side > 0.0) != is_turned)].map(|corner| tops.over(corner));
+        let all = skin.sides.iter().map(over).chain((!is_seam).then_some(beyond));
+        for (strip, [(from, up), (to, other)]) in strips.iter_mut().zip(all) {
+            *strip = [from, to];
+            sag = sag.max(dot(&subtract(&to, &from), &subtract(&other, &up)).abs() / 8.0);
+        }
+        Some(Self { ends: places, along: unit(&subtract(&places[1], &places[0])), up, strips, is_seam, sag: sag / STRIP })
     }
 
-    /// How far a vertex is off the side, as far out as the radius along the normals and the way out.
-    fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
+    /// How far a vertex is off the strips that go by it, over the side and beyond it.
+    fn error(&self, tops: &Tops<'_>, is_open: impl Fn(Corner) -> bool, vertex: u32) -> f64 {
+        let skin = tops.skin;
         let x = &skin.places[vertex as usize];
         let way = subtract(&self.ends[1], &self.ends[0]);
         let share = dot(&subtract(x, &self.ends[0]), &self.along) / dot(&way, &self.along);
-        let off = subtract(x, &between(&self.ends[0], &self.ends[1], share));
-        let up = skin.ups[vertex as usize];
-        let own = [up, if self.is_seam { up } else { skin.outs[vertex as usize] }];
-        let turned = |k: usize| {
-            let mean = between(&self.ways[0][k], &self.ways[1][k], share);
-            let sign = if dot(&mean, &own[k]) < 0.0 { -1.0 } else { 1.0 };
-            std::array::from_fn(|axis| sign * own[k][axis] - mean[axis])
+        let is_turned = dot(&skin.ups[vertex as usize], &self.up) < 0.0;
+        let over = |side: &f64| {
+            let corner = (vertex, (*side > 0.0) != is_turned);
+            is_open(corner).then(|| tops.over(corner).0)
         };
-        let across = |by: &Point, side: f64| {
-            let all = lifted(&off, by, side);
-            (dot(&all, &all) - dot(&all, &self.along).powi(2)).max(0.0).sqrt()
+        let beyond = (!self.is_seam).then(|| Some(lifted(x, &skin.outs[vertex as usize], tops.radius)));
+        let across = |(own, [from, to]): (Option<Point>, &[Point; 2])| {
+            let off = own.map_or([0.0; 3], |own| subtract(&own, &between(from, to, share)));
+            (dot(&off, &off) - dot(&off, &self.along).powi(2)).max(0.0).sqrt()
         };
-        let [up, out] = [turned(0), turned(1)];
-        skin.sides.iter().map(|side| across(&up, side * radius)).fold(across(&out, radius), f64::max) / STRIP
+        skin.sides.iter().map(over).chain(beyond).zip(&self.strips).map(across).fold(0.0, f64::max) / STRIP
     }
 }
 
-/// A triangle: its corners as places on it and as far out on its sides, with the normals there, and how far sides are off sheets that turn evenly.
+/// A triangle: its corners as places on it, and of its sheets a place and the normal, and how far sides are off sheets that turn evenly.
 struct Triangle {
     corners: [Point; 3],
     normal: Point,
@@ -162,7 +183,8 @@ struct Triangle {
 
 impl Triangle {
     /// None where it is a sliver, lower than a share of its longest side, or leans from its corners' normals.
-    fn new(skin: &Skin, radius: f64, height: f64, corners: [u32; 3]) -> Option<Self> {
+    fn new(tops: &Tops<'_>, height: f64, corners: [u32; 3]) -> Option<Self> {
+        let skin = tops.skin;
         let places = corners.map(|corner| skin.places[corner as usize]);
         let across = |[a, b, c]: &[Point; 3]| cross(&subtract(b, a), &subtract(c, a));
         let raw = across(&places);
@@ -178,9 +200,9 @@ impl Triangle {
         }
         let mut sheets = [([0.0; 3], [0.0; 3]); 2];
         let (mut sag, mut is_inverted) = (0.0_f64, [false; 2]);
-        let ups: [Point; 3] = std::array::from_fn(|k| skin.ups[corners[k] as usize].map(|part| part * cosines[k].signum()));
         for ((sheet, is_inverted), side) in sheets.iter_mut().zip(&mut is_inverted).zip(skin.sides) {
-            let out: [Point; 3] = std::array::from_fn(|k| lifted(&places[k], &ups[k], side * radius));
+            let over: [(Point, Point); 3] = std::array::from_fn(|k| tops.over((corners[k], side * cosines[k] > 0.0)));
+            let out = over.map(|own| own.0);
             let own = unit(&across(&out));
             let cosine = dot(&own, &normal);
             *is_inverted = cosine < LEAST_COSINE;
@@ -188,10 +210,9 @@ impl Triangle {
             if cosine < 0.0 {
                 continue;
             }
-            // Of a curve with these normals at its ends.
-            for k in 0..3 {
-                let next = (k + 1) % 3;
-                sag = sag.max(dot(&subtract(&out[next], &out[k]), &subtract(&ups[next], &ups[k])).abs() / 8.0);
+            // Of a curve with these normals at its ends, or about these where parts meet.
+            for ((from, up), (to, other)) in (0..3).map(|k| (over[k], over[(k + 1) % 3])) {
+                sag = sag.max(dot(&subtract(&to, &from), &subtract(&other, &up)).abs() / 8.0);
             }
         }
         Some(Self { corners: places, normal, sheets, sag, is_inverted })
@@ -207,15 +228,16 @@ impl Triangle {
         all.iter().fold(f64::INFINITY, |least, &own| least.min(own)) / all.iter().sum::<f64>()
     }
 
-    /// How far a vertex is off the sheets.
-    fn error(&self, skin: &Skin, radius: f64, vertex: u32) -> f64 {
-        let (x, up) = (&skin.places[vertex as usize], &skin.ups[vertex as usize]);
-        let own = radius.copysign(dot(&self.normal, up));
+    /// How far a vertex is off the sheets that go by it.
+    fn error(&self, tops: &Tops<'_>, is_open: impl Fn(Corner) -> bool, vertex: u32) -> f64 {
+        let above = dot(&self.normal, &tops.skin.ups[vertex as usize]);
         // Sheets that look the other way are cut away.
-        let off = |(at, normal): &(Point, Point), side: f64| {
-            if dot(normal, &self.normal) < 0.0 { 0.0 } else { dot(normal, &subtract(&lifted(x, up, side * own), at)).abs() }
+        let off = |((at, normal), side): (&(Point, Point), &f64)| {
+            let corner = (vertex, side * above > 0.0);
+            let goes_by = dot(normal, &self.normal) >= 0.0 && is_open(corner);
+            if goes_by { dot(normal, &subtract(&tops.over(corner).0, at)).abs() } else { 0.0 }
         };
-        self.sheets.iter().zip(skin.sides).map(|(sheet, &side)| off(sheet, side)).fold(0.0, f64::max)
+        self.sheets.iter().zip(tops.skin.sides).map(off).fold(0.0, f64::max)
     }
 }
 
@@ -225,19 +247,20 @@ pub(super) fn lifted(x: &Point, up: &Point, by: f64) -> Point {
 }
 
 impl<'a> Coarse<'a> {
-    pub(super) fn new(skin: &'a Skin, hidden: &'a Hidden, radius: f64, turn: f64) -> Self {
+    pub(super) fn new(skin: &'a Skin, valleys: Option<&'a Valleys>, hidden: &'a Hidden, radius: f64, turn: f64) -> Self {
         let mesh = skin.mesh.clone();
         let mut mender = Mender::default();
         mender.start(&mesh);
         let count = mesh.triangles() as usize;
-        let is_inverted = |&corners: &[u32; 3]| Triangle::new(skin, radius, 0.0, corners).map_or([false; 2], |own| own.is_inverted);
+        let tops = Tops { skin, valleys, radius };
+        let is_inverted = |&corners: &[u32; 3]| Triangle::new(&tops, 0.0, corners).map_or([false; 2], |own| own.is_inverted);
         let mut inverted: Vec<[bool; 2]> = skin.triangles.iter().map(is_inverted).collect();
         inverted.resize(count, [false; 2]);
         let (fresh, normals, heights, lengths) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self {
             skin,
             hidden,
-            radius,
+            tops,
             turn,
             height: LEAST_HEIGHT,
             short: 1.0,
@@ -371,7 +394,7 @@ impl<'a> Coarse<'a> {
         lengths.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         if to_seams {
             // Joined to each other they would be in each other's way.
-            lengths.retain(|&(_, m)| ring[m] == skin.beyond() || !hidden.is_hidden[ring[m] as usize]);
+            lengths.retain(|&(_, m)| ring[m] == skin.beyond() || !hidden.is_so(ring[m]));
             lengths.sort_by_key(|&(_, m)| skin.seams.copies(ring[m]).is_none());
         }
         true
@@ -379,16 +402,16 @@ impl<'a> Coarse<'a> {
 
     /// Whether the star's vertex may move to ring m.
     fn serves(&mut self, m: usize, share: f64, most: &[f64]) -> bool {
-        let Self { skin, hidden, radius, height, mender, inverted, removed, fresh, normals, heights, .. } = self;
+        let Self { skin, hidden, tops, height, mender, inverted, removed, fresh, normals, heights, .. } = self;
         let ring = &mender.star.ring;
         let count = ring.len();
         fresh.clear();
         for k in kept(Some(m), count) {
             let corners = [ring[m], ring[k], ring[(k + 1) % count]];
-            let Some(own) = Fresh::new(skin, *radius, height.min(heights[k]), corners) else { return false };
+            let Some(own) = Fresh::new(tops, height.min(heights[k]), corners) else { return false };
             let is_turned = matches!(&own, Fresh::Triangle(own) if dot(&own.normal, &normals[k]) <= 0.0);
             // What has a hidden corner will not be left as it is.
-            let has_hidden = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_hidden[corner as usize]);
+            let has_hidden = corners.iter().any(|&corner| corner != skin.beyond() && hidden.is_so(corner));
             let before = inverted[(mender.star.halves[k] / 3) as usize];
             let is_new = (0..2).any(|side| own.is_inverted()[side] && !before[side]);
             if is_turned || (is_new && !has_hidden) {
@@ -401,13 +424,14 @@ impl<'a> Coarse<'a> {
             fresh.push((own, has_hidden));
         }
         let Removed { around, owners, .. } = removed;
+        let is_open = |corner: Corner| tops.valleys.is_none() || !hidden.is_over(corner);
         owners.clear();
         around.iter().all(|&vertex| {
             let depths = fresh.iter().map(|(own, _)| own.depth(skin, vertex)).enumerate();
             let Some((owner, _)) = depths.max_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
             owners.push(owner);
             let (own, has_hidden) = &fresh[owner];
-            *has_hidden || own.error(skin, *radius, vertex) <= share * most[vertex as usize]
+            *has_hidden || own.error(tops, is_open, vertex) <= share * most[vertex as usize]
         })
     }
 

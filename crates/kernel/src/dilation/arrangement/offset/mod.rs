@@ -3,7 +3,7 @@
 //! Around solids that do not meet themselves there is the sheet outside alone, and all that is said here of places is said of those outside, unless that one does not come out; closed surfaces whose seams leave no triangles for both sides are made of two such, one around what is outside of them. At seams the surface is taken apart (`seams`). On the side where there is room between the sheets of both parts, strips as around borders join them; where they would cross each other, what the parts hide of each other is left out, and the sheets have their corners in common there.
 //!
 //! Let S be the union of the faces, and d the distance from it, with s < r < t the ends of the band and the radius. Fewer triangles T stand for S (`coarse`). Their corners, moved by r along the normals there to either side, are the corners of two sheets; corners on the border
-//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What cuts leave of folds is closed by moving vertices to neighbours. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
+//! are moved in all directions away from S, too (`sheets`). Where noise turns normals so that sheets fold there, these are evened; where the surface bends by more than the radius they do so anyway, and what they hide of themselves is cut away. What cuts leave of folds is closed by moving vertices to neighbours, or made anew with finer triangles. What is left bounds a solid M. Nothing of how it was made is taken on trust. Shown are:
 //!
 //! * Each way from a place of the sheets to the place with the same shares in the feet of its corners has d <= t - m (`faces`). These ways fill the cells between the triangles and the T, or the border, whose boundaries add up to that of the sheets: where no cell is, these wind around nothing. A sheet outside alone winds there as the T do (`inward`). Where sheets cross each other they are cut (`crossed`), and M is what they wind around once or more: so M is in D_t(S), as what cuts, mending and rounding move is moved by less than m.
 //!   So is what else is added: closed parts that are filled, and lids (`lids`) over places where sheets are too near, look back, or touch, each with a place inside such that what is between that and the lid has d <= t - m; and what is between slivers, or folds, and what they become (`tidy`).
@@ -67,14 +67,18 @@ const ROUNDS: u32 = 10;
 const FINER: f64 = 0.25;
 /// Rounds in which strips that are too near are left to finer ones.
 const ROUNDS_OF_STRIPS: u32 = 4;
-/// Rounds in which normals are evened where what is left of sheets looks back, the first before folds are closed and lids are tried, the second where these do not help, and by how many times fewer triangles are not as they have to be after each round of these at least.
+/// Rounds in which normals are evened where what is left of sheets looks back, the first before folds are closed where noise turns them, others where lids do not help, and by how many times fewer triangles are not as they have to be after each round of these at least.
 const EVENINGS: usize = 2;
 const FEWER: usize = 2;
-/// Of so many triangles one may be covered by lids, and one may be folded before.
+/// Of so many triangles one may be covered by lids, one may be folded before, and more are where noise turns normals.
 const SPARSE: usize = 8;
 const FOLDED: usize = 4;
-/// By what share of half the band vertices are shaken, so that triangles do not touch each other.
+const NOISY: usize = 64;
+/// How many times what is left of folds, where it is less than that, is made anew with finer triangles.
+const TANGLES: usize = 4;
+/// By what share of half the band vertices are shaken, so that triangles do not touch each other, and how often.
 const SHAKEN: f64 = 0.01;
+const SHAKES: u64 = 3;
 /// What is cut, mended and rounded is off by so many roundings at most, all in all.
 const MOVED: f64 = 128.0;
 /// Triangles one after the other.
@@ -223,11 +227,6 @@ fn along(
     let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
     budget.cancel.check()?;
     let ways = Ways::new(skin, faces, [inner, outer]);
-    let (off, reach) = (setting.off + setting.slack, setting.reach);
-    let is_steady = setting.off > 0.0 && inner <= reach - off && reach + 2.0 * off <= outer && ways.lead_out(off, budget)?;
-    if !is_steady && !ways.lead_out(0.0, budget)? {
-        return Ok(ControlFlow::Continue(()));
-    }
     let at = |share: f64| radius + share * half;
     let Some(valleys) = skin.seams.valleys(skin, radius) else {
         return Ok(ControlFlow::Continue(()));
@@ -240,19 +239,39 @@ fn along(
     let (mut most, mut good) = (first.clone(), HashSet::new());
     // With other normals, if these are needed: what is shown of the surface does not know them.
     let mut evened: Option<Skin> = None;
-    let (mut round_number, mut evenings, mut has_lids, mut may_move_before) = (0, 0, false, false);
-    let mut made_before = None;
+    let (mut round_number, mut evenings, mut tangles) = (0, 0, 0);
+    let (mut by_valleys, mut has_lids, mut may_move_before) = (false, false, false);
+    let (mut made_before, mut tangled_before) = (None, None);
+    // Takes longer than a round where it is so, and not long where it is not: asked first if nothing may be in the way of rounds.
+    let mut steadiness = None;
+    if hidden.all.is_empty() {
+        steadiness = ways.steadiness(setting, budget)?;
+        if steadiness.is_none() {
+            return Ok(ControlFlow::Continue(()));
+        }
+    }
     'rounds: while round_number < ROUNDS {
         let own = evened.as_ref().unwrap_or(skin);
-        let mut coarse = Coarse::new(own, &hidden, radius, column.cos());
+        let mut coarse = Coarse::new(own, by_valleys.then_some(&valleys), &hidden, radius, column.cos());
         if !coarse.run(&first, &most, budget)? {
-            return Ok(ControlFlow::Continue(()));
+            if by_valleys || valleys.iter().all(Option::is_none) {
+                return Ok(ControlFlow::Continue(()));
+            }
+            // Over what is hidden sheets along the normals are too far off.
+            by_valleys = true;
+            continue;
+        }
+        if steadiness.is_none() {
+            steadiness = ways.steadiness(setting, budget)?;
+            if steadiness.is_none() {
+                return Ok(ControlFlow::Continue(()));
+            }
         }
         let (names, left) = coarse.triangles();
         let share = 1.0 + FINER * f64::from(round_number);
         let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
         let expected = shape.triangles(own, &left);
-        if expected > 2.0 * budget.limits.triangles as f64 {
+        if expected > 2.0 * budget.limits.triangles as f64 && !by_valleys {
             return Ok(ControlFlow::Break(Some(Flat::Beyond(expected))));
         }
         if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
@@ -261,14 +280,18 @@ fn along(
         let Some(mut sheets) = Sheets::new(own, &valleys, &left, &shape, round) else {
             return Ok(ControlFlow::Continue(()));
         };
-        let mut pieces = Pieces::of(&sheets, skin, round, budget)?;
-        if pieces.is_none() {
+        let (unshaken, mut shakes) = (sheets.vertices.clone(), 0);
+        let mut pieces = loop {
+            if let Some(pieces) = Pieces::of(&sheets, skin, round, budget)? {
+                break pieces;
+            }
+            if shakes == SHAKES {
+                return Ok(ControlFlow::Continue(()));
+            }
             // Triangles touch each other.
-            sheets.shake(SHAKEN * half, round);
-            pieces = Pieces::of(&sheets, skin, round, budget)?;
-        }
-        let Some(mut pieces) = pieces else {
-            return Ok(ControlFlow::Continue(()));
+            sheets.vertices.clone_from(&unshaken);
+            sheets.shake(shakes, SHAKEN * half, round);
+            shakes += 1;
         };
         pieces.fill(|part| around.is_filled(part, budget))?;
         // What is cut is not exactly where it is said to be.
@@ -283,12 +306,19 @@ fn along(
         let is_strip = |fault: &(u32, bool)| sheets.owners[fault.0 as usize] == NONE;
         let has_finer_strips = round_number < ROUNDS_OF_STRIPS && faults.iter().any(is_strip);
         let may_go_on = round_number + 1 < ROUNDS && (is_finer || has_finer_strips);
+        if by_valleys && !may_go_on && !faults.is_empty() {
+            return Ok(ControlFlow::Continue(()));
+        }
         let is_stalled = !may_go_on && faults.iter().all(|fault| fault.1);
         made_before = Some(left.len());
+        good = pieces.good(&sheets, &faults);
         if faults.is_empty() || is_stalled {
             let mut outcome = Outcome::new(&sheets, pieces, &faults);
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
-            let (bent, is_first) = (around.feet(outcome.feet(&flaws.not_left)), evenings == 0);
+            let bent = around.feet(outcome.feet(&flaws.not_left));
+            // Noise folds sheets all over, bends do in some places.
+            let was_evened = evenings > 0;
+            let is_noise = !was_evened && NOISY * flaws.count() > outcome.surface.triangles.len();
             let mut even = |most: &mut [f64]| {
                 if bent.is_empty() || evenings == EVENINGS {
                     return false;
@@ -303,7 +333,7 @@ fn along(
                 is_changed
             };
             // Sheets with other normals have fewer triangles than those with lids.
-            if is_first && even(&mut most) {
+            if is_noise && even(&mut most) {
                 continue;
             }
             let mut before = usize::MAX;
@@ -322,23 +352,35 @@ fn along(
                 flaws = outcome.flaws(around, &ways, setting, budget)?;
             }
             if !flaws.is_none() {
+                if was_evened && even(&mut most) {
+                    continue;
+                }
+                let is_sparse = NOISY * flaws.count() <= outcome.surface.triangles.len();
+                if is_sparse && flaws.off.is_empty() && tangles < TANGLES && tangled_before.replace(left.len()) != Some(left.len()) {
+                    // What is left of some folds may be another tangle with finer triangles.
+                    let near = outcome.places(&flaws).into_iter().filter_map(|x| around.closest(&x));
+                    let feet = near.flat_map(|(face, _)| skin.triangles[face as usize]).collect();
+                    around.feet(feet).into_iter().for_each(|foot| most[foot as usize] *= 0.5);
+                    made_before = None;
+                    tangles += 1;
+                    continue;
+                }
                 if even(&mut most) {
                     continue;
                 }
-                return Ok(ControlFlow::Break(None));
+                return Ok(if by_valleys { ControlFlow::Continue(()) } else { ControlFlow::Break(None) });
             }
             if outcome.off > moved {
-                return Ok(ControlFlow::Break(None));
+                return Ok(if by_valleys { ControlFlow::Continue(()) } else { ControlFlow::Break(None) });
             }
             if skin.sides == OUTER && !around.wind_inside(&left, budget)? {
                 return Ok(ControlFlow::Continue(()));
             }
             let mut surface = outcome.surface;
             let is_shown = is_embedded(&mut surface, budget)? && holds(&surface, skin);
-            let made = if is_steady { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) };
+            let made = if steadiness == Some(true) { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) };
             return Ok(if is_shown { ControlFlow::Break(Some(made)) } else { ControlFlow::Continue(()) });
         }
-        good = pieces.good(&sheets, &faults);
         for (fault, _) in faults {
             let owner = sheets.owners[fault as usize];
             if owner == NONE {

@@ -6,7 +6,7 @@ use super::ways::Ways;
 use super::{Around, FEWER, IN_A_ROW};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
-use crate::dilation::arrangement::between::Memory;
+use crate::dilation::arrangement::between::{Memory, middle};
 use crate::dilation::arrangement::faces::numbered;
 use crate::dilation::setting::Setting;
 use crate::dilation::surface::{BlockSurface, NameMap};
@@ -38,7 +38,7 @@ pub(super) struct Outcome {
 /// What is not as it has to be: triangles that are nearer or farther, those that look back, those at vertices whose triangles are no single ring, and those at which no way out is found.
 #[derive(Default)]
 pub(super) struct Flaws {
-    off: Vec<u32>,
+    pub(super) off: Vec<u32>,
     back: Vec<u32>,
     pinched: Vec<u32>,
     pub(super) not_left: Vec<u32>,
@@ -79,6 +79,11 @@ impl Outcome {
     pub(super) fn feet(&self, triangles: &[u32]) -> BTreeSet<u32> {
         let corners = triangles.iter().flat_map(|&triangle| self.surface.corners(triangle));
         corners.filter_map(|corner| self.from.get(&corner.map(f64::to_bits))).map(|own| own.0).collect()
+    }
+
+    /// The middles of what is not as it has to be.
+    pub(super) fn places(&self, flaws: &Flaws) -> Vec<Point> {
+        flaws.triangles().into_iter().map(|triangle| middle(&self.surface.corners(triangle))).collect()
     }
 
     /// Mends it, if it was cut, and looks for what is not as it has to be.

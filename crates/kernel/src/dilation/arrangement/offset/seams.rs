@@ -54,9 +54,9 @@ pub(super) struct Seams {
     pub(super) ring_of: NameMap<Corner, usize>,
 }
 
-/// The vertices that must not be left, as other parts hide what is over them: which these are, and all of them, those first that are close to seams.
+/// The vertices that must not be left, as other parts hide what is over them: on which sides these are hidden, below and above, and all of them, those first that are close to seams.
 pub(super) struct Hidden {
-    pub(super) is_hidden: Vec<bool>,
+    is_hidden: Vec<[bool; 2]>,
     pub(super) all: Vec<u32>,
 }
 
@@ -219,7 +219,7 @@ impl Skin {
 
     /// What other parts hide, as far out as the radius, from one of the sides. Cost: some microseconds for each vertex near to seams.
     pub(super) fn hidden(&self, valleys: &Valleys, faces: &Faces, radius: f64, half: f64) -> Hidden {
-        let mut hidden = Hidden { is_hidden: vec![false; self.places.len()], all: Vec::new() };
+        let mut hidden = Hidden { is_hidden: vec![[false; 2]; self.places.len()], all: Vec::new() };
         let is_near = |x: &Point, least: f64| {
             let mut found = false;
             faces.around(std::slice::from_ref(x), least, |face| {
@@ -238,7 +238,7 @@ impl Skin {
             for &(vertex, is_up) in &ring.corners {
                 is_seen[vertex as usize] = true;
                 if is_hidden {
-                    hidden.add(vertex);
+                    hidden.add((vertex, is_up));
                 }
                 let beside = subtract(valley, &self.up((vertex, is_up)).map(|part| radius * part));
                 open.push_back((vertex, at, WIDE * WIDE * dot(&beside, &beside)));
@@ -252,9 +252,10 @@ impl Skin {
                     continue;
                 }
                 is_seen[other as usize] = true;
-                let is_over = |is_up: bool| is_near(&lifted(place, &self.up((other, is_up)), far), far - NEARER * half);
-                if self.sides.iter().map(|&side| side > 0.0).any(is_over) {
-                    hidden.add(other);
+                for corner in self.sides.iter().map(|&side| (other, side > 0.0)) {
+                    if is_near(&lifted(place, &self.up(corner), far), far - NEARER * half) {
+                        hidden.add(corner);
+                    }
                 }
                 open.push_back((other, at, wide));
             }
@@ -264,10 +265,21 @@ impl Skin {
 }
 
 impl Hidden {
-    fn add(&mut self, vertex: u32) {
-        if !std::mem::replace(&mut self.is_hidden[vertex as usize], true) {
+    fn add(&mut self, (vertex, is_up): Corner) {
+        if !self.is_so(vertex) {
             self.all.push(vertex);
         }
+        self.is_hidden[vertex as usize][usize::from(is_up)] = true;
+    }
+
+    /// Whether a vertex is hidden on a side.
+    pub(super) fn is_so(&self, vertex: u32) -> bool {
+        self.is_hidden[vertex as usize].contains(&true)
+    }
+
+    /// Whether one is on this side.
+    pub(super) fn is_over(&self, (vertex, is_up): Corner) -> bool {
+        self.is_hidden[vertex as usize][usize::from(is_up)]
     }
 }
 

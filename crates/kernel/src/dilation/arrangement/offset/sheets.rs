@@ -346,8 +346,8 @@ impl Sheets {
     }
 
     /// Moves all vertices by as much along each axis at most, so that none is on a plane or a line of others.
-    pub(super) fn shake(&mut self, most: f64, round: impl Fn(f64) -> f64) {
-        let mut random = Random(0);
+    pub(super) fn shake(&mut self, seed: u64, most: f64, round: impl Fn(f64) -> f64) {
+        let mut random = Random(seed);
         self.vertices.iter_mut().for_each(|vertex| *vertex = shaken(vertex, most, &mut random).map(&round));
     }
 

@@ -9,6 +9,7 @@ use crate::dilation::arrangement::between::{Body, lowest, middle};
 use crate::dilation::arrangement::faces::{Face, Faces};
 use crate::dilation::arrangement::polytopes::frame;
 use crate::dilation::convex::Convex;
+use crate::dilation::setting::Setting;
 use crate::dilation::surface::BlockSurface;
 use crate::solid::half_edges::{HalfEdges, NONE};
 use crate::solid::topology::Incidence;
@@ -95,11 +96,24 @@ impl<'a> Ways<'a> {
         })
     }
 
-    /// Whether that is so of all places that are between both distances from the surface, each along some direction, and lower by so much more.
+    /// Whether ways lead out of all places between both distances by as much as tells the topology of the shape that the surface stands for, too; none where they do not lead out.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn lead_out(&self, more: f64, budget: &Budget) -> Result<bool, Stopped> {
+    pub(super) fn steadiness(&self, setting: &Setting, budget: &Budget) -> Result<Option<bool>, Stopped> {
+        let (off, reach) = (setting.off + setting.slack, setting.reach);
+        let may_be_steady = setting.off > 0.0 && self.inner <= reach - off && reach + 2.0 * off <= self.outer;
+        if may_be_steady && self.lead_out(off, budget)? {
+            return Ok(Some(true));
+        }
+        Ok(self.lead_out(0.0, budget)?.then_some(false))
+    }
+
+    /// Whether all faces that are as near to some place between both distances from the surface are left behind along a direction there, and lower by so much more.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    fn lead_out(&self, more: f64, budget: &Budget) -> Result<bool, Stopped> {
         let ways = Self { more, ..*self };
         let Self { skin, faces, .. } = &ways;
         let (groups, cones) = (faces.groups(), cones());
