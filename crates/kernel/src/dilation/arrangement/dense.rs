@@ -63,8 +63,8 @@ pub(in crate::dilation) fn is_thin(setting: &Setting) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::testing::{
-        arranged, arranged_unless_left, assert_limited, assert_steady, centres, holds_everywhere, is_flat, on_lattice, points, system,
-        topology,
+        arranged, arranged_unless_left, assert_limited, assert_steady, centres, holds_everywhere, is_flat, on_coarse_lattice, points,
+        system, topology,
     };
     use crate::attractor::Attractor;
     use crate::attractor::cell::{Cell, ControlPoint, distance_squared};
@@ -153,7 +153,7 @@ mod tests {
             // By the centres of small balls, out of the plane.
             let Some(centres) = centres(&shape, 0.02 * radius, 400).filter(|_| made.topology_exact) else { continue };
             let centres: Vec<DVec3> = centres.into_iter().map(|at| turned * at).collect();
-            let other = on_lattice(&points(&centres), radius, 0.1 * radius);
+            let other = on_coarse_lattice(&points(&centres), radius, 0.1 * radius);
             if other.topology_exact {
                 assert_eq!(topology(&made), topology(&other), "{round}");
                 compared += 1;

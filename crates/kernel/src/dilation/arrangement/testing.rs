@@ -89,9 +89,17 @@ pub(super) fn arranged(attractor: &Attractor, radius: f64, tolerance: f64) -> Di
     arranged_unless_left(attractor, radius, tolerance).expect("there are few sites near each other")
 }
 
-/// The same by a lattice, which is asked for its topology: that is exact, or not told, however coarse it is, and whether it is simplified or not.
-pub(in crate::dilation) fn on_lattice(attractor: &Attractor, radius: f64, most: f64) -> Dilation {
-    let (plan, budget) = (plan_with(attractor, radius, most.max(0.1 * radius), false), Budget::default());
+pub(in crate::dilation) fn on_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+    run_on_lattice(&plan(attractor, radius, tolerance))
+}
+
+/// The same for its topology alone: that is exact, or not told, however coarse it is, and whether it is simplified or not.
+pub(in crate::dilation) fn on_coarse_lattice(attractor: &Attractor, radius: f64, tolerance: f64) -> Dilation {
+    run_on_lattice(&plan_with(attractor, radius, tolerance.max(0.1 * radius), false))
+}
+
+fn run_on_lattice(plan: &Plan<'_>) -> Dilation {
+    let budget = Budget::default();
     let setting = plan.setting(plan.pitch(), &budget);
     plan.on_lattice(&setting, &plan.space(&setting), &budget).unwrap()
 }

@@ -94,7 +94,7 @@ fn unions_keep_their_bounds_and_agree_with_the_lattice() {
         };
         assert!(dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance && dilation.crossings == 0, "{round}");
         keeps_its_bounds(&dilation, &segments, radius, size, &mut random);
-        let other = on_lattice(&shape, radius, tolerance);
+        let other = on_coarse_lattice(&shape, radius, tolerance);
         uncertain += usize::from(!dilation.topology_exact);
         if dilation.topology_exact && other.topology_exact {
             compared += 1;

@@ -1,6 +1,6 @@
 //! What is shown of dilations against what is known of them: closed forms, lattices, and finer points and segments.
 
-use super::super::arrangement::testing::{centres, copies_in_space, critical_values, on_lattice, points, topology, wires};
+use super::super::arrangement::testing::{centres, copies_in_space, critical_values, on_coarse_lattice, points, topology, wires};
 use super::super::{dilate, dilate_unsimplified};
 use super::*;
 use crate::attractor::cell::{cross, unit};
@@ -149,7 +149,7 @@ fn random_systems_have_the_topology_of_small_balls() {
         let Some(balls) = centres(&shape, small, 30_000) else { continue };
         let found: Vec<DVec3> = found.iter().map(|&at| DVec3::from_array(at)).collect();
         // The attractor's dilation is between those of all centres by less and by more.
-        let made = |set: &[DVec3], radius: f64| on_lattice(&points(set), radius, 0.25 * radius);
+        let made = |set: &[DVec3], radius: f64| on_coarse_lattice(&points(set), radius, 0.25 * radius);
         let all = [made(&found, radius), made(&balls, radius - small), made(&balls, radius + small)];
         let [own, less, more] = [0, 1, 2].map(|k| topology(&all[k]));
         if all.iter().all(|made| made.topology_exact) && less == more {

@@ -74,7 +74,7 @@ const FEWER: usize = 2;
 const SPARSE: usize = 8;
 const FOLDED: usize = 4;
 const NOISY: usize = 64;
-/// How many times what is left of folds, where it is less than that, is made anew with finer triangles.
+/// How many times what is left of folds is made anew with finer triangles, where it is less than one of `NOISY`.
 const TANGLES: usize = 4;
 /// By what share of half the band vertices are shaken, so that triangles do not touch each other, and how often.
 const SHAKEN: f64 = 0.01;
@@ -241,8 +241,8 @@ fn along(
     let mut evened: Option<Skin> = None;
     let (mut round_number, mut evenings, mut tangles) = (0, 0, 0);
     let (mut by_valleys, mut has_lids, mut may_move_before) = (false, false, false);
-    let (mut made_before, mut tangled_before) = (None, None);
-    // Takes longer than a round where it is so, and not long where it is not: asked first if nothing may be in the way of rounds.
+    let (mut made_before, mut left_of_tangle) = (None, None);
+    // None as long as it was not asked. Where nothing is hidden there always are coarse triangles, else these may fail sooner.
     let mut steadiness = None;
     if hidden.all.is_empty() {
         steadiness = ways.steadiness(setting, budget)?;
@@ -254,7 +254,7 @@ fn along(
         let own = evened.as_ref().unwrap_or(skin);
         let mut coarse = Coarse::new(own, by_valleys.then_some(&valleys), &hidden, radius, column.cos());
         if !coarse.run(&first, &most, budget)? {
-            if by_valleys || valleys.iter().all(Option::is_none) {
+            if by_valleys {
                 return Ok(ControlFlow::Continue(()));
             }
             // Over what is hidden sheets along the normals are too far off.
@@ -271,8 +271,8 @@ fn along(
         let share = 1.0 + FINER * f64::from(round_number);
         let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
         let expected = shape.triangles(own, &left);
-        if expected > 2.0 * budget.limits.triangles as f64 && !by_valleys {
-            return Ok(ControlFlow::Break(Some(Flat::Beyond(expected))));
+        if expected > 2.0 * budget.limits.triangles as f64 {
+            return Ok(given_up(by_valleys, Some(Flat::Beyond(expected))));
         }
         if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
             return Ok(ControlFlow::Continue(()));
@@ -306,6 +306,7 @@ fn along(
         let is_strip = |fault: &(u32, bool)| sheets.owners[fault.0 as usize] == NONE;
         let has_finer_strips = round_number < ROUNDS_OF_STRIPS && faults.iter().any(is_strip);
         let may_go_on = round_number + 1 < ROUNDS && (is_finer || has_finer_strips);
+        // What is too near in spite of these is at corners, where lids were of no use.
         if by_valleys && !may_go_on && !faults.is_empty() {
             return Ok(ControlFlow::Continue(()));
         }
@@ -316,9 +317,9 @@ fn along(
             let mut outcome = Outcome::new(&sheets, pieces, &faults);
             let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
             let bent = around.feet(outcome.feet(&flaws.not_left));
+            let tried_evening = evenings > 0;
             // Noise folds sheets all over, bends do in some places.
-            let was_evened = evenings > 0;
-            let is_noise = !was_evened && NOISY * flaws.count() > outcome.surface.triangles.len();
+            let is_noise = !tried_evening && NOISY * flaws.count() > outcome.surface.triangles.len();
             let mut even = |most: &mut [f64]| {
                 if bent.is_empty() || evenings == EVENINGS {
                     return false;
@@ -341,6 +342,9 @@ fn along(
                 flaws = outcome.unfold(flaws, around, &ways, setting, budget)?;
                 if !flaws.is_none() && !may_move {
                     has_lids = true;
+                    if by_valleys {
+                        made_before = None;
+                    }
                     continue 'rounds;
                 }
                 // Where they would be everywhere, or do not leave much less, lids do not help.
@@ -352,11 +356,11 @@ fn along(
                 flaws = outcome.flaws(around, &ways, setting, budget)?;
             }
             if !flaws.is_none() {
-                if was_evened && even(&mut most) {
+                if tried_evening && even(&mut most) {
                     continue;
                 }
-                let is_sparse = NOISY * flaws.count() <= outcome.surface.triangles.len();
-                if is_sparse && flaws.off.is_empty() && tangles < TANGLES && tangled_before.replace(left.len()) != Some(left.len()) {
+                let is_little = NOISY * flaws.count() <= outcome.surface.triangles.len();
+                if is_little && flaws.off.is_empty() && tangles < TANGLES && left_of_tangle.replace(left.len()) != Some(left.len()) {
                     // What is left of some folds may be another tangle with finer triangles.
                     let near = outcome.places(&flaws).into_iter().filter_map(|x| around.closest(&x));
                     let feet = near.flat_map(|(face, _)| skin.triangles[face as usize]).collect();
@@ -368,10 +372,10 @@ fn along(
                 if even(&mut most) {
                     continue;
                 }
-                return Ok(if by_valleys { ControlFlow::Continue(()) } else { ControlFlow::Break(None) });
+                return Ok(given_up(by_valleys, None));
             }
             if outcome.off > moved {
-                return Ok(if by_valleys { ControlFlow::Continue(()) } else { ControlFlow::Break(None) });
+                return Ok(given_up(by_valleys, None));
             }
             if skin.sides == OUTER && !around.wind_inside(&left, budget)? {
                 return Ok(ControlFlow::Continue(()));
@@ -393,6 +397,11 @@ fn along(
         round_number += 1;
     }
     Ok(ControlFlow::Continue(()))
+}
+
+/// What is told where sheets do not come out: that nothing else will, but for those that go by valleys, as with other seams there may be fewer triangles, or no need of these.
+fn given_up(by_valleys: bool, told: Option<Flat>) -> ControlFlow<Option<Flat>> {
+    if by_valleys { ControlFlow::Continue(()) } else { ControlFlow::Break(told) }
 }
 
 /// A surface, and the distances from it that sheets are between.

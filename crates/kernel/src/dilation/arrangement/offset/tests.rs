@@ -1,6 +1,6 @@
 use super::super::testing::{
     arranged, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat, lowered, lowered_as,
-    on_lattice, place, plan, topology,
+    on_coarse_lattice, place, plan, topology,
 };
 use super::skin::{BOTH_SIDES, Skin};
 use super::{solid_of, surface, with_seams};
@@ -309,7 +309,7 @@ fn assert_made(case: usize, mesh: &Mesh, [radius, tolerance]: [f64; 2], expected
     let mesh = mesh.clone().turned(random);
     let attractor = mesh.lowered();
     // That dilations are made of what is made is asked of some: it takes as long as these.
-    let is_used = case > 0 || is_flat(&attractor, radius, tolerance);
+    let is_used = !case.is_multiple_of(15) || is_flat(&attractor, radius, tolerance);
     assert!(mesh.is_made(radius, tolerance) && is_used, "{case} {radius} {tolerance}");
     let dilation = arranged(&attractor, radius, tolerance);
     assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
@@ -433,7 +433,7 @@ fn sheets_agree_with_the_lattice() {
         }
         made += 1;
         let dilation = arranged(&mesh.lowered(), radius, tolerance);
-        let lattice = on_lattice(&mesh.lowered(), radius, tolerance);
+        let lattice = on_coarse_lattice(&mesh.lowered(), radius, tolerance);
         assert!(dilation.topology_exact && lattice.topology_exact, "{case}");
         assert_eq!(topology(&dilation), topology(&lattice), "{case}");
         assert!(holds_everywhere(&dilation, radius, mesh.distance(), &mut random), "{case}");

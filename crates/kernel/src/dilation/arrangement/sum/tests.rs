@@ -1,6 +1,6 @@
 use super::super::testing::{
     arranged, arranged_unless_left, assert_bounds, assert_limited, assert_steady, distance_of_triangles, holds_everywhere, is_flat,
-    lowered, lowered_as, on_lattice, place, topology,
+    lowered, lowered_as, on_coarse_lattice, place, topology,
 };
 use super::ball::Ball;
 use super::corner::{Arc, Patch};
@@ -182,7 +182,7 @@ fn walls_keep_their_bounds_and_agree_with_the_lattice() {
             let x = on + radius * (0.7 + 0.6 * random.share()) * away;
             assert_bounds(case, &inside, &dilation, radius, x, distance(x));
         }
-        let lattice = on_lattice(&shape, radius, tolerance);
+        let lattice = on_coarse_lattice(&shape, radius, tolerance);
         if lattice.topology_exact {
             assert_eq!(topology(&dilation), topology(&lattice), "{case}");
         } else {
@@ -204,7 +204,7 @@ fn walls_that_come_close_are_left_to_others() {
         let walls = walls.turned(&mut random, false);
         let shape = walls.lowered();
         assert_eq!(is_flat(&shape, 1.0, 0.1), is_made, "{gap}");
-        let dilation = arranged_unless_left(&shape, 1.0, 0.1).unwrap_or_else(|| on_lattice(&shape, 1.0, 0.1));
+        let dilation = arranged_unless_left(&shape, 1.0, 0.1).unwrap_or_else(|| on_coarse_lattice(&shape, 1.0, 0.1));
         let one = (1, 0, 2);
         assert_eq!(topology(&dilation), if gap > 2.0 { (2, 0, 4) } else { one }, "{gap}");
     }
@@ -227,7 +227,7 @@ fn solids_have_no_surface_inside() {
         let walls = walls(case, &mut random);
         let Some(shape) = lowered_as(Interior::Solid, &walls.vertices, walls.faces.clone()) else { continue };
         let dilation = arranged(&shape, 1.5, 0.15);
-        assert_eq!(topology(&dilation), topology(&on_lattice(&shape, 1.5, 0.15)), "{case}");
+        assert_eq!(topology(&dilation), topology(&on_coarse_lattice(&shape, 1.5, 0.15)), "{case}");
         let within = Inside::new(dilation.solid.mesh());
         assert!((0..2_000).all(|_| {
             let x = place(&mut random, 40.0);
