@@ -131,7 +131,7 @@ fn a_dilated_torus_has_its_void_and_its_hole_as_long_as_there_is_room() {
     let mut random = Random(2);
     let shape = torus(10.0, 3.0);
     let mut claimed = [0; 3];
-    for round in 0..8 {
+    for round in 0..12 {
         let r = match round % 4 {
             0 => 0.3 + 2.0 * random.unit(),
             1 => 3.0 + 0.6 * (random.unit() - 0.5),
@@ -147,7 +147,7 @@ fn a_dilated_torus_has_its_void_and_its_hole_as_long_as_there_is_room() {
         }
         assert!(made.topology_exact || r > 2.5, "{r}");
     }
-    assert!(claimed[0] >= 2, "{claimed:?}");
+    assert!(claimed[0] >= 3, "{claimed:?}");
 }
 
 /// At least ten times fewer triangles than those of the lattice, within the same tolerance.

@@ -138,7 +138,7 @@ mod tests {
             let made = arranged(&shape, radius, tolerance);
             assert!(made.inner_mm <= tolerance && made.outer_mm <= tolerance && made.pitch_mm.is_none(), "{round}");
             // Nothing crosses, and no place is beyond the bounds but for what is not known of the distance.
-            let little = 0.05 * tolerance;
+            let little = 0.01 * tolerance;
             let [inner, outer] = [radius - made.inner_mm - little, radius + made.outer_mm + little];
             let within = |x: DVec3| if (inner..=outer).contains(&distance(&shape, x, little)) { radius } else { f64::INFINITY };
             assert!(holds_everywhere(&made, radius, within, &mut random), "{round}");

@@ -280,7 +280,7 @@ fn along(
         let Some(mut sheets) = Sheets::new(own, &valleys, &left, &shape, round) else {
             return Ok(ControlFlow::Continue(()));
         };
-        let (unshaken, mut shakes) = (sheets.vertices.clone(), 0);
+        let (mut unshaken, mut shakes) = (None, 0);
         let mut pieces = loop {
             if let Some(pieces) = Pieces::of(&sheets, skin, round, budget)? {
                 break pieces;
@@ -289,7 +289,7 @@ fn along(
                 return Ok(ControlFlow::Continue(()));
             }
             // Triangles touch each other.
-            sheets.vertices.clone_from(&unshaken);
+            sheets.vertices.clone_from(unshaken.get_or_insert_with(|| sheets.vertices.clone()));
             sheets.shake(shakes, SHAKEN * half, round);
             shakes += 1;
         };

@@ -308,9 +308,7 @@ fn shape(case: usize, random: &mut Random) -> (Mesh, (u64, u64, i64)) {
 fn assert_made(case: usize, mesh: &Mesh, [radius, tolerance]: [f64; 2], expected: (u64, u64, i64), places: u32, random: &mut Random) {
     let mesh = mesh.clone().turned(random);
     let attractor = mesh.lowered();
-    // That dilations are made of what is made is asked of some: it takes as long as these.
-    let is_used = !case.is_multiple_of(15) || is_flat(&attractor, radius, tolerance);
-    assert!(mesh.is_made(radius, tolerance) && is_used, "{case} {radius} {tolerance}");
+    assert!(mesh.is_made(radius, tolerance) && is_flat(&attractor, radius, tolerance), "{case} {radius} {tolerance}");
     let dilation = arranged(&attractor, radius, tolerance);
     assert!(dilation.topology_exact && dilation.inner_mm <= tolerance && dilation.outer_mm <= tolerance, "{case}");
     assert_eq!(topology(&dilation), expected, "{case}");
