@@ -2,8 +2,9 @@
 //!
 //! Near the ends of creases sheets fold back over themselves a little, and no cut takes that away. A lid is a closed surface whose top is half way out to the outer distance, and whose sides lead down into what is inside anyway: together with it the solid bounds none of what it covers.
 
+use super::Around;
+use super::rounds::SHAKEN;
 use super::sheets::shaken;
-use super::{Around, SHAKEN};
 use crate::attractor::cell::{Point, between, distance_squared, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::Memory;

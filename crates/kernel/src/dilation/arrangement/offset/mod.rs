@@ -18,6 +18,7 @@ mod crossed;
 mod inward;
 mod lids;
 mod outcome;
+mod rounds;
 mod seams;
 mod sheets;
 mod skin;
@@ -30,7 +31,6 @@ use super::between::{Memory, middle, radius};
 use super::faces::{Faces, Fault, Question, numbered, without_lines};
 use super::figure::{self, Figure};
 use super::solids::keep;
-use super::sum::is_embedded;
 use super::{BYTES_PER_TRIANGLE, Flat};
 use crate::attractor::cell::{Point, cross, dot, subtract, unit};
 use crate::budget::{Budget, Stopped};
@@ -40,45 +40,19 @@ use crate::dilation::surface::{BlockSurface, NameMap};
 use crate::groups::Groups;
 use crate::solid::half_edges::NONE;
 use crate::solid::{Crossings, Inside, Solid, SolidError, TriMesh, misplaced_shell, repair};
-use coarse::Coarse;
 use crossed::Pieces;
 use glam::DVec3;
-use outcome::Outcome;
 use rayon::prelude::*;
-use sheets::{Name, Shape, Sheets};
+use rounds::{Told, along};
+use sheets::{Name, Sheets};
 use skin::{BOTH_SIDES, OUTER, Sides, Skin, edges, upright};
 use std::cell::Cell;
 use std::collections::{BTreeSet, HashSet};
-use std::ops::ControlFlow;
-use ways::Ways;
 
 /// By how many times the angle that a normal may be off its corner's a surface turns at seams at least. Neighbours that both turn as much as may be from the corner between them turn by twice that; with less, seams may end in the midst of what turns about as much along a side.
 const SEAMS: [f64; 2] = [2.0, 1.2];
-/// Shares of half the band: by which sheets may be nearer where the surface turns at corners, how far off them places may be that they go by, and both together.
+/// By what share of half the band sheets may be nearer where the surface turns at corners.
 const TURNED: f64 = 0.75;
-const OFF: f64 = 0.75;
-const BOTH: f64 = 0.95;
-/// How far out strips around borders are, their sides across these, and their triangles around corners, beyond the radius in units of half the band.
-const RIM: f64 = 0.4;
-const SIDE: f64 = -0.3;
-const FACET: f64 = -0.7;
-/// Rounds in which faults are mended, and by what share of the first more strips have rows and columns in each.
-const ROUNDS: u32 = 10;
-const FINER: f64 = 0.25;
-/// Rounds in which strips that are too near are left to finer ones.
-const ROUNDS_OF_STRIPS: u32 = 4;
-/// Rounds in which normals are evened where what is left of sheets looks back, the first before folds are closed where noise turns them, others where lids do not help, and by how many times fewer triangles are not as they have to be after each round of these at least.
-const EVENINGS: usize = 2;
-const FEWER: usize = 2;
-/// Of so many triangles one may be covered by lids, one may be folded before, and more are where noise turns normals.
-const SPARSE: usize = 8;
-const FOLDED: usize = 4;
-const NOISY: usize = 64;
-/// How many times what is left of folds is made anew with finer triangles, where it is less than one of `NOISY`.
-const TANGLES: usize = 4;
-/// By what share of half the band vertices are shaken, so that triangles do not touch each other, and how often.
-const SHAKEN: f64 = 0.01;
-const SHAKES: u64 = 3;
 /// What is cut, mended and rounded is off by so many roundings at most, all in all.
 const MOVED: f64 = 128.0;
 /// Triangles one after the other.
@@ -208,200 +182,12 @@ fn with_seams(
         budget.cancel.check()?;
         let around = Around { skin: &skin, faces: &Faces::new(skin.faces()), inner, outer, moved: MOVED * setting.rounding };
         match along(&around, setting, round, budget)? {
-            ControlFlow::Break(Some(made)) => return Ok((Some(made), false)),
-            ControlFlow::Break(None) => return Ok((None, last > Some(0))),
-            ControlFlow::Continue(()) => is_open = true,
+            Told::Made(made) => return Ok((Some(made), false)),
+            Told::Nothing => return Ok((None, last > Some(0))),
+            Told::OtherSeams => is_open = true,
         }
     }
     Ok((None, last > Some(0) || (is_open && sides == OUTER)))
-}
-
-/// The same, given the surface with its seams: what is made, or that it cannot be, unless other seams may serve.
-fn along(
-    around: &Around<'_>,
-    setting: &Setting,
-    round: &(impl Fn(f64) -> f64 + Sync),
-    budget: &Budget,
-) -> Result<ControlFlow<Option<Flat>>, Stopped> {
-    let Around { skin, faces, inner, outer, moved } = *around;
-    let (radius, half) = (0.5 * (inner + outer), 0.5 * (outer - inner));
-    budget.cancel.check()?;
-    let ways = Ways::new(skin, faces, [inner, outer]);
-    let at = |share: f64| radius + share * half;
-    let Some(valleys) = skin.seams.valleys(skin, radius) else {
-        return Ok(ControlFlow::Continue(()));
-    };
-    let hidden = skin.hidden(&valleys, faces, radius, half);
-    let [row, column] = [[SIDE, RIM], [FACET, SIDE]].map(|[near, far]| 2.0 * (at(near) / at(far)).acos());
-    let fold = 2.0 * (at(-TURNED) / radius).acos();
-    let may_be_off = |skin: &Skin| skin.lost.iter().map(|lost| (BOTH * half - lost).min(OFF * half)).collect::<Vec<f64>>();
-    let first = may_be_off(skin);
-    let (mut most, mut good) = (first.clone(), HashSet::new());
-    // With other normals, if these are needed: what is shown of the surface does not know them.
-    let mut evened: Option<Skin> = None;
-    let (mut round_number, mut evenings, mut tangles) = (0, 0, 0);
-    let (mut by_valleys, mut has_lids, mut may_move_before) = (false, false, false);
-    let (mut made_before, mut left_of_tangle) = (None, None);
-    // None as long as it was not asked. Where nothing is hidden there always are coarse triangles, else these may fail sooner.
-    let mut steadiness = None;
-    if hidden.all.is_empty() {
-        steadiness = ways.steadiness(setting, budget)?;
-        if steadiness.is_none() {
-            return Ok(ControlFlow::Continue(()));
-        }
-    }
-    'rounds: while round_number < ROUNDS {
-        let own = evened.as_ref().unwrap_or(skin);
-        let mut coarse = Coarse::new(own, by_valleys.then_some(&valleys), &hidden, radius, column.cos());
-        if !coarse.run(&first, &most, budget)? {
-            if by_valleys {
-                return Ok(ControlFlow::Continue(()));
-            }
-            // Over what is hidden sheets along the normals are too far off.
-            by_valleys = true;
-            continue;
-        }
-        if steadiness.is_none() {
-            steadiness = ways.steadiness(setting, budget)?;
-            if steadiness.is_none() {
-                return Ok(ControlFlow::Continue(()));
-            }
-        }
-        let (names, left) = coarse.triangles();
-        let share = 1.0 + FINER * f64::from(round_number);
-        let shape = Shape { radius, rim: at(RIM), row: row / share, column: column / share, fold };
-        let expected = shape.triangles(own, &left);
-        if expected > 2.0 * budget.limits.triangles as f64 {
-            return Ok(given_up(by_valleys, Some(Flat::Beyond(expected))));
-        }
-        if BYTES_PER_TRIANGLE * expected > budget.limits.memory_bytes as f64 {
-            return Ok(ControlFlow::Continue(()));
-        }
-        let Some(mut sheets) = Sheets::new(own, &valleys, &left, &shape, round) else {
-            return Ok(ControlFlow::Continue(()));
-        };
-        let (mut unshaken, mut shakes) = (None, 0);
-        let mut pieces = loop {
-            if let Some(pieces) = Pieces::of(&sheets, skin, round, budget)? {
-                break pieces;
-            }
-            if shakes == SHAKES {
-                return Ok(ControlFlow::Continue(()));
-            }
-            // Triangles touch each other.
-            sheets.vertices.clone_from(unshaken.get_or_insert_with(|| sheets.vertices.clone()));
-            sheets.shake(shakes, SHAKEN * half, round);
-            shakes += 1;
-        };
-        pieces.fill(|part| around.is_filled(part, budget))?;
-        // What is cut is not exactly where it is said to be.
-        let may_move = pieces.is_cut || has_lids;
-        if may_move != may_move_before {
-            may_move_before = may_move;
-            good.clear();
-        }
-        let faults = around.faults(&sheets, &pieces, &good, if may_move { outer - moved } else { outer }, budget)?;
-        // What is too near is left to lids where a round does not make as many more triangles as there are of that.
-        let is_finer = made_before.is_none_or(|before| left.len() >= before + faults.len());
-        let is_strip = |fault: &(u32, bool)| sheets.owners[fault.0 as usize] == NONE;
-        let has_finer_strips = round_number < ROUNDS_OF_STRIPS && faults.iter().any(is_strip);
-        let may_go_on = round_number + 1 < ROUNDS && (is_finer || has_finer_strips);
-        // What is too near in spite of these is at corners, where lids were of no use.
-        if by_valleys && !may_go_on && !faults.is_empty() {
-            return Ok(ControlFlow::Continue(()));
-        }
-        let is_stalled = !may_go_on && faults.iter().all(|fault| fault.1);
-        made_before = Some(left.len());
-        good = pieces.good(&sheets, &faults);
-        if faults.is_empty() || is_stalled {
-            let mut outcome = Outcome::new(&sheets, pieces, &faults);
-            let mut flaws = outcome.flaws(around, &ways, setting, budget)?;
-            let bent = around.feet(outcome.feet(&flaws.not_left));
-            let tried_evening = evenings > 0;
-            // Noise folds sheets all over, bends do in some places.
-            let is_noise = !tried_evening && NOISY * flaws.count() > outcome.surface.triangles.len();
-            let mut even = |most: &mut [f64]| {
-                if bent.is_empty() || evenings == EVENINGS {
-                    return false;
-                }
-                evenings += 1;
-                let evened = evened.get_or_insert_with(|| skin.clone());
-                let is_changed = evened.even(&bent, radius, TURNED * half);
-                if is_changed {
-                    most.iter_mut().zip(may_be_off(evened)).for_each(|(most, other)| *most = most.min(other));
-                    made_before = None;
-                }
-                is_changed
-            };
-            // Sheets with other normals have fewer triangles than those with lids.
-            if is_noise && even(&mut most) {
-                continue;
-            }
-            let mut before = usize::MAX;
-            while !flaws.is_none() && flaws.count() <= outcome.surface.triangles.len() / FOLDED {
-                flaws = outcome.unfold(flaws, around, &ways, setting, budget)?;
-                if !flaws.is_none() && !may_move {
-                    has_lids = true;
-                    if by_valleys {
-                        made_before = None;
-                    }
-                    continue 'rounds;
-                }
-                // Where they would be everywhere, or do not leave much less, lids do not help.
-                let is_hopeless = flaws.count() > (before / FEWER).min(outcome.surface.triangles.len() / SPARSE);
-                before = flaws.count();
-                if flaws.is_none() || is_hopeless || !outcome.cover(around, &flaws, round, budget)? {
-                    break;
-                }
-                flaws = outcome.flaws(around, &ways, setting, budget)?;
-            }
-            if !flaws.is_none() {
-                if tried_evening && even(&mut most) {
-                    continue;
-                }
-                let is_little = NOISY * flaws.count() <= outcome.surface.triangles.len();
-                if is_little && flaws.off.is_empty() && tangles < TANGLES && left_of_tangle.replace(left.len()) != Some(left.len()) {
-                    // What is left of some folds may be another tangle with finer triangles.
-                    let near = outcome.places(&flaws).into_iter().filter_map(|x| around.closest(&x));
-                    let feet = near.flat_map(|(face, _)| skin.triangles[face as usize]).collect();
-                    around.feet(feet).into_iter().for_each(|foot| most[foot as usize] *= 0.5);
-                    made_before = None;
-                    tangles += 1;
-                    continue;
-                }
-                if even(&mut most) {
-                    continue;
-                }
-                return Ok(given_up(by_valleys, None));
-            }
-            if outcome.off > moved {
-                return Ok(given_up(by_valleys, None));
-            }
-            if skin.sides == OUTER && !around.wind_inside(&left, budget)? {
-                return Ok(ControlFlow::Continue(()));
-            }
-            let mut surface = outcome.surface;
-            let is_shown = is_embedded(&mut surface, budget)? && holds(&surface, skin);
-            let made = if steadiness == Some(true) { Flat::Steady(Box::new(surface)) } else { Flat::Made(Box::new(surface)) };
-            return Ok(if is_shown { ControlFlow::Break(Some(made)) } else { ControlFlow::Continue(()) });
-        }
-        for (fault, _) in faults {
-            let owner = sheets.owners[fault as usize];
-            if owner == NONE {
-                let corners = sheets.triangles[fault as usize];
-                corners.iter().for_each(|&corner| most[sheets.feet[corner as usize] as usize] *= 0.5);
-            } else {
-                coarse.halve(names[owner as usize], &mut most);
-            }
-        }
-        round_number += 1;
-    }
-    Ok(ControlFlow::Continue(()))
-}
-
-/// What is told where sheets do not come out: that nothing else will, but for those that go by valleys, as with other seams there may be fewer triangles, or no need of these.
-fn given_up(by_valleys: bool, told: Option<Flat>) -> ControlFlow<Option<Flat>> {
-    if by_valleys { ControlFlow::Continue(()) } else { ControlFlow::Break(told) }
 }
 
 /// A surface, and the distances from it that sheets are between.

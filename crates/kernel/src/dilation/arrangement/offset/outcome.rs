@@ -3,7 +3,7 @@
 use super::crossed::Pieces;
 use super::sheets::Sheets;
 use super::ways::Ways;
-use super::{Around, FEWER, IN_A_ROW};
+use super::{Around, IN_A_ROW};
 use crate::attractor::cell::Point;
 use crate::budget::{Budget, Stopped};
 use crate::dilation::arrangement::between::{Memory, middle};
@@ -19,6 +19,11 @@ use std::collections::{BTreeSet, HashSet};
 
 /// The cosine from which on a triangle looks back.
 pub(super) const BACK: f64 = 0.05;
+/// By how many times fewer triangles are not as they have to be after each round of unfolding, and of lids, at least.
+const FEWER: usize = 2;
+/// Of so many triangles one may be folded before, and one may be covered by lids.
+const FOLDED: usize = 4;
+const SPARSE: usize = 8;
 /// How many times lids are shaken until they cross what is there without touching it.
 const TRIES: usize = 3;
 
@@ -120,11 +125,42 @@ impl Outcome {
         Ok(flaws)
     }
 
+    /// Takes folds away, and covers with lids what is left of them, with coordinates that are rounded, as long as there is less afterwards; tells what is left of it. None where lids are needed, but no rounding is told, as there is no room for what they move.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn close(
+        &mut self,
+        mut flaws: Flaws,
+        around: &Around<'_>,
+        ways: &Ways<'_>,
+        round: Option<&(impl Fn(f64) -> f64 + Sync)>,
+        setting: &Setting,
+        budget: &Budget,
+    ) -> Result<Option<Flaws>, Stopped> {
+        let mut before = usize::MAX;
+        while !flaws.is_none() && flaws.count() <= self.surface.triangles.len() / FOLDED {
+            flaws = self.unfold(flaws, around, ways, setting, budget)?;
+            if flaws.is_none() {
+                break;
+            }
+            let Some(round) = round else { return Ok(None) };
+            // Where they would be everywhere, or do not leave much less, lids do not help.
+            let is_hopeless = flaws.count() > (before / FEWER).min(self.surface.triangles.len() / SPARSE);
+            before = flaws.count();
+            if is_hopeless || !self.cover(around, &flaws, round, budget)? {
+                break;
+            }
+            flaws = self.flaws(around, ways, setting, budget)?;
+        }
+        Ok(Some(flaws))
+    }
+
     /// Takes folds away as long as that leaves much less that is not as it has to be, and tells what is left of it.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn unfold(
+    fn unfold(
         &mut self,
         mut flaws: Flaws,
         around: &Around<'_>,
@@ -150,7 +186,7 @@ impl Outcome {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(super) fn cover(
+    fn cover(
         &mut self,
         around: &Around<'_>,
         flaws: &Flaws,
