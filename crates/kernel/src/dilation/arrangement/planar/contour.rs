@@ -13,6 +13,9 @@ use std::f64::consts::{PI, TAU};
 
 /// Segments turn into each other if they turn by less than this.
 pub(super) const STRAIGHT: f64 = 1e-4;
+/// Parts of a curve that are asked for one body that covers all of each are no longer than this, in units of the radius; and with what room it has to, in units of the margin.
+const PART: f64 = 0.5;
+const ROOM: f64 = 4.0;
 /// What a piece ends at that ends where its curve does.
 const NATURAL: u32 = NONE;
 
@@ -151,16 +154,18 @@ pub(super) fn contour(wires: &Wires, radius: f64, gap: f64, budget: &Budget) -> 
         }
         left.is_certain()
     };
-    let (halves, reach) = (2 * wires.segments as u32, 2.0 * radius + gap);
-    for half in 0..halves {
+    for half in 0..2 * wires.segments as u32 {
         if half.is_multiple_of(32) {
             budget.cancel.check()?;
         }
         let side = Side::new(wires, half, radius);
+        let stretch = Stretch { owner: half / 2, length: side.length, at: |length| plus(side.from, length, side.along) };
+        if stretch.is_buried(wires, [radius, gap]) {
+            continue;
+        }
         left.start(side.length, gap);
         let own = &wires.bodies[(half / 2) as usize];
-        for other in wires.near(half / 2, reach) {
-            let body = &wires.bodies[other as usize];
+        for (other, body) in stretch.near(wires, [radius, gap]) {
             let leans = |along: Place| dot(along, side.right) > STRAIGHT;
             let is_apart = (body.ends[0] == own.ends[0] || body.ends[0] == own.ends[1]) && !leans(body.along)
                 || (body.ends[1] == own.ends[0] || body.ends[1] == own.ends[1]) && !leans(body.along.map(|x| -x));
@@ -185,9 +190,13 @@ pub(super) fn contour(wires: &Wires, radius: f64, gap: f64, budget: &Budget) -> 
         let owner = wires.owner[vertex as usize];
         for (curve, start, width) in arcs(wires, vertex) {
             let arc = Around { place: wires.places[vertex as usize], start, width };
+            let at = |length: f64| plus(arc.place, radius, towards(start + length / radius));
+            let stretch = Stretch { owner, length: radius * width, at };
+            if stretch.is_buried(wires, [radius, gap]) {
+                continue;
+            }
             left.start(width, gap / radius);
-            for other in wires.near(owner, reach) {
-                let body = &wires.bodies[other as usize];
+            for (other, body) in stretch.near(wires, [radius, gap]) {
                 if body.ends.contains(&vertex) {
                     continue;
                 }
@@ -204,6 +213,41 @@ pub(super) fn contour(wires: &Wires, radius: f64, gap: f64, budget: &Budget) -> 
         }
     }
     Ok(joined(wires, radius, pieces))
+}
+
+/// A curve of some length, by what is as far along it, and the body that it is beside.
+struct Stretch<F> {
+    owner: u32,
+    length: f64,
+    at: F,
+}
+
+impl<F: Fn(f64) -> Place> Stretch<F> {
+    /// Whether each part is within the dilation of one body, with room: no place of a part is farther from its middle than half its length, and so all of it is as much nearer to the body. Nothing is left of the curve then, and all that it meets is covered with room, too.
+    fn is_buried(&self, wires: &Wires, [radius, gap]: [f64; 2]) -> bool {
+        let parts = (self.length / (PART * radius)).ceil().max(1.0);
+        let half = 0.5 * self.length / parts;
+        let most = radius - half - ROOM * gap;
+        most > 0.0
+            && (0..parts as u32).all(|part| {
+                let middle = (self.at)((2.0 * f64::from(part) + 1.0) * half);
+                wires.near(self.owner, radius + most).any(|other| wires.bodies[other as usize].square(middle) < most * most)
+            })
+    }
+
+    /// The bodies whose dilations may meet it: others are farther from all of it, with room.
+    fn near<'a>(&self, wires: &'a Wires, [radius, gap]: [f64; 2]) -> impl Iterator<Item = (u32, &'a Body)> + use<'a, F> {
+        let half = 0.5 * self.length;
+        let (middle, most) = ((self.at)(half), radius + half + ROOM * gap);
+        let all = wires.near(self.owner, 2.0 * radius + gap).map(|other| (other, &wires.bodies[other as usize]));
+        all.filter(move |(_, body)| body.square(middle) <= most * most)
+    }
+}
+
+/// The unit vector at an angle.
+fn towards(angle: f64) -> Place {
+    let (sine, cosine) = angle.sin_cos();
+    [cosine, sine]
 }
 
 /// The arcs around a vertex, with the angle at which each begins and how wide it is.

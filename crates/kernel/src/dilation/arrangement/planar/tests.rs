@@ -117,6 +117,55 @@ fn counted(drawing: &Drawing, radius: f64) -> Option<[u64; 2]> {
     contour(&wires, radius, 1e-9, &budget).unwrap().map(|made| [made.components, made.holes])
 }
 
+/// Places around bodies, to which no other is nearer by a thousandth, are on the contour, and all of that are as far from the nearest body as they have to be: most curves of crowded drawings are buried.
+#[test]
+fn contours_are_all_that_is_open() {
+    let (mut random, budget, mut counts) = (Random(17), Budget::default(), [0; 2]);
+    for round in 0..24 {
+        let radius = [0.7, 1.5, 2.6][round / 6 % 3];
+        let drawing = drawing(round % 6, &mut random);
+        // None of these is in doubt.
+        let wires = Wires::new(&drawing, 2.2 * radius, 1e-10, &budget).unwrap().unwrap();
+        let made = contour(&wires, radius, 1e-9, &budget).unwrap().unwrap();
+        let far = |x: Place| wires.bodies.iter().map(|body| body.square(x)).fold(f64::INFINITY, f64::min).sqrt();
+        let mut places = Vec::new();
+        for piece in made.loops.iter().flatten().map(|&number| &made.pieces[number as usize]) {
+            let steps = ((piece.to - piece.from) * radius.max(1.0) / STEP).ceil();
+            places.extend(
+                (0..=steps as u32).map(|k| made.place(&wires, piece, piece.from + (piece.to - piece.from) * f64::from(k) / steps).0),
+            );
+        }
+        assert!(places.iter().all(|&place| (far(place) - radius).abs() < 1e-6), "{round}");
+        for body in &wires.bodies {
+            let around = (0..90).map(|k| {
+                let (sine, cosine) = (std::f64::consts::TAU * f64::from(k) / 90.0).sin_cos();
+                let end = if k % 2 == 0 { body.from } else { body.to() };
+                [end[0] + radius * cosine, end[1] + radius * sine]
+            });
+            let beside = (0..20).map(|k| {
+                let (along, side) = (body.length * (f64::from(k / 2) + 0.5) / 10.0, if k % 2 == 0 { radius } else { -radius });
+                let [x, y] = body.along;
+                [body.from[0] + along * x - side * y, body.from[1] + along * y + side * x]
+            });
+            for x in around.chain(beside) {
+                let is_open = far(x) > 0.999 * radius;
+                counts[usize::from(is_open)] += 1;
+                if !is_open {
+                    continue;
+                }
+                let near = |place: &Place| (place[0] - x[0]).hypot(place[1] - x[1]);
+                let least = places.iter().map(near).fold(f64::INFINITY, f64::min);
+                // Where bodies meet at a flat angle the contour is somewhat farther away.
+                assert!(least < STEP + 0.05 * radius, "{round}: {least}");
+            }
+        }
+    }
+    assert!(counts[1] > 1_000 && counts[0] > 5 * counts[1], "{counts:?}");
+}
+
+/// How far apart places of a contour are that are asked for.
+const STEP: f64 = 0.03;
+
 /// A square lattice of so many places a side, 1 mm apart.
 fn lattice(count: i32) -> Drawing {
     let place = |x: i32, y: i32| [f64::from(x), f64::from(y)];
