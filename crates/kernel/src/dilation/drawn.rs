@@ -3,7 +3,7 @@
 use super::DilationError;
 use super::arrangement::without_lines;
 use super::decimation::{decimated, is_finer};
-use super::plan::{Balls, JUNG, Meant, Plan};
+use super::plan::{Balls, Meant, Plan};
 use super::unfold::unfolded;
 use crate::attractor::{Attractor, RefineError};
 use crate::budget::{Budget, Limits};
@@ -25,9 +25,11 @@ const SMOOTH_SHARE: f64 = 0.2;
 /// Share of it by which they may move where they turn back.
 const UNFOLDED_SHARE: f64 = 0.2;
 
-/// Share of the tolerance that fewer triangles may use which stand for a mesh of at least so many.
-const DECIMATED_SHARE: f64 = 0.2;
+/// Share of the tolerance that fewer triangles may use which stand for a mesh of at least so many; and of one of fewer, such as cylinders with long thin triangles: so near to it the topology of either is that of the other one, mostly.
 const MANY_TRIANGLES: usize = 20_000;
+const DECIMATED_SHARE: f64 = 0.2;
+const FEW_TRIANGLES: usize = 500;
+const FEW_SHARE: f64 = 0.0125;
 /// Bytes that it takes for each of these at most to find them.
 const BYTES_PER_TRIANGLE: u64 = 1_000;
 
@@ -141,7 +143,7 @@ impl<'a> Drawn<'a> {
 
     /// Fewer triangles for a mesh that is finer than needed, within their share of the tolerance, times `coarseness`; `None` where it is no such.
     pub(super) fn decimated(
-        Finer { mesh, is_solid }: &Finer,
+        Finer { mesh, is_solid, share }: &Finer,
         attractor: &'a Attractor,
         radius: Radius,
         tolerance: Tolerance,
@@ -150,10 +152,10 @@ impl<'a> Drawn<'a> {
     ) -> Result<Option<Self>, DilationError> {
         let radius = radius.mm();
         let aimed = tolerance.mm().min(0.5 * radius);
-        let share = coarseness * DECIMATED_SHARE * aimed;
+        let share = coarseness * share * aimed;
         // Whatever is farther from the surface than this is in both solids, or in none.
-        let longest = if *is_solid { NEAR_SURFACE * (radius - aimed) / JUNG } else { f64::INFINITY };
-        let Some(fewer) = decimated(mesh, share, longest, budget)? else { return Ok(None) };
+        let farthest = if *is_solid { NEAR_SURFACE * (radius - aimed) } else { f64::INFINITY };
+        let Some(fewer) = decimated(mesh, share, farthest, budget)? else { return Ok(None) };
         let bounds = bounding_box(attractor, budget)?;
         Ok(Attractor::of_triangles(&fewer, *is_solid).and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, share])))
     }
@@ -165,24 +167,26 @@ impl<'a> Drawn<'a> {
     }
 }
 
-/// A mesh in one piece of many triangles that are finer than needed, and whether it bounds a solid.
+/// A mesh in one piece of triangles that are finer than needed, whether it bounds a solid, and the share of the tolerance that fewer of them may use.
 pub(super) struct Finer {
     mesh: TriMesh,
     is_solid: bool,
+    share: f64,
 }
 
 impl Finer {
     /// None where it is something else: parts that are alike are made once, as they are.
     pub(super) fn of(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Option<Self> {
         let count = attractor.roots().len();
-        if count < MANY_TRIANGLES || count as u64 > budget.limits.memory_bytes / BYTES_PER_TRIANGLE {
+        if count < FEW_TRIANGLES || count as u64 > budget.limits.memory_bytes / BYTES_PER_TRIANGLE {
             return None;
         }
         let (mut mesh, is_solid) = attractor.triangles()?;
         mesh.triangles = without_lines(mesh.triangles)?;
-        let share = DECIMATED_SHARE * tolerance.mm().min(0.5 * radius.mm());
+        let share = if mesh.triangles.len() < MANY_TRIANGLES { FEW_SHARE } else { DECIMATED_SHARE };
+        let most = share * tolerance.mm().min(0.5 * radius.mm());
         let is_whole = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles).all().iter().all(|&group| group == 0);
-        (is_whole && is_finer(&mesh, share)).then_some(Self { mesh, is_solid })
+        (is_whole && is_finer(&mesh, most)).then_some(Self { mesh, is_solid, share })
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::convex::{Convex, SiteSearch};
 use super::lattice::{Cube, ENCLOSING, Number, UNITS};
-use super::plan::JUNG;
 use super::setting::Setting;
 use super::tree::{NodeId, SiteId, Tree, in_space};
 use crate::attractor::cell::{Point, distance_squared};
 
+/// The ball around a tetrahedron has at most this radius, in units of its longest edge: sqrt(3 / 8) (Jung, 1901).
+const JUNG: f64 = 0.612_373;
 /// Value of a vertex not evaluated yet.
 pub(super) const UNKNOWN: f64 = f64::NAN;
 /// Value of a vertex so near to a site that it covers every tetrahedron there.

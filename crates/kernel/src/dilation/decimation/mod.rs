@@ -3,8 +3,8 @@
 //! Sides are collapsed into one of their ends as long as no vertex that is gone is farther from the triangles that are left than it may be (Klein, Liebich and Strasser, "Mesh reduction with error control", 1996). Nothing of that is taken on trust: in the end each triangle of either mesh is shown to be nowhere farther from the other
 //! one than the bound (`cover`), so that their Hausdorff distance is no more than that.
 //!
-//! Where a mesh is the surface of a solid, so is what is left of it, if that is embedded. Both solids are the same but for places close to the surface: what lies between a star and what it becomes is covered by tetrahedra whose corners are vertices of the mesh, and no place of one is farther from these than sqrt(3 / 8) of its longest side (Jung, 1901).
-//! All of its sides are in the mesh before or after: as no vertex is removed where one of them is longer than told, the windings of both meshes around all places farther away are the same.
+//! Where a mesh is the surface of a solid, so is what is left of it, if that is embedded. Both solids are the same but for places close to the surface: let f(v) be the vertex that v became in the end, and f map each triangle as that says. Each collapse maps what bounds a solid to what is left, as triangles that lose
+//! their area add nothing: so f maps the mesh to what is left of it. Straight from x to f(x) no place moves by more than the corners of its triangle do. So windings around all places are the same that are farther from the mesh than any vertex is from what it became (homotopy in the complement of a place).
 
 mod cover;
 #[cfg(test)]
@@ -29,26 +29,30 @@ const PASSES: [f64; 4] = [0.05, 0.15, 0.4, 0.75];
 const SHORT: f64 = 0.2;
 /// The cosine of the angle between a triangle and the normals of its corners, and its height as a share of its longest side, at least: or as much as there was before.
 const FAIR: Quality = Quality { lean: 0.94, height: 0.1 };
-/// The same where short sides go, and of the cosine in any case.
+/// The same where short sides go; and of the cosine unless there was less before, as beside sharp edges.
 const POOR: Quality = Quality { lean: 0.5, height: 1e-4 };
+/// The cosine in any case: nothing turns over, however often it becomes a little worse.
+const LEAST_LEAN: f64 = 0.1;
 /// What rounding may take of the cosine.
 const ROUNDED: f64 = 1e-3;
 /// Rounds in which vertices may be half as far away as before where meshes were found to be too far from each other.
 const ROUNDS: usize = 4;
 /// Of so many triangles one has to be left at most for it to be worth while: the topology is told of what is left alone unless that is near enough to the mesh.
 const WORTH: usize = 8;
+/// The cosine of the angle by which a mesh turns at sharp edges at least.
+const SHARP: f64 = 0.5;
 /// How many times as many triangles are left at most, of meshes that were tried, than there had to be of one that is curved alike everywhere.
 const MISSED: f64 = 4.0;
 /// Vertices that are looked at before a stop is noticed.
 const IN_A_ROW: u32 = 256;
 
-/// The mesh with fewer triangles, no place of either farther from the other one than `most`; none where that does not come out, or saves little. `longest` is infinite for surfaces; for the surface of a solid it is how long sides may be around vertices that go.
+/// The mesh with fewer triangles, no place of either farther from the other one than `most`; none where that does not come out, or saves little. `farthest` is infinite for surfaces; for the surface of a solid it is how far vertices may be from what they become.
 ///
 /// Cost: some microseconds for each triangle.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn decimated(mesh: &TriMesh, most: f64, longest: f64, budget: &Budget) -> Result<Option<TriMesh>, Stopped> {
+pub(super) fn decimated(mesh: &TriMesh, most: f64, farthest: f64, budget: &Budget) -> Result<Option<TriMesh>, Stopped> {
     if !is_finer(mesh, most) {
         return Ok(None);
     }
@@ -56,7 +60,7 @@ pub(super) fn decimated(mesh: &TriMesh, most: f64, longest: f64, budget: &Budget
     let faces = Faces::of_mesh(mesh);
     let mut may_be_off = vec![most; mesh.vertices.len()];
     for _ in 0..ROUNDS {
-        let mut decimation = Decimation::new(mesh, longest);
+        let mut decimation = Decimation::new(mesh, farthest);
         decimation.sweep(&may_be_off, PASSES[PASSES.len() - 1], SHORT, budget)?;
         for share in PASSES {
             decimation.sweep(&may_be_off, share, 1.0, budget)?;
@@ -68,7 +72,7 @@ pub(super) fn decimated(mesh: &TriMesh, most: f64, longest: f64, budget: &Budget
         let of_mesh = uncovered(mesh, &Faces::of_mesh(&fewer), most, budget)?;
         let of_fewer = uncovered(&fewer, &faces, most, budget)?;
         if of_mesh.is_empty() && of_fewer.is_empty() {
-            let serves = longest == f64::INFINITY || (is_closed(&fewer) && Crossings::of(&fewer, budget)?.count == 0);
+            let serves = farthest == f64::INFINITY || (is_closed(&fewer) && Crossings::of(&fewer, budget)?.count == 0);
             return Ok(serves.then_some(fewer));
         }
         let mut is_nearer = vec![false; may_be_off.len()];
@@ -79,16 +83,29 @@ pub(super) fn decimated(mesh: &TriMesh, most: f64, longest: f64, budget: &Budget
     Ok(None)
 }
 
-/// Whether a mesh may be worth it: triangles of a smooth surface are off by an eighth of what their neighbours' corners are off their planes, and there are as many times more of them as they are less off.
+/// Whether a mesh may be worth it: triangles of a smooth surface are off by an eighth of what their neighbours' corners are off their planes, and there are as many times more of them as they are less off. Sharp edges, as around the ends of cylinders, tell nothing of that, if most sides are none.
 pub(super) fn is_finer(mesh: &TriMesh, most: f64) -> bool {
     let joined = HalfEdges::new(mesh.vertices.iter().map(|vertex| vertex.to_array()).collect(), &mesh.triangles);
-    let height = |half: u32| {
-        let twin = joined.twin(half);
-        let [a, b, c] = mesh.points_of(half / 3);
-        let up = unit(&cross(&subtract(&b, &a), &subtract(&c, &a)));
-        (twin != NONE).then(|| dot(&up, &subtract(&joined.points[joined.end(next(twin)) as usize], &a)).abs())
+    let up = |triangle: u32| {
+        let [a, b, c] = mesh.points_of(triangle);
+        unit(&cross(&subtract(&b, &a), &subtract(&c, &a)))
     };
-    let (sum, count) = (0..3 * joined.triangles()).filter_map(height).fold((0.0, 0), |(sum, count), own| (sum + own, count + 1));
+    let ups: Vec<Point> = (0..joined.triangles()).map(up).collect();
+    let (mut all, mut smooth) = ((0_u32, 0.0), (0_u32, 0.0));
+    for half in 0..3 * joined.triangles() {
+        let twin = joined.twin(half);
+        if twin == NONE {
+            continue;
+        }
+        let [own, other] = [half, twin].map(|half| &ups[half as usize / 3]);
+        let beside = &joined.points[joined.end(next(twin)) as usize];
+        let height = dot(own, &subtract(beside, &mesh.points_of(half / 3)[0])).abs();
+        all = (all.0 + 1, all.1 + height);
+        if dot(own, other) >= SHARP {
+            smooth = (smooth.0 + 1, smooth.1 + height);
+        }
+    }
+    let (count, sum) = if 2 * smooth.0 > all.0 { smooth } else { all };
     count > 0 && 8.0 * most * f64::from(count) >= MISSED * WORTH as f64 * sum
 }
 
@@ -124,8 +141,11 @@ struct Decimation {
     is_border: Vec<bool>,
     /// Vertices all of whose triangles are around them one after the other, and have no side that is not one of two triangles.
     may_move: Vec<bool>,
-    /// How long sides may be that come, stay or go, squared, and how good triangles, unless those before were as bad.
-    longest_squared: f64,
+    /// How far vertices may be from what they become; no less than how far those are that became one; and of those the next one, around a ring.
+    farthest: f64,
+    moved: Vec<f64>,
+    next_of: Vec<u32>,
+    /// How good triangles have to be, unless those before were as bad.
     least: Quality,
     mender: Mender,
     removed: Removed,
@@ -168,12 +188,11 @@ impl Fresh {
     }
 }
 
-/// A triangle with its unit normal, twice its area, the square of its longest side, and how good it is.
+/// A triangle with its unit normal, twice its area, and how good it is.
 struct Facet {
     corners: [Point; 3],
     normal: Point,
     double: f64,
-    longest_squared: f64,
     quality: Quality,
 }
 
@@ -186,23 +205,17 @@ impl Facet {
         let longest_squared = distance_squared(a, b).max(distance_squared(b, c)).max(distance_squared(c, a));
         let normal = raw.map(|part| part / double);
         let lean = ups.iter().map(|up| dot(&normal, up)).fold(1.0, f64::min);
-        (double > 0.0).then(|| Self {
-            normal,
-            double,
-            longest_squared,
-            quality: Quality { lean, height: double / longest_squared },
-            corners,
-        })
+        (double > 0.0).then(|| Self { normal, double, quality: Quality { lean, height: double / longest_squared }, corners })
     }
 
-    /// Whether it is as good as it has to be, or as what was there before.
+    /// Whether it is as good as it has to be, or as what was there before: beside sharp edges triangles lean from the normals there.
     fn serves(&self, least: Quality, old: Option<&Self>) -> bool {
         let own = self.quality;
-        let Quality { lean, height } = old.map_or(least, |old| Quality {
-            lean: old.quality.lean.min(least.lean) - ROUNDED,
-            height: old.quality.height.min(least.height),
-        });
-        own.lean >= lean.max(POOR.lean) && own.height >= height
+        let Some(Quality { lean, height }) = old.map(|old| old.quality) else {
+            return own.lean >= least.lean && own.height >= least.height;
+        };
+        let lean = (lean.min(least.lean) - ROUNDED).max(POOR.lean.min(lean - ROUNDED)).max(LEAST_LEAN);
+        own.lean >= lean && own.height >= height.min(least.height)
     }
 
     /// How far inside a place is, seen along the normal: the least of its shares in the corners.
@@ -216,7 +229,7 @@ impl Facet {
 }
 
 impl Decimation {
-    fn new(mesh: &TriMesh, longest: f64) -> Self {
+    fn new(mesh: &TriMesh, farthest: f64) -> Self {
         let beyond = mesh.vertices.len() as u32;
         let points: Vec<Point> = mesh.vertices.iter().map(|vertex| vertex.to_array()).chain([[0.0; 3]]).collect();
         let joined = HalfEdges::new(points.clone(), &mesh.triangles);
@@ -256,8 +269,8 @@ impl Decimation {
         };
         let may_move = (0..beyond).map(may_move).collect();
         let (removed, fresh, old, lengths) = (Removed::new(all.len(), beyond as usize), Vec::new(), Vec::new(), Vec::new());
-        let longest_squared = longest * longest;
-        Self { mesh: joined, beyond, ups, is_border, may_move, longest_squared, least: FAIR, mender, removed, fresh, old, lengths }
+        let (moved, next_of) = (vec![0.0; count], (0..count as u32).collect());
+        Self { mesh: joined, beyond, ups, is_border, may_move, farthest, moved, next_of, least: FAIR, mender, removed, fresh, old, lengths }
     }
 
     /// Removes vertices as long as none that is gone is farther from what is left than a share of what it may be off, along sides that are no longer than a share of the longest one around it.
@@ -273,11 +286,12 @@ impl Decimation {
             let longest = self.lengths.iter().map(|length| length.0).fold(0.0, f64::max);
             for index in 0..self.lengths.len() {
                 let (length, m) = self.lengths[index];
-                if length > short * short * longest || length > self.longest_squared {
+                if length > short * short * longest {
                     break;
                 }
+                let Some(moved) = self.farthest_of(vertex, m) else { continue };
                 if self.serves(m, may_be_off, share) && self.mender.keeps_manifold(&self.mesh, m) {
-                    self.collapse(vertex, m);
+                    self.collapse(vertex, m, moved);
                     break;
                 }
             }
@@ -328,9 +342,7 @@ impl Decimation {
             Some(Fresh::Triangle(old)) => Some(old),
             _ => None,
         };
-        let is_short = self.longest_squared == f64::INFINITY
-            || old.is_some_and(|old| facet.longest_squared.max(old.longest_squared) <= self.longest_squared);
-        (is_short && facet.serves(self.least, old)).then_some(Fresh::Triangle(facet))
+        facet.serves(self.least, old).then_some(Fresh::Triangle(facet))
     }
 
     /// Whether the star's vertex may move to ring m: with nothing that is gone farther from what is left, nor the middles of sides before and after from each other.
@@ -363,7 +375,25 @@ impl Decimation {
         serves && are_before() && others.all(|k| is_near(closest(old.iter().flatten(), &middle(ring[m], ring[k]), false)))
     }
 
-    fn collapse(&mut self, vertex: u32, m: usize) {
+    /// No less than how far all that became the star's vertex is from ring m; none where that is too far.
+    fn farthest_of(&self, vertex: u32, m: usize) -> Option<f64> {
+        let at = |vertex: u32| &self.mesh.points[vertex as usize];
+        let to = at(self.mender.star.ring[m]);
+        let most = self.moved[vertex as usize] + distance_squared(at(vertex), to).sqrt();
+        if most <= self.farthest {
+            return Some(most);
+        }
+        let others = std::iter::successors(Some(vertex), |&other| Some(self.next_of[other as usize]).filter(|&next| next != vertex));
+        let exact = others.map(|other| distance_squared(at(other), to)).fold(0.0, f64::max).sqrt();
+        (exact <= self.farthest).then_some(exact)
+    }
+
+    /// Makes the star's vertex ring m, from which what became it is no farther than told.
+    fn collapse(&mut self, vertex: u32, m: usize, moved: f64) {
+        let target = self.mender.star.ring[m];
+        let farthest = &mut self.moved[target as usize];
+        *farthest = farthest.max(moved);
+        self.next_of.swap(vertex as usize, target as usize);
         self.mesh.collapse(vertex, &self.mender.star, m);
         self.removed.remove(&self.mender.star, m);
     }

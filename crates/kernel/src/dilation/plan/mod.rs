@@ -48,8 +48,6 @@ const CLOSE: f64 = 1.6;
 const COARSER: u32 = 1;
 /// How far the surface passes from filled vertices, in units of the ball's radius.
 const FILLED_CUT: f64 = 0.25;
-/// The ball around a tetrahedron has at most this radius, in units of its longest edge: sqrt(3 / 8) (Jung, 1901).
-pub(super) const JUNG: f64 = 0.612_373;
 /// See [`Setting`], in the same units.
 const NECK: f64 = 0.36;
 /// A pitch finer than this many roundings of single precision cannot be carried.
