@@ -25,11 +25,11 @@ const SMOOTH_SHARE: f64 = 0.2;
 /// Share of it by which they may move where they turn back.
 const UNFOLDED_SHARE: f64 = 0.2;
 
-/// Share of the tolerance that fewer triangles may use which stand for a mesh of at least so many; and of one of fewer, such as cylinders with long thin triangles: so near to it the topology of either is that of the other one, mostly.
+/// Shares of the tolerance that fewer triangles may use which stand for a mesh, as they are tried: of at least so many, and of fewer, such as cylinders with long thin triangles. The nearer to it they are, the more often the topology of either is shown to be that of the other one; where that of few is not, all of them are asked.
 const MANY_TRIANGLES: usize = 20_000;
-const DECIMATED_SHARE: f64 = 0.2;
+const SHARES_OF_MANY: &[f64] = &[0.2];
 const FEW_TRIANGLES: usize = 500;
-const FEW_SHARE: f64 = 0.0125;
+const SHARES_OF_FEW: &[f64] = &[0.0125, 0.05, 0.2];
 /// Bytes that it takes for each of these at most to find them.
 const BYTES_PER_TRIANGLE: u64 = 1_000;
 
@@ -141,9 +141,9 @@ impl<'a> Drawn<'a> {
         Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest })
     }
 
-    /// Fewer triangles for a mesh that is finer than needed, within their share of the tolerance, times `coarseness`; `None` where it is no such.
+    /// Fewer triangles for a mesh that is finer than needed, within the first of their shares of the tolerance that serves, times `coarseness`; `None` where it is no such.
     pub(super) fn decimated(
-        Finer { mesh, is_solid, share }: &Finer,
+        Finer { mesh, is_solid, shares }: &Finer,
         attractor: &'a Attractor,
         radius: Radius,
         tolerance: Tolerance,
@@ -152,12 +152,16 @@ impl<'a> Drawn<'a> {
     ) -> Result<Option<Self>, DilationError> {
         let radius = radius.mm();
         let aimed = tolerance.mm().min(0.5 * radius);
-        let share = coarseness * share * aimed;
         // Whatever is farther from the surface than this is in both solids, or in none.
         let farthest = if *is_solid { NEAR_SURFACE * (radius - aimed) } else { f64::INFINITY };
-        let Some(fewer) = decimated(mesh, share, farthest, budget)? else { return Ok(None) };
-        let bounds = bounding_box(attractor, budget)?;
-        Ok(Attractor::of_triangles(&fewer, *is_solid).and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, share])))
+        for share in *shares {
+            let share = coarseness * share * aimed;
+            if let Some(fewer) = decimated(mesh, share, farthest, budget)? {
+                let (bounds, drawn) = (bounding_box(attractor, budget)?, Attractor::of_triangles(&fewer, *is_solid));
+                return Ok(drawn.and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, share])));
+            }
+        }
+        Ok(None)
     }
 
     /// The plan of its dilation, as that of the other one.
@@ -167,14 +171,19 @@ impl<'a> Drawn<'a> {
     }
 }
 
-/// A mesh in one piece of triangles that are finer than needed, whether it bounds a solid, and the share of the tolerance that fewer of them may use.
+/// A mesh in one piece of triangles that are finer than needed, whether it bounds a solid, and shares of the tolerance that fewer of them may use, the least first.
 pub(super) struct Finer {
     mesh: TriMesh,
     is_solid: bool,
-    share: f64,
+    shares: &'static [f64],
 }
 
 impl Finer {
+    /// Whether it has so few triangles that all of them may be asked where fewer do not tell the topology.
+    pub(super) fn has_few(&self) -> bool {
+        self.mesh.triangles.len() < MANY_TRIANGLES
+    }
+
     /// None where it is something else: parts that are alike are made once, as they are.
     pub(super) fn of(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Option<Self> {
         let count = attractor.roots().len();
@@ -183,10 +192,10 @@ impl Finer {
         }
         let (mut mesh, is_solid) = attractor.triangles()?;
         mesh.triangles = without_lines(mesh.triangles)?;
-        let share = if mesh.triangles.len() < MANY_TRIANGLES { FEW_SHARE } else { DECIMATED_SHARE };
-        let most = share * tolerance.mm().min(0.5 * radius.mm());
+        let shares = if mesh.triangles.len() < MANY_TRIANGLES { SHARES_OF_FEW } else { SHARES_OF_MANY };
+        let most = shares.last()? * tolerance.mm().min(0.5 * radius.mm());
         let is_whole = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles).all().iter().all(|&group| group == 0);
-        (is_whole && is_finer(&mesh, most)).then_some(Self { mesh, is_solid, share })
+        (is_whole && is_finer(&mesh, most)).then_some(Self { mesh, is_solid, shares })
     }
 }
 

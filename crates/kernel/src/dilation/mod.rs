@@ -196,7 +196,14 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
         (None, Some(framed)) => on_lattice(framed).map(Some),
         (made, _) => Ok(made),
     };
-    order.planned(COARSE, budget, |plan| plan.run(finer, instead, budget))
+    let made = order.planned(COARSE, budget, |plan| plan.run(finer, instead, budget))?;
+    if made.topology_exact || !order.finer.as_ref().is_some_and(Finer::has_few) {
+        return Ok(made);
+    }
+    // What a few triangles fewer leave in doubt the mesh itself may tell.
+    let whole = order.plan_of(order.attractor, COARSE, budget)?;
+    let own = unless_stopped(whole.run(finer, instead, budget).map(Some))?;
+    Ok(own.filter(|own| own.topology_exact).unwrap_or(made))
 }
 
 /// Cells of a graph. Many are left to rays at once; few serve better themselves, unless they need a lattice.
