@@ -196,8 +196,12 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
         (None, Some(framed)) => on_lattice(framed).map(Some),
         (made, _) => Ok(made),
     };
-    let made = order.planned(COARSE, budget, |plan| plan.run(finer, instead, budget))?;
-    if made.topology_exact || !order.finer.as_ref().is_some_and(Finer::has_few) {
+    let mut has_fewer = false;
+    let made = order.planned(COARSE, budget, |plan| {
+        has_fewer = plan.stands_for_shape();
+        plan.run(finer, instead, budget)
+    })?;
+    if made.topology_exact || !has_fewer || !order.finer.as_ref().is_some_and(Finer::has_few) {
         return Ok(made);
     }
     // What a few triangles fewer leave in doubt the mesh itself may tell.

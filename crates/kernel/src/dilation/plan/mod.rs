@@ -262,6 +262,11 @@ impl<'a> Plan<'a> {
         Self { meant, ..self }
     }
 
+    /// Whether it is that of triangles which stand for another shape.
+    pub(super) fn stands_for_shape(&self) -> bool {
+        self.meant.shape.is_some()
+    }
+
     /// The same with sites that are nearer to what they stand for around some places: all that may be closest to these.
     fn closer(&self, places: &[Point], share: f64) -> Self {
         Self { rule: self.rule.closer(places, self.radius + 2.0 * self.rule.outer_reserve(), share), ..self.clone() }
