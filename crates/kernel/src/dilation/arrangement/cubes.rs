@@ -150,6 +150,8 @@ enum Known {
     Meet(Point),
     /// No such place was found; whether the dilations have a common point.
     Doubtful(Common),
+    /// The same, and in some cube it was left in doubt.
+    InDoubt(Common),
 }
 
 /// A search in a part of space.
@@ -194,6 +196,8 @@ enum Of {
     /// They do nothing there, and no set that holds them does.
     Apart,
     Doubtful(Common),
+    /// The same of a set that is in doubt elsewhere.
+    InDoubt(Common),
 }
 
 impl<'a> Search<'a> {
@@ -362,8 +366,14 @@ impl<'a> Search<'a> {
         let common = match self.of(cube, list, places) {
             Of::Meet => return Some(true),
             Of::Apart => return Some(false),
-            Of::Doubtful(_) if !self.stage.is_last => return None,
+            Of::Doubtful(_) | Of::InDoubt(_) if !self.stage.is_last => return None,
             Of::Doubtful(common) => common,
+            // It is told anew when its polytopes are other ones, which they have to be: along faces that hardly meet smaller cubes would be many.
+            Of::InDoubt(common) => {
+                let set: Vec<u32> = places.iter().map(|&place| list[place]).collect();
+                self.found.doubts.push((name(&set), common));
+                return Some(common != Common::None);
+            }
         };
         // There may be others that hide them, or they may do nothing but elsewhere. Solids hide what is flat, and where cubes would be many.
         let may_be_settled = !is_small && list.len() > places.len();
@@ -379,7 +389,9 @@ impl<'a> Search<'a> {
         if may_be_settled {
             return None;
         }
-        self.found.doubts.push((name(&set), common));
+        let name = name(&set);
+        self.known.insert(name, Known::InDoubt(common));
+        self.found.doubts.push((name, common));
         Some(common != Common::None)
     }
 
@@ -411,6 +423,7 @@ impl<'a> Search<'a> {
                 Of::Meet
             }
             Known::Doubtful(common) => Of::Doubtful(common),
+            Known::InDoubt(common) => Of::InDoubt(common),
         }
     }
 
