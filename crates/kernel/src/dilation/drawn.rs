@@ -25,11 +25,14 @@ const SMOOTH_SHARE: f64 = 0.2;
 /// Share of it by which they may move where they turn back.
 const UNFOLDED_SHARE: f64 = 0.2;
 
-/// Shares of the tolerance that fewer triangles may use which stand for a mesh, as they are tried: of at least so many, and of fewer, such as cylinders with long thin triangles. The nearer to it they are, the more often the topology of either is shown to be that of the other one; where that of few is not, all of them are asked.
+/// Shares of the tolerance that fewer triangles may use which stand for a mesh: of at least so many, and of fewer, such as turned parts with long thin triangles, as they are tried. The nearer to it they are, the more often the topology of either is shown to be that of the other one; where that of few is not, all of them are asked.
 const MANY_TRIANGLES: usize = 20_000;
-const SHARES_OF_MANY: &[f64] = &[0.2];
+const SHARE_OF_MANY: f64 = 0.2;
 const FEW_TRIANGLES: usize = 500;
-const SHARES_OF_FEW: &[f64] = &[0.0125, 0.05, 0.2];
+pub(super) const SHARES_OF_FEW: [f64; 3] = [0.0125, 0.05, 0.2];
+/// Of so many triangles one has to be left at most for it to be worth while. Of many not all can be asked where those that are left do not tell the topology.
+const WORTH_OF_MANY: usize = 8;
+pub(super) const WORTH_OF_FEW: usize = 3;
 /// Bytes that it takes for each of these at most to find them.
 const BYTES_PER_TRIANGLE: u64 = 1_000;
 
@@ -141,27 +144,24 @@ impl<'a> Drawn<'a> {
         Some(Self { attractor, balls: Balls { least: radius, most: radius }, meant, rest })
     }
 
-    /// Fewer triangles for a mesh that is finer than needed, within the first of their shares of the tolerance that serves, times `coarseness`; `None` where it is no such.
+    /// Fewer triangles for a mesh that is finer than needed, within a share of the tolerance; `None` where it is no such.
     pub(super) fn decimated(
-        Finer { mesh, is_solid, shares }: &Finer,
+        finer: &Finer,
         attractor: &'a Attractor,
         radius: Radius,
         tolerance: Tolerance,
-        coarseness: f64,
+        share: f64,
         budget: &Budget,
     ) -> Result<Option<Self>, DilationError> {
+        let Finer { mesh, is_solid } = finer;
         let radius = radius.mm();
         let aimed = tolerance.mm().min(0.5 * radius);
         // Whatever is farther from the surface than this is in both solids, or in none.
         let farthest = if *is_solid { NEAR_SURFACE * (radius - aimed) } else { f64::INFINITY };
-        for share in *shares {
-            let share = coarseness * share * aimed;
-            if let Some(fewer) = decimated(mesh, share, farthest, budget)? {
-                let (bounds, drawn) = (bounding_box(attractor, budget)?, Attractor::of_triangles(&fewer, *is_solid));
-                return Ok(drawn.and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, share])));
-            }
-        }
-        Ok(None)
+        let most = share * aimed;
+        let Some(fewer) = decimated(mesh, most, farthest, finer.worth(), budget)? else { return Ok(None) };
+        let (bounds, drawn) = (bounding_box(attractor, budget)?, Attractor::of_triangles(&fewer, *is_solid));
+        Ok(drawn.and_then(|drawn| Self::near(Some(attractor), drawn, &bounds, radius, [aimed, most])))
     }
 
     /// The plan of its dilation, as that of the other one.
@@ -171,19 +171,13 @@ impl<'a> Drawn<'a> {
     }
 }
 
-/// A mesh in one piece of triangles that are finer than needed, whether it bounds a solid, and shares of the tolerance that fewer of them may use, the least first.
+/// A mesh in one piece of triangles that are finer than needed, and whether it bounds a solid.
 pub(super) struct Finer {
     mesh: TriMesh,
     is_solid: bool,
-    shares: &'static [f64],
 }
 
 impl Finer {
-    /// Whether it has so few triangles that all of them may be asked where fewer do not tell the topology.
-    pub(super) fn has_few(&self) -> bool {
-        self.mesh.triangles.len() < MANY_TRIANGLES
-    }
-
     /// None where it is something else: parts that are alike are made once, as they are.
     pub(super) fn of(attractor: &Attractor, radius: Radius, tolerance: Tolerance, budget: &Budget) -> Option<Self> {
         let count = attractor.roots().len();
@@ -192,10 +186,25 @@ impl Finer {
         }
         let (mut mesh, is_solid) = attractor.triangles()?;
         mesh.triangles = without_lines(mesh.triangles)?;
-        let shares = if mesh.triangles.len() < MANY_TRIANGLES { SHARES_OF_FEW } else { SHARES_OF_MANY };
-        let most = shares.last()? * tolerance.mm().min(0.5 * radius.mm());
         let is_whole = Groups::of_triangles(mesh.vertices.len(), &mesh.triangles).all().iter().all(|&group| group == 0);
-        (is_whole && is_finer(&mesh, most)).then_some(Self { mesh, is_solid, shares })
+        let finer = Self { mesh, is_solid };
+        let most = finer.most_share() * tolerance.mm().min(0.5 * radius.mm());
+        (is_whole && is_finer(&finer.mesh, most, finer.worth())).then_some(finer)
+    }
+
+    /// Whether it has so few triangles that all of them may be asked where fewer do not tell the topology.
+    pub(super) fn has_few(&self) -> bool {
+        self.mesh.triangles.len() < MANY_TRIANGLES
+    }
+
+    /// The largest share of the tolerance that fewer triangles may use.
+    pub(super) fn most_share(&self) -> f64 {
+        if self.has_few() { SHARES_OF_FEW.into_iter().fold(0.0, f64::max) } else { SHARE_OF_MANY }
+    }
+
+    /// Of so many triangles one has to be left at most.
+    fn worth(&self) -> usize {
+        if self.has_few() { WORTH_OF_FEW } else { WORTH_OF_MANY }
     }
 }
 

@@ -19,7 +19,7 @@
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
 //! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`); around most solids, and NURBS volumes that are proven to be such (`volume` in `attractor`), there is one outside.
-//! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them.
+//! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them; of few triangles only where fewer tell the topology.
 //! For graphs over a convex part of a plane that have very many cells, as rough ones do, rays stand that lead down and up from a few of their places (`peaks`): between two sheets is all that is near to these.
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
 //!
@@ -71,7 +71,7 @@ use crate::budget::{Budget, Limits};
 use crate::measure::bounds::AxisBox;
 use crate::solid::Solid;
 use crate::tolerance::{Radius, Tolerance};
-use drawn::{Drawn, Finer, unless_stopped};
+use drawn::{Drawn, Finer, SHARES_OF_FEW, unless_stopped};
 pub use error::DilationError;
 use plan::{Balls, Plan};
 pub use stability::{Change, CriticalRadius, Stability, Verdict, stability};
@@ -196,18 +196,14 @@ fn run(order: &Order<'_>, budget: &Budget) -> Result<Dilation, DilationError> {
         (None, Some(framed)) => on_lattice(framed).map(Some),
         (made, _) => Ok(made),
     };
-    let mut has_fewer = false;
-    let made = order.planned(COARSE, budget, |plan| {
-        has_fewer = plan.stands_for_shape();
-        plan.run(finer, instead, budget)
-    })?;
-    if made.topology_exact || !has_fewer || !order.finer.as_ref().is_some_and(Finer::has_few) {
-        return Ok(made);
+    let aside = budget.aside();
+    if let Some(dilation) = order.by_fewer(&aside, |plan| plan.run_if_told(&aside))? {
+        budget.prove(dilation.inner_mm.max(dilation.outer_mm));
+        return Ok(dilation);
     }
-    // What a few triangles fewer leave in doubt the mesh itself may tell.
-    let whole = order.plan_of(order.attractor, COARSE, budget)?;
-    let own = unless_stopped(whole.run(finer, instead, budget).map(Some))?;
-    Ok(own.filter(|own| own.topology_exact).unwrap_or(made))
+    // What these leave in doubt the mesh itself may tell, unless that is too much.
+    let made = order.planned(COARSE, budget, |plan| plan.run(finer, instead, budget));
+    order.or_by_fewer(made, budget, |plan| plan.run_arranged(budget))
 }
 
 /// Cells of a graph. Many are left to rays at once; few serve better themselves, unless they need a lattice.
@@ -259,6 +255,36 @@ impl<'a> Order<'a> {
             };
         };
         unless_stopped(smooth.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))
+    }
+
+    /// What comes of the plan by fewer triangles for a mesh of few that are finer than needed: the nearest to it that serve.
+    fn by_fewer<T>(
+        &self,
+        budget: &Budget,
+        work: impl Fn(&Plan<'_>) -> Result<Option<T>, DilationError>,
+    ) -> Result<Option<T>, DilationError> {
+        let Some(finer) = self.finer.as_ref().filter(|finer| finer.has_few()) else { return Ok(None) };
+        for share in SHARES_OF_FEW {
+            let Some(fewer) = Drawn::decimated(finer, self.attractor, self.radius, self.tolerance, share, budget)? else { continue };
+            let made = unless_stopped(fewer.plan(self.simplify, COARSE, budget).and_then(|plan| work(&plan)))?;
+            if made.is_some() {
+                return Ok(made);
+            }
+        }
+        Ok(None)
+    }
+
+    /// What was made; or where that was refused, the same by fewer triangles.
+    fn or_by_fewer<T>(
+        &self,
+        made: Result<T, DilationError>,
+        budget: &Budget,
+        work: impl Fn(&Plan<'_>) -> Result<Option<T>, DilationError>,
+    ) -> Result<T, DilationError> {
+        match made {
+            Err(error) if !matches!(error, DilationError::Stopped(_)) => self.by_fewer(budget, work)?.ok_or(error),
+            made => made,
+        }
     }
 
     /// The same shape by frames; none where there are not far fewer cells of these.
@@ -318,13 +344,17 @@ impl<'a> Order<'a> {
         let Self { attractor, radius, tolerance, simplify, .. } = *self;
         let resolved = Drawn::resolved(attractor, radius, tolerance, coarseness, budget)?;
         let drawn = match (resolved, &self.finer) {
-            (None, Some(finer)) => Drawn::decimated(finer, attractor, radius, tolerance, coarseness, budget)?,
+            (None, Some(finer)) if !finer.has_few() => {
+                Drawn::decimated(finer, attractor, radius, tolerance, coarseness * finer.most_share(), budget)?
+            }
             (resolved, _) => resolved,
         };
         match drawn {
             Some(drawn) => work(&drawn.plan(simplify, coarseness, budget)?),
             None => {
                 let whole = self.plan_of(attractor, coarseness, budget)?;
+                // Of a finer mesh these were asked first, see `in_sheets`.
+                let whole = if self.finer.is_some() { whole.without_sheets() } else { whole };
                 match whole.split(budget)? {
                     Some(split) => work(&self.plan_of(&split, coarseness, budget)?),
                     None => work(&whole),
@@ -393,5 +423,9 @@ pub fn predict(
         (None, Some(framed)) => on_lattice(framed).map(Some),
         (made, _) => Ok(made),
     };
-    order.planned(COARSE, budget, |plan| plan.predict(instead, budget))
+    if let Some(prediction) = order.by_fewer(budget, |plan| plan.predict_if_told(budget))? {
+        return Ok(prediction);
+    }
+    let made = order.planned(COARSE, budget, |plan| plan.predict(instead, budget));
+    order.or_by_fewer(made, budget, |plan| plan.predict_arranged(budget))
 }

@@ -155,6 +155,17 @@ impl Faces {
         });
     }
 
+    /// Whether one of them is no farther from a place than a distance.
+    pub(in crate::dilation) fn have_within(&self, x: &Point, distance: f64) -> bool {
+        let (mut is_within, most) = (false, distance * distance);
+        self.around(std::slice::from_ref(x), distance, |item| {
+            let face = &self.all[item as usize];
+            is_within = face.may_be_nearer(x, most) && face.distance_squared(x) <= most;
+            !is_within
+        });
+        is_within
+    }
+
     /// Where a triangle is nearer or farther than it has to be, given what may be closest to a place. Cost: about a tenth of a microsecond for each face near to it.
     pub(super) fn fault_with(&self, offer: impl Fn(&Point) -> Option<u32>, question: &Question, memory: &mut Memory) -> Option<Fault> {
         let Question { triangle, feet, owners, inner, outer } = question;

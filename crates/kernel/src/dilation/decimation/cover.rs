@@ -11,8 +11,9 @@ use rayon::prelude::*;
 
 /// How far beyond its sides the piece goes that a triangle is near to, in units of the distance.
 const MARGIN: f64 = 0.25;
-/// Pieces of a triangle at most, and corners of a piece.
-const MOST_PIECES: usize = 1 << 20;
+/// Pieces of a triangle at most, in any case and for each of the faces near to it, of which a few are enough where it is near to all of it with some room; and corners of a piece.
+const FEW_PIECES: usize = 1 << 12;
+const PIECES_OF_A_FACE: usize = 64;
 const MOST_CORNERS: usize = 16;
 /// What rounding may take of the distance, as a share of it, and in roundings of coordinates.
 const ROUNDED: f64 = 1e-9;
@@ -31,9 +32,9 @@ pub(super) fn uncovered(mesh: &TriMesh, faces: &Faces, most: f64, budget: &Budge
     let extent = mesh.vertices.iter().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max);
     let most = most * (1.0 - ROUNDED) - ROUNDINGS * f64::EPSILON * extent;
     let look = |row: &[u32]| {
-        let (mut open, mut found) = (Vec::new(), Vec::new());
+        let (mut cover, mut found) = (Cover { faces, most, near: Vec::new(), open: Vec::new(), listed: Vec::new() }, Vec::new());
         for &triangle in row {
-            if !is_covered(&mesh.points_of(triangle), faces, most, &mut open, budget)? {
+            if !cover.is_whole(&mesh.points_of(triangle), budget)? {
                 found.push(triangle);
             }
         }
@@ -43,41 +44,111 @@ pub(super) fn uncovered(mesh: &TriMesh, faces: &Faces, most: f64, budget: &Budge
     Ok(all.concat())
 }
 
-/// Whether faces are near to all of a triangle, given room for what of it is open.
-fn is_covered(triangle: &[Point; 3], faces: &Faces, most: f64, open: &mut Vec<Piece>, budget: &Budget) -> Result<bool, Stopped> {
-    open.clear();
-    open.push(Piece::new(triangle));
-    for number in 0..MOST_PIECES {
-        if number % IN_A_ROW == 0 {
-            budget.cancel.check()?;
-        }
-        let Some(piece) = open.pop() else { return Ok(true) };
-        let middle = piece.middle();
-        let (mut closest, mut square) = (None, most * most);
-        faces.around(std::slice::from_ref(&middle), most, |face| {
-            let own = &faces.all[face as usize];
-            let distance = if own.may_be_nearer(&middle, square) { own.distance_squared(&middle) } else { f64::INFINITY };
-            if distance <= square {
-                (closest, square) = (Some(own), distance);
-            }
-            true
-        });
-        let Some(closest) = closest else { return Ok(false) };
-        piece.part(closest, most, open);
-    }
-    Ok(false)
+/// Looks at triangles one after the other.
+struct Cover<'a> {
+    faces: &'a Faces,
+    most: f64,
+    /// The faces that are near to a triangle.
+    near: Vec<Near<'a>>,
+    /// What of it is open.
+    open: Vec<Piece>,
+    /// By their places in `near`, those that may be near to the piece that is looked at, after those of the pieces that it is a part of: among long thin faces most are near to little of a triangle.
+    listed: Vec<u32>,
 }
 
-/// A convex polygon.
+impl Cover<'_> {
+    /// Whether faces are near to all of a triangle.
+    fn is_whole(&mut self, triangle: &[Point; 3], budget: &Budget) -> Result<bool, Stopped> {
+        let Self { faces, most, near, open, listed } = self;
+        let (faces, most) = (*faces, *most);
+        near.clear();
+        faces.around(triangle, most, |face| {
+            near.extend(Some(Near::of(&faces.all[face as usize])).filter(|near| near.may_reach(triangle, most)));
+            true
+        });
+        listed.clear();
+        listed.extend(0..near.len() as u32);
+        open.clear();
+        open.push(Piece::new(triangle, [0, listed.len()]));
+        for number in 0..FEW_PIECES + PIECES_OF_A_FACE * near.len() {
+            if number % IN_A_ROW == 0 {
+                budget.cancel.check()?;
+            }
+            let Some(mut piece) = open.pop() else { return Ok(true) };
+            let [first, end] = piece.listed;
+            listed.truncate(end);
+            for place in first..end {
+                let own = listed[place];
+                if near[own as usize].may_reach(piece.corners(), most) {
+                    listed.push(own);
+                }
+            }
+            if listed.len() - end < end - first {
+                piece.listed = [end, listed.len()];
+            } else {
+                listed.truncate(end);
+            }
+            let [first, end] = piece.listed;
+            let middle = piece.middle();
+            let (mut closest, mut square) = (None, most * most);
+            for near in listed[first..end].iter().map(|&own| &near[own as usize]) {
+                if near.square(&middle) <= square {
+                    let distance = near.face.distance_squared(&middle);
+                    if distance <= square {
+                        (closest, square) = (Some(near), distance);
+                    }
+                }
+            }
+            let Some(closest) = closest else { return Ok(false) };
+            piece.part(closest, most, open);
+        }
+        Ok(false)
+    }
+}
+
+/// A face, its plane, and the planes across that through its sides: unit vectors, outwards, and heights along them.
+struct Near<'a> {
+    face: &'a Face,
+    plane: (Point, f64),
+    sides: [(Point, f64); 3],
+}
+
+impl<'a> Near<'a> {
+    fn of(face: &'a Face) -> Self {
+        let side = |k: usize| {
+            let (a, b) = (&face.corners[k], &face.corners[(k + 1) % 3]);
+            let out = unit(&cross(&subtract(b, a), &face.normal));
+            (out, dot(&out, a))
+        };
+        Self { face, plane: (face.normal, dot(&face.normal, &face.corners[0])), sides: [0, 1, 2].map(side) }
+    }
+
+    /// Whether it may be within a distance of the hull of some corners, as far as its planes tell.
+    fn may_reach(&self, corners: &[Point], distance: f64) -> bool {
+        let beyond = |(out, height): &(Point, f64)| corners.iter().all(|corner| dot(out, corner) - height > distance);
+        let (up, height) = self.plane;
+        !beyond(&self.plane) && !beyond(&(up.map(|part| -part), -height)) && !self.sides.iter().any(beyond)
+    }
+
+    /// The square of how far a place is from it, or less.
+    fn square(&self, x: &Point) -> f64 {
+        let (up, height) = &self.plane;
+        let aside = self.sides.iter().map(|(out, height)| dot(out, x) - height).fold(0.0, f64::max);
+        (dot(up, x) - height).powi(2) + aside * aside
+    }
+}
+
+/// A convex polygon, and where those are listed that may be near to what it is a part of.
 #[derive(Clone, Copy)]
 struct Piece {
     corners: [Point; MOST_CORNERS],
     count: usize,
+    listed: [usize; 2],
 }
 
 impl Piece {
-    fn new(corners: &[Point]) -> Self {
-        let mut own = Self { corners: [[0.0; 3]; MOST_CORNERS], count: corners.len() };
+    fn new(corners: &[Point], listed: [usize; 2]) -> Self {
+        let mut own = Self { corners: [[0.0; 3]; MOST_CORNERS], count: corners.len(), listed };
         own.corners[..corners.len()].copy_from_slice(corners);
         own
     }
@@ -91,25 +162,21 @@ impl Piece {
     }
 
     /// Adds what of it a face is not shown to be near to, in parts.
-    fn part(mut self, face: &Face, most: f64, open: &mut Vec<Self>) {
+    fn part(mut self, Near { face, sides, .. }: &Near<'_>, most: f64, open: &mut Vec<Self>) {
         let is_near = |own: &Self| own.corners().iter().all(|corner| face.distance_squared(corner) <= most * most);
         if is_near(&self) {
             return;
         }
-        let first = open.len();
-        for k in 0..3 {
-            let (a, b) = (&face.corners[k], &face.corners[(k + 1) % 3]);
-            let out = unit(&cross(&subtract(b, a), &face.normal));
-            let height = dot(&out, a) + MARGIN * most;
-            let [inside, outside] = self.cut(&out, height);
+        let (whole, first) = (self, open.len());
+        for (out, height) in sides {
+            let [inside, outside] = self.cut(out, height + MARGIN * most);
             open.extend(outside);
             match inside {
                 Some(inside) => self = inside,
                 None => {
                     // Nothing of it is over the face that is closest to its middle.
-                    let halves = open.pop().map(Self::halves);
                     open.truncate(first);
-                    open.extend(halves.into_iter().flatten());
+                    open.extend(whole.halves());
                     return;
                 }
             }

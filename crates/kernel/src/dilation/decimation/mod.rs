@@ -37,36 +37,32 @@ const LEAST_LEAN: f64 = 0.1;
 const ROUNDED: f64 = 1e-3;
 /// Rounds in which vertices may be half as far away as before where meshes were found to be too far from each other.
 const ROUNDS: usize = 4;
-/// Of so many triangles one has to be left at most for it to be worth while: the topology is told of what is left alone unless that is near enough to the mesh.
-const WORTH: usize = 8;
-/// The cosine of the angle by which a mesh turns at sharp edges at least.
-const SHARP: f64 = 0.5;
 /// How many times as many triangles are left at most, of meshes that were tried, than there had to be of one that is curved alike everywhere.
 const MISSED: f64 = 4.0;
 /// Vertices that are looked at before a stop is noticed.
 const IN_A_ROW: u32 = 256;
 
-/// The mesh with fewer triangles, no place of either farther from the other one than `most`; none where that does not come out, or saves little. `farthest` is infinite for surfaces; for the surface of a solid it is how far vertices may be from what they become.
+/// The mesh with fewer triangles, no place of either farther from the other one than `most`; none where that does not come out, or more than one of `worth` triangles is left. `farthest` is infinite for surfaces; for the surface of a solid it is how far vertices may be from what they become.
 ///
 /// Cost: some microseconds for each triangle.
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn decimated(mesh: &TriMesh, most: f64, farthest: f64, budget: &Budget) -> Result<Option<TriMesh>, Stopped> {
-    if !is_finer(mesh, most) {
+pub(super) fn decimated(mesh: &TriMesh, most: f64, farthest: f64, worth: usize, budget: &Budget) -> Result<Option<TriMesh>, Stopped> {
+    if !is_finer(mesh, most, worth) {
         return Ok(None);
     }
     budget.cancel.check()?;
     let faces = Faces::of_mesh(mesh);
     let mut may_be_off = vec![most; mesh.vertices.len()];
     for _ in 0..ROUNDS {
-        let mut decimation = Decimation::new(mesh, farthest);
+        let mut decimation = Decimation::new(mesh, &faces, farthest);
         decimation.sweep(&may_be_off, PASSES[PASSES.len() - 1], SHORT, budget)?;
         for share in PASSES {
             decimation.sweep(&may_be_off, share, 1.0, budget)?;
         }
         let (fewer, names) = decimation.left();
-        if WORTH * fewer.triangles.len() > mesh.triangles.len() {
+        if worth * fewer.triangles.len() > mesh.triangles.len() {
             return Ok(None);
         }
         let of_mesh = uncovered(mesh, &Faces::of_mesh(&fewer), most, budget)?;
@@ -83,30 +79,23 @@ pub(super) fn decimated(mesh: &TriMesh, most: f64, farthest: f64, budget: &Budge
     Ok(None)
 }
 
-/// Whether a mesh may be worth it: triangles of a smooth surface are off by an eighth of what their neighbours' corners are off their planes, and there are as many times more of them as they are less off. Sharp edges, as around the ends of cylinders, tell nothing of that, if most sides are none.
-pub(super) fn is_finer(mesh: &TriMesh, most: f64) -> bool {
+/// Whether of a mesh one of `worth` triangles may be enough: triangles of a smooth surface are off by an eighth of what their neighbours' corners are off their planes, and there are as many times more of them as they are less off. That is so of at least half of them, by the median: edges, as around the ends of cylinders and between cones, tell nothing of it.
+pub(super) fn is_finer(mesh: &TriMesh, most: f64, worth: usize) -> bool {
     let joined = HalfEdges::new(mesh.vertices.iter().map(|vertex| vertex.to_array()).collect(), &mesh.triangles);
-    let up = |triangle: u32| {
+    let off = |triangle: u32| {
         let [a, b, c] = mesh.points_of(triangle);
-        unit(&cross(&subtract(&b, &a), &subtract(&c, &a)))
+        let up = unit(&cross(&subtract(&b, &a), &subtract(&c, &a)));
+        let twins = [0, 1, 2].map(|k| joined.twin(3 * triangle + k)).into_iter().filter(|&twin| twin != NONE);
+        twins.map(move |twin| (up, a, twin))
     };
-    let ups: Vec<Point> = (0..joined.triangles()).map(up).collect();
-    let (mut all, mut smooth) = ((0_u32, 0.0), (0_u32, 0.0));
-    for half in 0..3 * joined.triangles() {
-        let twin = joined.twin(half);
-        if twin == NONE {
-            continue;
-        }
-        let [own, other] = [half, twin].map(|half| &ups[half as usize / 3]);
-        let beside = &joined.points[joined.end(next(twin)) as usize];
-        let height = dot(own, &subtract(beside, &mesh.points_of(half / 3)[0])).abs();
-        all = (all.0 + 1, all.1 + height);
-        if dot(own, other) >= SHARP {
-            smooth = (smooth.0 + 1, smooth.1 + height);
-        }
+    let height = |(up, a, twin): (Point, Point, u32)| dot(&up, &subtract(&joined.points[joined.end(next(twin)) as usize], &a)).abs();
+    let mut all: Vec<f64> = (0..joined.triangles()).flat_map(off).map(height).collect();
+    if all.is_empty() {
+        return false;
     }
-    let (count, sum) = if 2 * smooth.0 > all.0 { smooth } else { all };
-    count > 0 && 8.0 * most * f64::from(count) >= MISSED * WORTH as f64 * sum
+    let middle = all.len() / 2;
+    let (_, &mut median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
+    8.0 * most >= MISSED * worth as f64 * median
 }
 
 /// Whether each side has two triangles, one in either direction.
@@ -131,7 +120,9 @@ struct Quality {
 }
 
 /// A mesh of which vertices are removed.
-struct Decimation {
+struct Decimation<'a> {
+    /// What there was at first.
+    faces: &'a Faces,
     /// Joined where neighbours have a side in opposite directions, and behind them a triangle for each other side, with a corner that all of these have and no other: so that nearly all that is around a vertex is closed.
     mesh: HalfEdges,
     /// That corner.
@@ -155,10 +146,16 @@ struct Decimation {
     lengths: Vec<(f64, usize)>,
 }
 
-/// What of some stands best for a place, and how far it is.
-fn closest<'a>(all: impl Iterator<Item = &'a Fresh>, x: &Point, is_border: bool) -> Option<(usize, f64)> {
-    let all = all.enumerate().map(|(index, own)| (index, own.depth(x, is_border), own));
-    all.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, depth, own)| (index, own.distance(x, depth)))
+/// What of some stands for a place: it is no farther than `most`. That is what the place is deepest in, seen along its normal, or where that is too far, as on the other side of a sharp edge, what is closest.
+fn standing<'a>(all: impl Iterator<Item = &'a Fresh> + Clone, x: &Point, is_border: bool, most: f64) -> Option<usize> {
+    let deepest = all.clone().enumerate().map(|(index, own)| (index, own.depth(x, is_border), own)).max_by(|a, b| a.1.total_cmp(&b.1));
+    let (index, depth, own) = deepest?;
+    if own.distance(x, depth) <= most {
+        return Some(index);
+    }
+    let others = all.enumerate().filter(|(_, own)| own.may_be_within(x, is_border, most));
+    let distances = others.map(|(index, own)| (index, own.distance(x, own.depth(x, is_border))));
+    distances.filter(|&(_, distance)| distance <= most).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
 }
 
 /// What may come to be: a triangle, or a side of the border.
@@ -175,6 +172,14 @@ impl Fresh {
             Self::Triangle(own) => own.depth(x),
             Self::Side(_) if is_border => f64::INFINITY,
             Self::Side(_) => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Whether it may stand for a vertex that is no farther than `most` from it: at a glance, its plane is not.
+    fn may_be_within(&self, x: &Point, is_border: bool, most: f64) -> bool {
+        match self {
+            Self::Triangle(own) => !is_border && dot(&own.normal, &subtract(x, &own.corners[0])).abs() <= most,
+            Self::Side(_) => is_border,
         }
     }
 
@@ -228,8 +233,8 @@ impl Facet {
     }
 }
 
-impl Decimation {
-    fn new(mesh: &TriMesh, farthest: f64) -> Self {
+impl<'a> Decimation<'a> {
+    fn new(mesh: &TriMesh, faces: &'a Faces, farthest: f64) -> Self {
         let beyond = mesh.vertices.len() as u32;
         let points: Vec<Point> = mesh.vertices.iter().map(|vertex| vertex.to_array()).chain([[0.0; 3]]).collect();
         let joined = HalfEdges::new(points.clone(), &mesh.triangles);
@@ -240,11 +245,14 @@ impl Decimation {
         sides.iter().flatten().for_each(|&end| is_border[end as usize] = true);
         let mut ups = vec![[0.0; 3]; points.len()];
         for triangle in 0..mesh.triangles.len() as u32 {
-            let [a, b, c] = mesh.points_of(triangle);
-            let raw = cross(&subtract(&b, &a), &subtract(&c, &a));
-            for corner in mesh.triangles[triangle as usize] {
+            let corners = mesh.points_of(triangle);
+            for (k, corner) in mesh.triangles[triangle as usize].into_iter().enumerate() {
+                let [a, b] = [1, 2].map(|step| subtract(&corners[(k + step) % 3], &corners[k]));
+                let raw = cross(&a, &b);
+                // By the angle there: long needles on one side of a sharp edge tell no more than short ones on the other (Thuermer and Wuethrich, "Computing vertex normals from polygonal facets", 1998).
+                let (normal, angle) = (unit(&raw), dot(&raw, &raw).sqrt().atan2(dot(&a, &b)));
                 let up = &mut ups[corner as usize];
-                *up = std::array::from_fn(|axis| up[axis] + raw[axis]);
+                *up = std::array::from_fn(|axis| up[axis] + angle * normal[axis]);
             }
         }
         ups.iter_mut().for_each(|up| *up = unit(up));
@@ -270,7 +278,23 @@ impl Decimation {
         let may_move = (0..beyond).map(may_move).collect();
         let (removed, fresh, old, lengths) = (Removed::new(all.len(), beyond as usize), Vec::new(), Vec::new(), Vec::new());
         let (moved, next_of) = (vec![0.0; count], (0..count as u32).collect());
-        Self { mesh: joined, beyond, ups, is_border, may_move, farthest, moved, next_of, least: FAIR, mender, removed, fresh, old, lengths }
+        Self {
+            faces,
+            mesh: joined,
+            beyond,
+            ups,
+            is_border,
+            may_move,
+            farthest,
+            moved,
+            next_of,
+            least: FAIR,
+            mender,
+            removed,
+            fresh,
+            old,
+            lengths,
+        }
     }
 
     /// Removes vertices as long as none that is gone is farther from what is left than a share of what it may be off, along sides that are no longer than a share of the longest one around it.
@@ -345,7 +369,7 @@ impl Decimation {
         facet.serves(self.least, old).then_some(Fresh::Triangle(facet))
     }
 
-    /// Whether the star's vertex may move to ring m: with nothing that is gone farther from what is left, nor the middles of sides before and after from each other.
+    /// Whether the star's vertex may move to ring m: with nothing that is gone farther from what is left, nor the middles of sides before and after from each other, nor the latter from what there was at first: around a bore vertices that are gone lie in what is beside it, however far sides cut into it.
     fn serves(&mut self, m: usize, may_be_off: &[f64], share: f64) -> bool {
         let mut fresh = std::mem::take(&mut self.fresh);
         fresh.clear();
@@ -355,24 +379,27 @@ impl Decimation {
         if !is_made {
             return false;
         }
-        let Self { mesh, beyond, is_border, removed, fresh, old, mender, .. } = self;
+        let Self { faces, mesh, beyond, is_border, removed, fresh, old, mender, .. } = self;
         let Removed { around, owners, .. } = removed;
         owners.clear();
         let serves = around.iter().all(|&vertex| {
-            let Some((owner, distance)) = closest(fresh.iter(), &mesh.points[vertex as usize], is_border[vertex as usize]) else {
-                return false;
-            };
-            owners.push(owner);
-            distance <= share * may_be_off[vertex as usize]
+            let most = share * may_be_off[vertex as usize];
+            let owner = standing(fresh.iter(), &mesh.points[vertex as usize], is_border[vertex as usize], most);
+            owners.extend(owner);
+            owner.is_some()
         });
         let (ring, vertex) = (&mender.star.ring, around[0]);
         let most = share * may_be_off[vertex as usize];
         let middle = |a: u32, b: u32| between(&mesh.points[a as usize], &mesh.points[b as usize], 0.5);
-        let is_near = |found: Option<(usize, f64)>| found.is_some_and(|(_, distance)| distance <= most);
-        let are_before =
-            || ring.iter().filter(|other| *other != beyond).all(|&other| is_near(closest(fresh.iter(), &middle(vertex, other), false)));
+        let are_before = || {
+            ring.iter().filter(|other| *other != beyond).all(|&other| standing(fresh.iter(), &middle(vertex, other), false, most).is_some())
+        };
         let mut others = (0..count).filter(|&k| k != m && (k + 1) % count != m && (m + 1) % count != k && ring[k] != *beyond);
-        serves && are_before() && others.all(|k| is_near(closest(old.iter().flatten(), &middle(ring[m], ring[k]), false)))
+        let is_after = |k: usize| {
+            let middle = middle(ring[m], ring[k]);
+            standing(old.iter().flatten(), &middle, false, most).is_some() && faces.have_within(&middle, most)
+        };
+        serves && are_before() && others.all(is_after)
     }
 
     /// No less than how far all that became the star's vertex is from ring m; none where that is too far.

@@ -262,11 +262,6 @@ impl<'a> Plan<'a> {
         Self { meant, ..self }
     }
 
-    /// Whether it is that of triangles which stand for another shape.
-    pub(super) fn stands_for_shape(&self) -> bool {
-        self.meant.shape.is_some()
-    }
-
     /// The same with sites that are nearer to what they stand for around some places: all that may be closest to these.
     fn closer(&self, places: &[Point], share: f64) -> Self {
         Self { rule: self.rule.closer(places, self.radius + 2.0 * self.rule.outer_reserve(), share), ..self.clone() }
@@ -365,6 +360,13 @@ impl<'a> Plan<'a> {
     pub(super) fn predict_arranged(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let arrangement = Arrangement::new(&setting, &self.rule, &self.space(&setting).candidates, budget)?;
+        Ok(arrangement.map(|arrangement| self.predicted(&arrangement)))
+    }
+
+    /// The same for [`Plan::run_if_told`], as far as it is known before.
+    pub(super) fn predict_if_told(&self, budget: &Budget) -> Result<Option<Prediction>, DilationError> {
+        let setting = self.setting(self.pitch, budget);
+        let arrangement = self.arranged_if_told(&setting, &self.space(&setting), budget)?;
         Ok(arrangement.map(|arrangement| self.predicted(&arrangement)))
     }
 
@@ -468,15 +470,16 @@ impl<'a> Plan<'a> {
     pub(super) fn run_if_told(&self, budget: &Budget) -> Result<Option<Dilation>, DilationError> {
         let setting = self.setting(self.pitch, budget);
         let space = self.space(&setting);
-        let mut arrangement = Arrangement::new(&setting, &self.rule, &space.candidates, budget)?;
-        // Asked first: all else takes longer.
-        if let Some(arrangement) = &mut arrangement
-            && !arrangement.is_of_another(&self.rule, self.flow(&setting, &space).as_ref(), budget)?
-        {
-            return Ok(None);
-        }
+        let arrangement = self.arranged_if_told(&setting, &space, budget)?;
         let made = self.of_arrangement(arrangement, &setting, &space, budget)?;
         Ok(made.map(|made| made.dilation).filter(|made| made.topology_exact))
+    }
+
+    /// What needs no lattice, where its sites tell the topology of what they stand for: asked first, as all else takes longer.
+    fn arranged_if_told(&self, setting: &Setting, space: &Space, budget: &Budget) -> Result<Option<Arrangement>, DilationError> {
+        let Some(mut arrangement) = Arrangement::new(setting, &self.rule, &space.candidates, budget)? else { return Ok(None) };
+        let is_told = arrangement.is_of_another(&self.rule, self.flow(setting, space).as_ref(), budget)?;
+        Ok(is_told.then_some(arrangement))
     }
 
     /// The dilation by the union of polytopes around points, segments, polygons and polyhedra, or by what needs none, where that serves better than a lattice and comes out.
