@@ -19,7 +19,7 @@
 //! part (`patches`). Of pieces that are alike but for where they are, as in dusts and on trays, one is made and put where the others are (`copies` there). Points and segments in one plane are a sheet over it and its mirror image (`planar` there).
 //!
 //! NURBS and subdivision surfaces, and all others of which faces are known that hang together, are drawn as triangles first if they are smooth (`drawn`): a sheet on either side of these is the solid's surface (`offset` in `arrangement`); around most solids, and NURBS volumes that are proven to be such (`volume` in `attractor`), there is one outside.
-//! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them; of few triangles only where fewer tell the topology.
+//! Meshes that are far finer than the tolerance are made of fewer triangles first (`decimation`), unless sheets serve all of them; of few triangles only where fewer tell the topology, or all are too many.
 //! For graphs over a convex part of a plane that have very many cells, as rough ones do, rays stand that lead down and up from a few of their places (`peaks`): between two sheets is all that is near to these.
 //! Where sites are not the shape itself, the topology is proven for it all the same if both are near enough to each other (`steady` there).
 //!
@@ -97,7 +97,7 @@ pub struct Dilation {
     /// The least radius: the one asked for, unless parts have their own.
     pub least_radius_mm: f64,
     /// Cubes of the lattice where the distance may have a critical point so close to r that the topology there is not certain, as far as they were looked at: others beside them are not; without a lattice, sets of sites whose dilations may or may not
-    /// have a common point. Where points stand for cells critical points of theirs are not those of the attractor: these are not counted, but it is one where the solid is shown to have another topology.
+    /// have a common point, of places with very many of them some. Where points stand for cells critical points of theirs are not those of the attractor: these are not counted, but it is one where the solid is shown to have another topology.
     pub uncertain: u64,
     /// Whether it is proven that the solid has as many components, handles and voids as the exact dilation (see `critical`, and `nerve` in `arrangement`), where nothing was uncertain and no triangles cross: of points, wires, surfaces and solids of these; of curves and smooth surfaces, if what stands for them is near enough (see `steady` there) or is shown to have their topology (see `flow`); and of all that is told by a few points (see `told`).
     pub topology_exact: bool,
@@ -274,7 +274,7 @@ impl<'a> Order<'a> {
         Ok(None)
     }
 
-    /// What was made; or where that was refused, the same by fewer triangles.
+    /// What was made; or where there was too much of it, the same by fewer triangles, whether these tell the topology or not.
     fn or_by_fewer<T>(
         &self,
         made: Result<T, DilationError>,
@@ -282,7 +282,9 @@ impl<'a> Order<'a> {
         work: impl Fn(&Plan<'_>) -> Result<Option<T>, DilationError>,
     ) -> Result<T, DilationError> {
         match made {
-            Err(error) if !matches!(error, DilationError::Stopped(_)) => self.by_fewer(budget, work)?.ok_or(error),
+            Err(error @ (DilationError::Triangles { .. } | DilationError::LeafCells { .. } | DilationError::Cells { .. })) => {
+                self.by_fewer(budget, work)?.ok_or(error)
+            }
             made => made,
         }
     }
@@ -389,7 +391,8 @@ pub struct Prediction {
     pub pitch_mm: Option<f64>,
 }
 
-/// Predicts what [`dilate`] will make, or without `simplify` [`dilate_unsimplified`], from a sample of the lattice.
+/// Predicts what [`dilate`] will make, or without `simplify` [`dilate_unsimplified`], from a sample of the lattice. Where fewer triangles stand for a mesh, that is what comes of these if no set of sites is left in doubt; what comes of them where
+/// all are too many is not foreseen.
 ///
 /// # Errors
 /// As [`dilate`], for what shows before the work.
@@ -426,6 +429,5 @@ pub fn predict(
     if let Some(prediction) = order.by_fewer(budget, |plan| plan.predict_if_told(budget))? {
         return Ok(prediction);
     }
-    let made = order.planned(COARSE, budget, |plan| plan.predict(instead, budget));
-    order.or_by_fewer(made, budget, |plan| plan.predict_arranged(budget))
+    order.planned(COARSE, budget, |plan| plan.predict(instead, budget))
 }

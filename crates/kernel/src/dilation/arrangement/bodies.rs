@@ -112,6 +112,12 @@ impl Bodies<'_> {
         (beyond, if distance > 0.0 { way.map(|part| part / distance) } else { way })
     }
 
+    /// How high a place is above the one of some kinds of a body that it is highest above.
+    pub(super) fn height(&self, kinds: &[Kind], body: u32, x: &Point) -> f64 {
+        let near = self.near(body, x);
+        kinds.iter().map(|&kind| self.above_at(kind, body, x, &near).0).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The same of any place.
     #[cfg(test)]
     pub(super) fn above(&self, kind: Kind, body: u32, x: &Point) -> (f64, Point) {
@@ -208,9 +214,9 @@ impl Bodies<'_> {
         })
     }
 
-    /// How far a place is beyond the one of some dilations that it is farthest from.
-    fn farthest(&self, set: &[u32], x: &Point) -> (f64, Point) {
-        let beyond = self.beyond(&[Kind::Dilation], set, x, f64::NEG_INFINITY);
+    /// How far a place is beyond the one of some bodies that it is farthest from.
+    pub(super) fn farthest(&self, kind: Kind, set: &[u32], x: &Point) -> (f64, Point) {
+        let beyond = self.beyond(&[kind], set, x, f64::NEG_INFINITY);
         beyond.map_or((0.0, [0.0; 3]), |(above, (away, _))| (above, away))
     }
 
@@ -266,7 +272,7 @@ impl Bodies<'_> {
         if part(known) {
             return Vec::new();
         }
-        let lowest = lowest(within, |x| self.farthest(set, x));
+        let lowest = lowest(within, |x| self.farthest(Kind::Dilation, set, x));
         let Some((x, gap)) = lowest.filter(|&(_, gap)| gap > LEAST_GAP * slack) else { return Vec::new() };
         let plane = |(place, &body): (usize, &u32)| {
             let figure = &self.figures[body as usize];
@@ -285,7 +291,7 @@ impl Bodies<'_> {
 
     /// For dilations of a set that have a common point: those whose polytopes do not hold the place that is deepest in all; all where it is in all polytopes.
     pub(super) fn short(&self, set: &[u32]) -> Vec<u32> {
-        let deepest = lowest(self.within(set), |x| self.farthest(set, x));
+        let deepest = lowest(self.within(set), |x| self.farthest(Kind::Dilation, set, x));
         let is_short = |&&body: &&u32| deepest.is_none_or(|(x, _)| !self.is_inside(&[Kind::Polytope], body, &x));
         let short: Vec<u32> = set.iter().filter(is_short).copied().collect();
         if short.is_empty() { set.to_vec() } else { short }

@@ -6,6 +6,7 @@
 use super::bodies::{AXES, Bodies, Common, Hub, Kind, Near, STEADY_CUBE};
 use super::ellipsoid::Place;
 use super::figure::{Figure, box_of};
+use super::hidden::Hidden;
 use crate::attractor::cell::{Point, between, dot, subtract};
 use crate::budget::{Budget, Stopped};
 use crate::dilation::surface::NameMap;
@@ -17,12 +18,16 @@ use rayon::prelude::*;
 pub(super) const MOST_BODIES: usize = 4;
 /// So many bodies are few: all sets of them are looked at, however wide the cube is.
 const FEW: usize = 8;
-/// Of more bodies one hub for all is not sought. In cubes as wide as this, in units of the radius, that many are few: they are long, and stay beside each other.
+/// In the smallest cubes, of more bodies no set is asked for if their dilations have a common place.
+const SOME: usize = 16;
+/// Of more bodies one hub for all is not sought but in the smallest cubes. In cubes as wide as this, in units of the radius, that many are few: they are long, and stay beside each other.
 const MANY: usize = 64;
 const WIDE: f64 = 32.0;
 /// Of one part: cubes that are looked at before those that are left are halved no more, and sets that are asked for at most.
 const CUBES_OF_A_PART: usize = 50_000;
 const ASKED_OF_A_PART: usize = 200_000;
+/// Sets in doubt of one part that are enough to change polytopes by, which may settle many more: where dozens of bodies hardly have a common point, or hardly none, there are tens of thousands.
+const DOUBTS_OF_A_PART: usize = 64;
 /// Means of bodies that are tried to show that they are apart.
 const MEANS: u32 = 6;
 /// Rounded up.
@@ -58,7 +63,7 @@ impl Cube {
     }
 
     /// Its lowest and its highest corner.
-    fn ends(&self) -> [Point; 2] {
+    pub(super) fn ends(&self) -> [Point; 2] {
         [self.at(0, self.half), self.at(7, self.half)]
     }
 
@@ -148,10 +153,8 @@ pub(super) fn parts(bodies: &Bodies<'_>, most: usize, budget: &Budget) -> Result
 enum Known {
     /// All are around a place.
     Meet(Point),
-    /// No such place was found; whether the dilations have a common point.
-    Doubtful(Common),
-    /// The same, and in some cube it was left in doubt.
-    InDoubt(Common),
+    /// No such place was found; whether the dilations have a common point, and the part of space in which the set was left in doubt last, if it was.
+    Doubtful { common: Common, left_in: Option<u32> },
 }
 
 /// A search in a part of space.
@@ -172,7 +175,8 @@ pub(super) struct Search<'a> {
     count: u32,
     /// Two bodies whose dilations have no common point: they have no hub, nor have any with both in smaller cubes.
     apart: Option<[u32; 2]>,
-    /// Cubes that were looked at in the part.
+    /// The number of the part, and the cubes that were looked at in it.
+    part: u32,
     cubes: usize,
     found: Found,
 }
@@ -186,8 +190,17 @@ pub(super) struct Found {
     pub(super) doubts: Vec<(Set, Common)>,
     /// Sets that were asked for, or as many as could have been while it was asked whether they are hidden.
     pub(super) asked: usize,
+    /// Whether more may be in doubt than is told.
+    has_more: bool,
     /// Whether there was too much to look at, and this is not all.
     pub(super) is_cut_short: bool,
+}
+
+impl Found {
+    /// Whether nothing more is looked at.
+    fn is_over(&self) -> bool {
+        self.has_more || self.is_cut_short
+    }
 }
 
 /// What came of a set in a cube.
@@ -195,9 +208,11 @@ enum Of {
     Meet,
     /// They do nothing there, and no set that holds them does.
     Apart,
-    Doubtful(Common),
-    /// The same of a set that is in doubt elsewhere.
-    InDoubt(Common),
+    /// As of [`Known::Doubtful`].
+    Doubtful {
+        common: Common,
+        left_in: Option<u32>,
+    },
 }
 
 impl<'a> Search<'a> {
@@ -216,6 +231,7 @@ impl<'a> Search<'a> {
             hubs,
             count: 0,
             apart: None,
+            part: 0,
             cubes: 0,
             found: Found::default(),
         }
@@ -226,6 +242,7 @@ impl<'a> Search<'a> {
     /// # Errors
     /// [`Stopped`].
     pub(super) fn run(&mut self, (cube, list): &Listed, budget: &Budget) -> Result<Found, Stopped> {
+        self.part += 1;
         self.cubes = 0;
         self.listed.clear();
         self.listed.extend_from_slice(list);
@@ -273,31 +290,41 @@ impl<'a> Search<'a> {
     fn is_settled(&mut self, cube: &Cube, from: usize) -> bool {
         let (bodies, inside, reach) = (self.bodies, self.stage.inside, self.bodies.setting.reach);
         let (list, near) = (&self.listed[from..], &self.near[from..]);
-        if list.len() < 2 || self.found.is_cut_short || !self.is_due(list.iter().copied()) {
+        if list.len() < 2 || self.found.is_over() || !self.is_due(list.iter().copied()) {
             return true;
         }
+        let is_wide = list.len() <= MANY && cube.half > WIDE * reach;
+        // What is left in doubt of long bodies is parted sooner than cubes along them would tell.
+        let is_small = cube.half <= reach * self.stage.small || is_wide || self.cubes > CUBES_OF_A_PART;
         if cube.half <= reach {
             if is_covered(bodies, inside, cube, list, near, &mut self.depths) {
                 return true;
             }
-            let are_apart = self.apart.is_some_and(|apart| apart.iter().all(|body| list.contains(body)));
-            if list.len() <= MANY && !are_apart {
+            let (are_apart, mut is_unknown) = (self.apart.is_some_and(|apart| apart.iter().all(|body| list.contains(body))), false);
+            if (list.len() <= MANY || is_small) && !are_apart {
                 let sum = near.iter().fold([0.0; 3], |sum: Point, near| std::array::from_fn(|axis| sum[axis] + near.way[axis]));
                 let middle = subtract(&cube.centre, &sum.map(|part| part / list.len() as f64));
                 match bodies.hub(inside, list, middle) {
                     Hub::At(_) => return true,
                     Hub::Apart(apart) => self.apart = Some(apart),
-                    Hub::Unknown => {}
+                    Hub::Unknown => is_unknown = true,
                 }
             }
             if is_in_a_solid(bodies, cube) {
                 return true;
             }
+            if is_unknown && is_small && self.stage.is_last && list.len() > SOME {
+                let place = |kinds: &[Kind]| bodies.common(kinds, list, bodies.within(list), -bodies.setting.slack);
+                if matches!(place(inside), Place::At(_)) {
+                    return true;
+                }
+                if let Place::At(x) = place(&inside[..1]) {
+                    self.leave_short(from, &x);
+                    return true;
+                }
+            }
         }
-        let is_wide = list.len() <= MANY && cube.half > WIDE * reach;
         let is_few = list.len() <= FEW || is_wide;
-        // What is left in doubt of long bodies is parted sooner than cubes along them would tell.
-        let is_small = cube.half <= reach * self.stage.small || is_wide || self.cubes > CUBES_OF_A_PART;
         if !is_few && !is_small {
             return false;
         }
@@ -313,6 +340,25 @@ impl<'a> Search<'a> {
         false
     }
 
+    /// Leaves the bodies of a cube's list in doubt, which begins at a place, whose polytopes do not hold a place that all of their dilations hold: once they are around these, it is a hub. Of dozens of bodies there are far too many sets to ask for.
+    fn leave_short(&mut self, from: usize, x: &Point) {
+        let list = &self.listed[from..];
+        let is_short = |&body: &u32| !self.bodies.is_inside(&[Kind::Polytope], body, x);
+        let (mut short, mut others): (Vec<u32>, Vec<u32>) = list.iter().copied().partition(is_short);
+        if short.len() == 1 {
+            short.extend(others.pop());
+            short.sort_unstable();
+        }
+        let mut left = &short[..];
+        while !left.is_empty() {
+            // None is left alone.
+            let count = if left.len() == MOST_BODIES + 1 { MOST_BODIES - 1 } else { MOST_BODIES.min(left.len()) };
+            let (set, others) = left.split_at(count);
+            self.found.doubts.push((name(set), Common::Some));
+            left = others;
+        }
+    }
+
     /// Whether all sets of some bodies do nothing in a cube; where that is told no better in smaller ones, those that do are in doubt.
     fn are_settled(&mut self, cube: &Cube, list: &[u32], is_small: bool) -> bool {
         let number = list.len();
@@ -322,6 +368,9 @@ impl<'a> Search<'a> {
         let mut meet = vec![false; number * number];
         for second in 0..number {
             for first in 0..second {
+                if self.found.is_over() {
+                    return true;
+                }
                 let Some(own) = self.may_meet(cube, list, &[first, second], is_small) else { return false };
                 meet[first * number + second] = own;
             }
@@ -332,6 +381,9 @@ impl<'a> Search<'a> {
         for third in 0..number {
             for second in (0..third).filter(|&second| meet[second * number + third]) {
                 for first in (0..second).filter(|&first| meet[first * number + second] && meet[first * number + third]) {
+                    if self.found.is_over() {
+                        return true;
+                    }
                     match self.may_meet(cube, list, &[first, second, third], is_small) {
                         None => return false,
                         Some(false) => continue,
@@ -363,41 +415,40 @@ impl<'a> Search<'a> {
         if !self.is_due(places.iter().map(|&place| list[place])) {
             return Some(!self.are_parted(cube, places));
         }
-        let common = match self.of(cube, list, places) {
+        let (common, left_in) = match self.of(cube, list, places) {
             Of::Meet => return Some(true),
             Of::Apart => return Some(false),
-            Of::Doubtful(_) | Of::InDoubt(_) if !self.stage.is_last => return None,
-            Of::Doubtful(common) => common,
-            // It is told anew when its polytopes are other ones, which they have to be: along faces that hardly meet smaller cubes would be many.
-            Of::InDoubt(common) => {
-                let set: Vec<u32> = places.iter().map(|&place| list[place]).collect();
-                self.found.doubts.push((name(&set), common));
-                return Some(common != Common::None);
-            }
+            Of::Doubtful { .. } if !self.stage.is_last => return None,
+            Of::Doubtful { common, left_in } => (common, left_in),
         };
-        // There may be others that hide them, or they may do nothing but elsewhere. Solids hide what is flat, and where cubes would be many.
-        let may_be_settled = !is_small && list.len() > places.len();
-        if may_be_settled && self.bodies.solids.is_empty() {
-            return None;
-        }
         let set: Vec<u32> = places.iter().map(|&place| list[place]).collect();
-        let is_hidden = self.bodies.is_hidden(&set, common, cube, list, &mut self.found.asked);
-        self.found.is_cut_short |= self.found.asked > ASKED_OF_A_PART;
-        if is_hidden {
-            return Some(false);
+        // What is left in doubt anywhere is told anew when its polytopes are other ones, which they have to be: along faces that hardly meet smaller cubes would be many.
+        if left_in.is_none() {
+            // There may be others that hide them, or they may do nothing but elsewhere. Solids hide what is flat, and where cubes would be many.
+            let may_be_settled = !is_small && list.len() > places.len();
+            if may_be_settled && self.bodies.solids.is_empty() {
+                return None;
+            }
+            let hidden = self.bodies.hidden(&set, common, cube, list, &mut self.found.asked);
+            self.found.is_cut_short |= self.found.asked > ASKED_OF_A_PART;
+            match hidden {
+                Hidden::All => return Some(false),
+                Hidden::Unknown if may_be_settled => return None,
+                Hidden::Unknown | Hidden::NotAll => {}
+            }
         }
-        if may_be_settled {
-            return None;
+        if left_in != Some(self.part) {
+            let name = name(&set);
+            self.known.insert(name, Known::Doubtful { common, left_in: Some(self.part) });
+            self.found.doubts.push((name, common));
+            self.found.has_more |= self.found.doubts.len() >= DOUBTS_OF_A_PART;
         }
-        let name = name(&set);
-        self.known.insert(name, Known::InDoubt(common));
-        self.found.doubts.push((name, common));
         Some(common != Common::None)
     }
 
     /// What some of the bodies of a cube do there.
     fn of(&mut self, cube: &Cube, list: &[u32], places: &[usize]) -> Of {
-        if places.iter().fold(u64::MAX, |common, &place| common & self.hubs[place]) != 0 || self.found.is_cut_short {
+        if places.iter().fold(u64::MAX, |common, &place| common & self.hubs[place]) != 0 || self.found.is_over() {
             return Of::Meet;
         }
         if self.are_parted(cube, places) {
@@ -422,8 +473,7 @@ impl<'a> Search<'a> {
                 self.add_hub(list, &x);
                 Of::Meet
             }
-            Known::Doubtful(common) => Of::Doubtful(common),
-            Known::InDoubt(common) => Of::InDoubt(common),
+            Known::Doubtful { common, left_in } => Of::Doubtful { common, left_in },
         }
     }
 
@@ -494,15 +544,16 @@ impl<'a> Search<'a> {
 impl Stage {
     /// What is known of a set, of which all are near to a place, wherever it is.
     fn known(&self, bodies: &Bodies<'_>, set: &[u32], near: &Point) -> Known {
+        let doubtful = |common: Common| Known::Doubtful { common, left_in: None };
         match bodies.hub(self.inside, set, *near) {
             Hub::At(x) => return Known::Meet(x),
             // Of the last stage the first kind is the dilation by the radius.
-            Hub::Apart(_) => return Known::Doubtful(if self.is_last { Common::None } else { Common::Unknown }),
+            Hub::Apart(_) => return doubtful(if self.is_last { Common::None } else { Common::Unknown }),
             Hub::Unknown => {}
         }
         match bodies.common(self.inside, set, bodies.within(set), -bodies.setting.slack) {
             Place::At(x) => Known::Meet(x),
-            _ => Known::Doubtful(if self.is_last { bodies.common_of_dilations(set) } else { Common::Unknown }),
+            _ => doubtful(if self.is_last { bodies.common_of_dilations(set) } else { Common::Unknown }),
         }
     }
 }
@@ -543,6 +594,6 @@ fn is_in_a_solid(bodies: &Bodies<'_>, cube: &Cube) -> bool {
 }
 
 /// What two boxes have in common.
-fn overlap([low, high]: [Point; 2], [from, to]: [Point; 2]) -> [Point; 2] {
+pub(super) fn overlap([low, high]: [Point; 2], [from, to]: [Point; 2]) -> [Point; 2] {
     [std::array::from_fn(|axis| low[axis].max(from[axis])), std::array::from_fn(|axis| high[axis].min(to[axis]))]
 }

@@ -2,8 +2,9 @@
 
 use crate::attractor::cell::{Point, between, dot};
 
-/// Ellipsoids at most, to decide one question.
+/// Ellipsoids at most, to decide one question, and where little depends on it.
 const MOST_ELLIPSOIDS: usize = 400;
+const FEW_ELLIPSOIDS: usize = 40;
 /// What rounding makes of an ellipsoid in one step: of its square lengths, as a share of the largest, and of where its centre is. They grow by that in every step, so that they hold what they should.
 const NOISE: f64 = 1e-14;
 const SHIFT: f64 = 1e-15;
@@ -23,19 +24,34 @@ pub(super) fn lowest([low, high]: [Point; 2], above: impl Fn(&Point) -> (f64, Po
     let mut best = (between(&low, &high, 0.5), f64::INFINITY);
     for share in ZOOM {
         let half: Point = std::array::from_fn(|axis| 0.5 * share * (high[axis] - low[axis]));
-        let [from, to] = [-1.0, 1.0].map(|side| std::array::from_fn(|axis| best.0[axis] + side * half[axis]));
-        let mut ellipsoid = Ellipsoid::around(&from, &to);
-        for _ in 0..MOST_ELLIPSOIDS {
-            let (value, slope) = above(&ellipsoid.centre);
-            if value < best.1 {
-                best = (ellipsoid.centre, value);
-            }
-            if !matches!(ellipsoid.cut(value - best.1, &slope, false), Left::Some) {
-                break;
-            }
-        }
+        let around = [-1.0, 1.0].map(|side| std::array::from_fn(|axis| best.0[axis] + side * half[axis]));
+        go_down(&mut best, around, MOST_ELLIPSOIDS, &above);
     }
     Some(best)
+}
+
+/// The same, but for where few ellipsoids lead: low enough to try what is there.
+pub(super) fn low(within: [Point; 2], above: impl Fn(&Point) -> (f64, Point)) -> Option<(Point, f64)> {
+    if is_empty(&within) {
+        return None;
+    }
+    let mut best = (between(&within[0], &within[1], 0.5), f64::INFINITY);
+    go_down(&mut best, within, FEW_ELLIPSOIDS, &above);
+    Some(best)
+}
+
+/// Looks for a place of a box where a function is lower than at the best one so far.
+fn go_down(best: &mut (Point, f64), [low, high]: [Point; 2], most: usize, above: &impl Fn(&Point) -> (f64, Point)) {
+    let mut ellipsoid = Ellipsoid::around(&low, &high);
+    for _ in 0..most {
+        let (value, slope) = above(&ellipsoid.centre);
+        if value < best.1 {
+            *best = (ellipsoid.centre, value);
+        }
+        if !matches!(ellipsoid.cut(value - best.1, &slope, false), Left::Some) {
+            break;
+        }
+    }
 }
 
 /// Sides of the boxes where the lowest place is sought, as shares of the first.

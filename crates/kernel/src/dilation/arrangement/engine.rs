@@ -24,6 +24,8 @@ use std::sync::OnceLock;
 /// Doubts that polytopes may leave, as a share of the sites, and in any case. Nearly all of them end in the next rounds; with more, the lattice costs less.
 const MOST_DOUBTS: f64 = 20.0;
 const FEW_DOUBTS: f64 = 1_000.0;
+/// Rounds in which polytopes are changed, at most: two to six are enough nearly always.
+const MOST_ROUNDS: u32 = 32;
 /// Planes that part a site's polytope from others, on average over a set.
 const MOST_PLANES: usize = 64;
 /// How much narrower the band of finer polytopes is, level by level.
@@ -136,8 +138,11 @@ impl<'a> Engine<'a> {
         let Some(mut sets) = Sets::new(&self.bodies(), budget)? else { return Ok(Run::Doubtful) };
         let mut changes = vec![Change::Other; self.sites.len()];
         let most = (MOST_DOUBTS * self.sites.len() as f64).max(FEW_DOUBTS) as usize;
-        while changes.iter().any(|&change| change != Change::Nothing) {
-            if !sets.look(&self.bodies(), &changes, most, budget)? {
+        for round in 0.. {
+            if changes.iter().all(|&change| change == Change::Nothing) {
+                break;
+            }
+            if round == MOST_ROUNDS || !sets.look(&self.bodies(), &changes, most, budget)? {
                 return Ok(Run::Doubtful);
             }
             let doubts = sets.doubts();

@@ -238,7 +238,9 @@ impl Arrangement {
         candidates: &Candidates,
         budget: &Budget,
     ) -> Result<Option<Self>, Stopped> {
-        let Some((mut sites, _)) = Sites::of(rule, candidates, most_of(MOST_POLYTOPES, budget), budget)? else { return Ok(None) };
+        // As many as [`Arrangement::new`] asks for sheets.
+        let most = (budget.limits.memory_bytes as f64 / BYTES_PER_SITE) as usize;
+        let Some((mut sites, _)) = Sites::of(rule, candidates, most_of(most, budget), budget)? else { return Ok(None) };
         sites.is_exact = setting.off + sites.off() == 0.0;
         let copies = Copies::default();
         let surfaces = rule.attractor().surfaces();

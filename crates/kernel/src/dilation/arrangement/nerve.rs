@@ -39,7 +39,7 @@ pub(super) struct Doubt {
     pub(super) wanted: Common,
 }
 
-/// The sets in doubt in a cube, and whether their dilations have a common point.
+/// The sets in doubt in a cube, or as many as it takes to go on, and whether their dilations have a common point.
 type Doubts = Vec<(Set, Common)>;
 
 /// How a polytope P_i was changed.
@@ -96,7 +96,8 @@ impl Sets {
         all.into_iter().map(|(set, wanted)| Doubt { sites: cubes::sites(set).collect(), wanted }).collect()
     }
 
-    /// Looks at the cubes where changes of the sites' polytopes may tell: at first, when they are all other ones, all of them. False where there was too much to look at, or more sets are in doubt than `most`.
+    /// Looks at the cubes where changes of the sites' polytopes may tell: at first, when they are all other ones, all of them. False where there was too much to look at, or more sets are in doubt than `most`. Of a cube with very many so
+    /// many are told as it takes to go on: it is looked at again when polytopes of its bodies change.
     ///
     /// # Errors
     /// [`Stopped`].

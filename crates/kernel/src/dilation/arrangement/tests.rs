@@ -2,6 +2,7 @@ use super::bodies::{Common, Hub, Kind, Near};
 use super::cubes::{ANY, Cube, MOST_BODIES, PRESENT, Search, is_covered};
 use super::ellipsoid::Place;
 use super::engine::Engine;
+use super::hidden::Hidden;
 use super::nerve::{Change, Doubt, Sets};
 use super::polytopes::height;
 use super::testing::*;
@@ -609,7 +610,7 @@ fn hidden_places_are_hidden() {
                     assert!(of_dilations.is_empty(), "{round}: {set:?}");
                     apart += 1;
                 }
-                if bodies.is_hidden(&set, common, &cube, &all, &mut asked) {
+                if bodies.hidden(&set, common, &cube, &all, &mut asked) == Hidden::All {
                     hidden += 1;
                     for x in of_dilations.into_iter().chain(of_polytopes).filter(|x| is_there(x)) {
                         assert!(all.iter().any(|&body| is_in(&engine, body, *x) == [true; 2]), "{round}: {set:?} {x}");
@@ -831,12 +832,65 @@ fn short_sides_turn_no_boxes() {
                     assert!((0..9).all(|place| skew(place / 3, place % 3) < 1e-14), "{tiny} {trial}: {axes:?}");
                 }
                 if arrangement.sites.list.len() == 2 {
-                    assert!(!bodies.is_hidden(&[0, 1], Common::Unknown, &around(), &[0, 1], &mut 0), "{tiny} {trial}");
+                    assert_ne!(bodies.hidden(&[0, 1], Common::Unknown, &around(), &[0, 1], &mut 0), Hidden::All, "{tiny} {trial}");
                 }
             });
             let dilation = arranged(&shape, 1.0, 0.1);
             assert!(!dilation.topology_exact || topology(&dilation) == (2, 0, 4), "{tiny} {trial}");
         }
+    }
+}
+
+/// A plate with a slot through it whose walls' dilations hardly meet, with sharp ends or round ones: what they have in common is long and thin, and dozens have it around an end. It is filled, without a lattice and without a doubt.
+#[test]
+fn slots_that_hardly_close_are_arranged() {
+    // Half as long and half as wide as told, with its corners where it ends, against the clock, and a plate of a size around it.
+    let plate = |slot: &[[f64; 2]], [wide, high]: [f64; 2]| {
+        let (count, corners) = (slot.len() as u32, [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]);
+        let both = |x: f64, y: f64| [0.0, high].map(|z| DVec3::new(x, y, z));
+        let around = corners.iter().map(|&[x, y]| both(wide * x, wide * y)).chain(slot.iter().map(|&[x, y]| both(x, y)));
+        let vertices: Vec<DVec3> = around.flatten().collect();
+        let corner = |place: u32| 4 * (place % count) / count;
+        let (low, own) = (|corner: u32| 2 * corner, |place: u32| 8 + 2 * (place % count));
+        let mut faces = Vec::new();
+        for place in 0..count {
+            let ([from, to], [a, b]) = ([place, place + 1].map(own), [place, place + 1].map(|place| low(corner(place))));
+            faces.extend([vec![from, to, a], vec![to + 1, from + 1, a + 1], vec![from, from + 1, to + 1], vec![from, to + 1, to]]);
+            if a != b {
+                faces.extend([vec![b, a, to], vec![a + 1, b + 1, to + 1], vec![a, b, b + 1], vec![a, b + 1, a + 1]]);
+            }
+        }
+        (vertices, faces)
+    };
+    let round = |half: f64, wide: f64| -> Vec<[f64; 2]> {
+        let end = |out: f64| {
+            (0..16).map(move |k| (out, std::f64::consts::PI * f64::from(k) / 15.0)).map(move |(out, turn)| {
+                let (sine, cosine) = turn.sin_cos();
+                [out * wide * cosine, out * (half + wide * sine)]
+            })
+        };
+        end(1.0).chain(end(-1.0)).collect()
+    };
+    for (slot, size, is_sharp) in
+        [(vec![[0.975, 20.0], [-0.975, 20.0], [-0.975, -20.0], [0.975, -20.0]], [50.0, 10.0], true), (round(8.0, 0.99), [14.0, 6.0], false)]
+    {
+        let (vertices, faces) = plate(&slot, size);
+        let shape = lowered_as(Interior::Solid, &vertices, faces).unwrap();
+        let dilation = dilate(&shape, Radius::new(1.0).unwrap(), Tolerance::new(0.1).unwrap(), &Budget::default()).unwrap();
+        assert!(dilation.topology_exact && dilation.crossings == 0 && dilation.pitch_mm.is_none(), "{is_sharp}");
+        assert_eq!(topology(&dilation), (1, 0, 2), "{is_sharp}");
+        // Steiner's formula of the box, less dents at the mouths of the slot, which are no deeper than the radius.
+        let volume = crate::measure::mass::volume(dilation.solid.mesh());
+        let of = |r: f64| {
+            let (a, h) = (2.0 * size[0], size[1]);
+            a * a * h
+                + 2.0 * (a * a + 2.0 * a * h) * r
+                + std::f64::consts::PI * (2.0 * a + h) * r * r
+                + 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)
+        };
+        let dents = 2.0
+            * slot.iter().fold([0.0; 2], |most, at| [0, 1].map(|k| at[k].max(most[k]))).map(|half: f64| 2.0 * half).iter().product::<f64>();
+        assert!(of(0.9) - dents < volume && volume < of(1.1), "{is_sharp}: {volume}");
     }
 }
 
@@ -858,7 +912,7 @@ fn places_hidden_in_solids_are_hidden() {
             let (bodies, count) = (engine.bodies(), arrangement.sites.list.len() as u32);
             let all: Vec<u32> = (0..count).collect();
             for (first, second) in (0..count).flat_map(|first| (0..first).map(move |second| (second, first))) {
-                if !bodies.is_hidden(&[first, second], Common::Unknown, &around(), &all, &mut 0) {
+                if bodies.hidden(&[first, second], Common::Unknown, &around(), &all, &mut 0) != Hidden::All {
                     continue;
                 }
                 hidden += 1;
